@@ -1,0 +1,1 @@
+"""The flight software: estimator, control cascade, mixer and the MAVLink face of the vehicle."""

@@ -1,0 +1,1 @@
+"""The ground station: what a person types, what is captured, and the report."""
