@@ -54,5 +54,5 @@ def quat_ned_frd_from_enu_flu(quat_wxyz: Quat) -> Quat:
 
 @kernel
 def quat_enu_flu_from_ned_frd(quat_wxyz: Quat) -> Quat:
-    """Attitude FRD -> NED rewritten as attitude FLU -> ENU, with w >= 0: both changes of axes are half turns."""
+    """Attitude FRD -> NED rewritten as FLU -> ENU, with w >= 0: both changes of axes are half turns."""
     return quat_ned_frd_from_enu_flu(quat_wxyz)

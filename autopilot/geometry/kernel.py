@@ -35,7 +35,8 @@ def _source_hash() -> str:
 
 
 if "NUMBA_CACHE_DIR" not in os.environ:
-    numba.config.CACHE_DIR = str(user_cache_path("plumbline") / "kernels" / _source_hash())
+    # numba.config is filled from the environment; it declares no attributes to a type checker
+    vars(numba.config)["CACHE_DIR"] = str(user_cache_path("plumbline") / "kernels" / _source_hash())
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:

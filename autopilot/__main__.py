@@ -1,0 +1,442 @@
+"""The `autopilot` program: sockets, storage and signals around `autopilot.onboard`."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import select
+import signal
+import socket
+import struct
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import click
+from platformdirs import user_state_path
+
+from autopilot.onboard import Onboard
+from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.records import Event, Link, MissionChanged, ParameterChanged, TimesyncAnswered
+from autopilot.storage import Storage, StorageError
+from autopilot.telemetry_view import Options
+from autopilot.vehicle.belief import BeliefError, load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert import Home, home_from_text
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameters import ParameterError, ParameterTable
+
+Address = tuple[str, int]
+
+LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
+GROUND_SYNC_US = 20_000
+_GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
+_SILENCE_S = 3.0  # of the simulator, until it is said
+_GROUND_RESEND_S = 1.0
+_GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
+_STALE_TICKS = 3  # ticks from the past in a row: the simulator has started again
+_GROUND_LINK: Link = "ground"
+_LARGEST_DATAGRAM = 65535
+_PR_SET_TIMERSLACK = 29
+
+
+class Stop(BaseException):
+    """SIGTERM or SIGINT."""
+
+
+class AutopilotError(Exception):
+    """What ends the program with one line."""
+
+
+def _receive(sock: socket.socket, flags: int = 0) -> tuple[bytes, Address] | None:
+    """The next datagram and its sender; None after the socket's timeout, or if one of ours found nobody."""
+    try:
+        return sock.recvfrom(_LARGEST_DATAGRAM, flags)
+    except OSError:
+        return None
+
+
+def _set_timeout(sock: socket.socket, seconds: float) -> None:
+    """By SO_RCVTIMEO, which costs nothing per datagram."""
+    whole = int(seconds)
+    value = struct.pack("ll", whole, round((seconds - whole) * 1e6))
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
+
+
+def _open(address: Address, what: str) -> socket.socket:
+    try:
+        family = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0][0]
+        sock = socket.socket(family, socket.SOCK_DGRAM)
+        # no traffic but to where we are pointed, and answers to it
+        sock.bind(("127.0.0.1" if _is_loopback(address[0]) else "", 0))
+    except OSError as error:
+        raise AutopilotError(f"{what} {address[0]}:{address[1]}: {error.strerror or error}") from None
+    return sock
+
+
+def _is_loopback(host: str) -> bool:
+    return host == "localhost" or host.startswith("127.")
+
+
+class GroundStations:
+    """Sockets towards ground stations, one for each address that we were pointed at.
+
+    Whoever else speaks to such a socket is a link of its own and is answered where it is.
+    """
+
+    def __init__(self, addresses: tuple[Address, ...]) -> None:
+        self._sockets = [_open(address, "ground station") for address in addresses]
+        self._links: list[Link] = [(i, address) for i, address in enumerate(addresses)]
+
+    def join(self, onboard: Onboard) -> None:
+        """Serve the configured links from now on."""
+        for link in self._links:
+            onboard.add_link(link)
+
+    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None]) -> None:
+        """Hand over what came and send what is due."""
+        for i, sock in enumerate(self._sockets):
+            while True:
+                arrived = _receive(sock, socket.MSG_DONTWAIT)
+                if arrived is None:
+                    break
+                datagram, sender = arrived
+                handle(onboard.receive_ground(datagram, (i, sender)))
+        self.send(onboard)
+
+    def send(self, onboard: Onboard) -> None:
+        """Send what is due."""
+        for link, datagram in onboard.ground_datagrams():
+            i, address = link  # type: ignore[misc]
+            with suppress(OSError):  # nobody listens there yet, or the network is full: lost
+                self._sockets[i].sendto(datagram, address)  # type: ignore[has-type]
+
+    def wait(self, other: socket.socket, seconds: float) -> None:
+        """Until anything arrives, here or on `other`."""
+        select.select([other, *self._sockets], [], [], seconds)
+
+    def close(self) -> None:
+        for sock in self._sockets:
+            sock.close()
+
+
+class GroundInStep:
+    """One ground station that shares our clock: every 20 ms we wait until it has caught up."""
+
+    def __init__(self, address: Address) -> None:
+        self._socket = _open(address, "ground station")
+        self._address = address
+        self._next_us = 0
+
+    def join(self, onboard: Onboard) -> None:
+        """Serve the link from now on."""
+        onboard.add_link(_GROUND_LINK)
+        _set_timeout(self._socket, _GROUND_RESEND_S)
+
+    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None]) -> None:
+        """Send what is due; at the end of a window wait for the ground station's word on it."""
+        for _, datagram in onboard.ground_datagrams():
+            self._send(datagram)
+        if onboard.now_us < self._next_us:
+            return
+        self._next_us = onboard.now_us - onboard.now_us % GROUND_SYNC_US + GROUND_SYNC_US
+        stamp = onboard.now_us * 1000
+        ask = onboard.endpoint.datagram(_GROUND_LINK, mavlink.MAVLink_timesync_message(0, stamp))
+        self._send(ask)
+        asked = time.monotonic()
+        while True:
+            arrived = _receive(self._socket)
+            if arrived is None:
+                if time.monotonic() - asked > _GROUND_GONE_S:
+                    raise AutopilotError(f"the ground station was silent for {_GROUND_GONE_S:g} s; stopping")
+                self._send(ask)
+                continue
+            if arrived[1] != self._address:
+                continue
+            events = onboard.receive_ground(arrived[0], _GROUND_LINK)
+            handle(events)
+            if any(isinstance(event, TimesyncAnswered) and event.ts1 == stamp for event in events):
+                return
+
+    def _send(self, datagram: bytes) -> None:
+        with suppress(OSError):
+            self._socket.sendto(datagram, self._address)
+
+    def wait(self, other: socket.socket, seconds: float) -> None:
+        """Until something arrives on `other`: the ground station has nothing to say out of turn."""
+        select.select([other], [], [], seconds)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class Program:
+    """The running autopilot: an `Onboard`, and anew whenever the simulator starts again."""
+
+    def __init__(
+        self,
+        build: Callable[[StoredMission | None], Onboard],
+        mission: StoredMission | None,
+        storage: Storage,
+        simulator: Address,
+        ground: GroundStations | GroundInStep,
+        say: Callable[[str], None],
+    ) -> None:
+        self._build = build
+        self._storage = storage
+        self._simulator = simulator
+        self._ground = ground
+        self._say = say
+        self._socket = _open(simulator, "simulator")
+        greeting = mavlink.MAVLink_heartbeat_message(
+            type=mavlink.MAV_TYPE_QUADROTOR,
+            autopilot=mavlink.MAV_AUTOPILOT_PX4,
+            base_mode=mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+            custom_mode=0,
+            system_status=mavlink.MAV_STATE_BOOT,
+            mavlink_version=3,
+        )
+        self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
+        self.onboard = build(mission)
+        self._ground.join(self.onboard)
+
+    def run(self) -> None:
+        """Tick for ever."""
+        _set_timeout(self._socket, _GREETING_S)
+        heard = time.monotonic()
+        silent = True
+        self._say(f"looking for the simulator at {_shown(self._simulator)}")
+        self._greet()
+        while True:
+            arrived = _receive(self._socket)
+            if arrived is None:
+                now = time.monotonic()
+                if not silent and now - heard > _SILENCE_S:
+                    silent = True
+                    self._say(f"no word from the simulator for {_SILENCE_S:g} s; looking for it")
+                if silent or now - heard > 1.0:
+                    self._greet()
+                # the clock stands, but questions are answered
+                if isinstance(self._ground, GroundStations):
+                    self._ground.exchange(self.onboard, self._keep)
+                continue
+            datagram, sender = arrived
+            if sender != self._simulator:
+                continue
+            before = self.onboard.now_us, self.onboard.tick
+            answer = self.onboard.receive_sensors(datagram)
+            if answer is not None:
+                with suppress(OSError):
+                    self._answer(answer, (self.onboard.now_us, self.onboard.tick) != before)
+                if silent:
+                    silent = False
+                    self._say(f"flying with the simulator at {_shown(self._simulator)}")
+                heard = time.monotonic()
+            elif self.onboard.stale >= _STALE_TICKS:
+                self._say("the simulator has started again: so do I")
+                self.onboard = self._build(self.onboard.endpoint.mission)
+                self._ground.join(self.onboard)
+
+    def _answer(self, answer: bytes, new: bool) -> None:
+        """Exchange with the ground before the answer where the ground shares our clock, else after it."""
+        if isinstance(self._ground, GroundInStep):
+            if new:
+                self._ground.exchange(self.onboard, self._keep)
+            self._socket.sendto(answer, self._simulator)
+        else:
+            self._socket.sendto(answer, self._simulator)
+            self._ground.exchange(self.onboard, self._keep)
+        if new and self.onboard.fault and self.onboard.tick == 1:
+            raise AutopilotError(self.onboard.fault)
+
+    def _greet(self) -> None:
+        with suppress(OSError):
+            self._socket.sendto(self._greeting, self._simulator)
+
+    def _keep(self, events: list[Event]) -> None:
+        for event in events:
+            try:
+                match event:
+                    case MissionChanged(mission):
+                        self._storage.keep_mission(mission)
+                    case ParameterChanged(name, value):
+                        self._storage.keep_parameter(name, value)
+            except OSError as error:
+                self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
+                self._say(f"cannot store: {error}")
+
+    def close(self) -> None:
+        """Close all sockets."""
+        self._socket.close()
+        self._ground.close()
+
+
+def _shown(address: Address) -> str:
+    return f"{address[0]}:{address[1]}"
+
+
+def _prepare_process() -> None:
+    """What the operating system may do for punctuality; none of it is needed."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    gc.collect()
+    gc.freeze()
+
+
+def _address(text: str) -> Address:
+    """HOST:PORT."""
+    host, _, port = text.rpartition(":")
+    if not (host and port.isdecimal() and 0 < int(port) < 65536):
+        raise click.BadParameter(f"{text!r}; must be HOST:PORT with a port of 1 ... 65535")
+    return host.strip("[]"), int(port)
+
+
+def _address_or_none(text: str) -> Address | None:
+    """HOST:PORT or `none`."""
+    return None if text == "none" else _address(text)
+
+
+def _home(text: str) -> Home:
+    """LAT,LON,ALT."""
+    try:
+        return home_from_text(text)
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
+def _setting(text: str) -> tuple[str, float]:
+    """NAME=VALUE."""
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
+
+
+def _apply(table: ParameterTable, settings: tuple[tuple[str, float], ...]) -> None:
+    """Set what is the autopilot's; SIM_ parameters that it does not know belong to the simulator."""
+    for name, value in settings:
+        if name in table or not name.startswith("SIM_"):
+            table.set(name, value)
+
+
+@click.command()
+@click.option(
+    "--sim",
+    type=_address,
+    metavar="HOST:PORT",
+    default="127.0.0.1:4560",
+    show_default=True,
+    help="Where the simulator listens.",
+)
+@click.option(
+    "--gcs",
+    type=_address_or_none,
+    metavar="HOST:PORT",
+    multiple=True,
+    default=("127.0.0.1:14550",),
+    show_default=True,
+    help="Ground station to speak to; repeatable, `none` for none.",
+)
+@click.option(
+    "--api",
+    type=_address_or_none,
+    metavar="HOST:PORT",
+    default="127.0.0.1:14540",
+    show_default=True,
+    help="API client to speak to, `none` for none.",
+)
+@click.option(
+    "--ground-lockstep",
+    type=_address,
+    metavar="HOST:PORT",
+    help="One ground station that shares our clock, in place of --gcs and --api.",
+)
+@click.option(
+    "--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help="What is believed to fly."
+)
+@click.option(
+    "--set",
+    "settings",
+    type=_setting,
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Set a parameter; repeatable. SIM_ parameters of the simulator are passed over.",
+)
+@click.option("--home", type=_home, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@click.option(
+    "--storage",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Where mission and parameters outlive the program.  [default: the user's state directory]",
+)
+@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+@click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
+def main(
+    sim: Address,
+    gcs: tuple[Address | None, ...],
+    api: Address | None,
+    ground_lockstep: Address | None,
+    vehicle: str,
+    settings: tuple[tuple[str, float], ...],
+    home: Home | None,
+    storage: Path | None,
+    quiet: bool,
+) -> None:
+    """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
+
+    def say(text: str) -> None:
+        if not quiet:
+            print(f"autopilot: {text}", flush=True)
+
+    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGINT, _stop)
+    program: Program | None = None
+    place = home or Home()
+    in_step = ground_lockstep is not None
+    try:
+        table = autopilot_parameters(load_belief(vehicle))
+        kept = Storage(storage or user_state_path("plumbline"))
+        for trouble in kept.load_parameters(table):
+            print(f"autopilot: {trouble}", file=sys.stderr)
+        _apply(table, settings)
+        table.freeze()
+        mission, trouble = kept.load_mission(place)
+        if trouble:
+            print(f"autopilot: {trouble}", file=sys.stderr)
+        boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
+        options = Options(place, boot)
+
+        def build(stored: StoredMission | None) -> Onboard:
+            return Onboard(table, Identity(), options, stored)
+
+        stations = [address for address in (*gcs, api) if address is not None]
+        ground = GroundInStep(ground_lockstep) if ground_lockstep else GroundStations(tuple(stations))
+        program = Program(build, mission, kept, sim, ground, say)
+        program.onboard.rehearse()
+        _prepare_process()
+        program.run()
+    except (AutopilotError, BeliefError, ParameterError, StorageError) as error:
+        print(f"autopilot: {error}", file=sys.stderr)
+        sys.exit(1)
+    except Stop:
+        pass
+    finally:
+        if program is not None:
+            program.close()
+    if program is not None:
+        say(f"stopped at t = {program.onboard.now_us / 1e6:.3f} s")
+
+
+def _stop(_signal: int, _frame: object) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise Stop
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,66 @@
+"""The records that travel between the laws: NamedTuples, because kernels take and return them.
+
+SI units, world ENU, body FLU. Whatever a field name does not say is in the world frame.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.geometry.linear import Mat3, Vec3
+
+# Position and its first to sixth time derivatives, world frame: m, m/s, ... m/s^6
+Jet = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
+
+
+class Vehicle(NamedTuple):
+    """What the autopilot believes of the vehicle (Table 4-1). Assumptions: principal axes are the body axes,
+    the cable is massless, inextensible and attached at the centre of mass."""
+
+    quad_mass: float  # m_Q, kg, without the load
+    load_mass: float  # m_L, kg
+    cable_length: float  # L, m
+    inertia: Vec3  # diagonal of J, kg m^2, body
+    gravity: float  # g, m/s^2
+    arm: float  # l, m, from the centre of mass to a rotor
+    torque_ratio: float  # c = d/b, m: drag torque for each newton of thrust
+    rotor_min: float  # N, one rotor
+    rotor_max: float  # N, one rotor; inf if unlimited
+
+
+class State(NamedTuple):
+    """What the laws are told of the motion, while the cable is taut (2-19)."""
+
+    x_load: Vec3  # x_L, m
+    v_load: Vec3  # m/s
+    q_cable: Vec3  # q, unit vector from the vehicle to the load
+    q_cable_dot: Vec3  # 1/s, orthogonal to q_cable
+    x_quad: Vec3  # x_Q, m
+    v_quad: Vec3  # m/s
+    R: Mat3  # body to world
+    omega_body: Vec3  # Omega, rad/s, body
+
+
+class Reference(NamedTuple):
+    """Where the load (or, in the vehicle position law, the vehicle) is to be, and where the nose points."""
+
+    jet: Jet  # desired position and its six derivatives
+    b1_d: Vec3  # desired heading, unit vector, not parallel to the thrust axis
+
+
+class Command(NamedTuple):
+    """What goes to the mixer, and the errors it was made from. Errors that a flight mode does not close are
+    zero, so is a Psi that it does not define."""
+
+    thrust: float  # f, N, along the thrust axis
+    moment: Vec3  # M, N m, body
+    e_x: Vec3  # m
+    e_v: Vec3  # m/s
+    e_q: Vec3  # (3-10)
+    e_q_dot: Vec3  # 1/s, (3-11)
+    e_R: Vec3  # (3-3), body
+    e_Omega: Vec3  # rad/s, (3-6), body
+    psi_R: float  # (3-1), 0 ... 2
+    psi_q: float  # (3-8), 0 ... 2
+    q_c: Vec3  # the cable direction asked for: computed (3-42) or desired
+    R_c: Mat3  # the attitude asked for: computed (3-27) or desired

@@ -1,0 +1,281 @@
+"""What the supervisor answers to a request, and what becomes of the flight by it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from autopilot.flight import (
+    CARRYING,
+    ON_GROUND,
+    Event,
+    Flight,
+    Phase,
+    Plan,
+    Selected,
+    Settings,
+    View,
+)
+from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.guidance import LOAD_POSITION, Hold, transfer_leg
+from autopilot.services import identity
+from autopilot.services.records import Verdict
+from autopilot.services.requests import (
+    Arm,
+    ChangeSpeed,
+    Continue,
+    Land,
+    Pause,
+    ReplaceMission,
+    Reposition,
+    ReturnHome,
+    RunPrearmChecks,
+    SetCurrent,
+    SetMode,
+    StartMission,
+    Takeoff,
+    Terminate,
+)
+from autopilot.supervisor import disarmed, enter, happen, load_setpoint
+from autopilot.wire.dialect import plumbline as mavlink
+from missions import model
+
+ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
+LEAST_ALTITUDE_M = 0.3
+GROUND_SPEED_M_S = 0.3  # an arming vehicle moves no faster
+
+
+def _denied(text: str) -> Verdict:
+    return Verdict(mavlink.MAV_RESULT_DENIED, text)
+
+
+def _later(text: str) -> Verdict:
+    return Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, text)
+
+
+def _wrong_phase(flight: Flight, what: str) -> Verdict:
+    return _later(f"{what} denied while {flight.phase.name.lower()}")
+
+
+Decision = tuple[Flight, Verdict]
+
+
+def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    """The flight after the request, and the verdict on it; an unknown request is unsupported."""
+    handler = _HANDLERS.get(type(request))
+    if handler is None:
+        return flight, Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
+    return handler(flight, request, view, settings)
+
+
+def arming_complaints(flight: Flight, view: View) -> tuple[str, ...]:
+    """What keeps the vehicle from being armed, in words."""
+    found = list(view.complaints)
+    if view.tilt_rad > math.radians(20.0):
+        found.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
+    if norm(view.v_quad) > GROUND_SPEED_M_S:
+        found.append(f"moving at {norm(view.v_quad):.1f} m/s")
+    return tuple(found)
+
+
+def _arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decision:
+    if not request.arm:
+        if flight.phase == Phase.DISARMED:
+            return flight, ACCEPTED
+        if flight.phase not in ON_GROUND and not request.force:
+            return flight, _denied("Disarming denied: in the air")
+        after = happen(flight, Event.DISARM, view, settings)
+        return (disarmed(after), ACCEPTED) if after else (flight, _denied("Disarming denied"))
+    if flight.phase == Phase.ARMED:
+        return flight, ACCEPTED
+    if flight.phase != Phase.DISARMED:
+        return flight, _denied("Arming denied: in the air")
+    complaints = arming_complaints(flight, view)
+    if complaints and not request.force:
+        return flight, _denied(f"Arming denied: {complaints[0]}")
+    after = happen(flight, Event.ARM, view, settings)
+    assert after is not None
+    if flight.selected == Selected.MISSION:
+        return _begin_mission(after, view, settings)
+    if flight.selected == Selected.TAKEOFF:
+        return _take_off(after, view, settings), ACCEPTED
+    return after, ACCEPTED
+
+
+def _take_off(flight: Flight, view: View, settings: Settings) -> Flight:
+    after = happen(replace(flight, speed_m_s=settings.speed_m_s), Event.TAKEOFF, view, settings)
+    assert after is not None
+    return after
+
+
+def _takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) -> Decision:
+    altitude = settings.takeoff_altitude_m if request.altitude_m is None else request.altitude_m
+    if not altitude >= LEAST_ALTITUDE_M:
+        return flight, _denied(f"Take-off denied: load height {altitude:.2f} m, least {LEAST_ALTITUDE_M} m")
+    flight_up = replace(flight, takeoff_altitude_m=altitude, selected=Selected.TAKEOFF, on_mission=False)
+    if flight.phase == Phase.DISARMED:
+        return flight_up, ACCEPTED
+    if flight.phase == Phase.ARMED:
+        return _take_off(flight_up, view, settings), ACCEPTED
+    return flight, _denied("Take-off denied: in the air")
+
+
+def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
+    """Start the mission at `flight.step`, from the ground or from the air."""
+    plan = flight.plan
+    if not plan.steps:
+        return flight, _denied("Mission denied: there is none")
+    if flight.phase == Phase.DISARMED:
+        return replace(flight, selected=Selected.MISSION), ACCEPTED
+    flight = replace(flight, on_mission=True, mission_done=False, selected=Selected.MISSION)
+    if flight.phase == Phase.ARMED:
+        first = next((s for s in plan.steps if isinstance(s, model.Takeoff)), None)
+        altitude = settings.takeoff_altitude_m if first is None else first.altitude_m
+        return _take_off(replace(flight, takeoff_altitude_m=altitude), view, settings), ACCEPTED
+    if isinstance(plan.steps[flight.step], model.Land):
+        after = happen(flight, Event.LAND, view, settings)
+    else:
+        after = happen(flight, Event.MISSION, view, settings)
+    return (after, ACCEPTED) if after else _refused(flight, "Mission")
+
+
+def _refused(flight: Flight, what: str) -> Decision:
+    return replace(flight, on_mission=False), _wrong_phase(flight, what)
+
+
+def _start_mission(flight: Flight, request: StartMission, view: View, settings: Settings) -> Decision:
+    if request.first is not None:
+        flight, verdict = _set_current(flight, SetCurrent(request.first), view, settings)
+        if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
+            return flight, verdict
+    if flight.on_mission and flight.phase not in ON_GROUND and flight.phase != Phase.HOLD:
+        return flight, ACCEPTED
+    return _begin_mission(flight, view, settings)
+
+
+def _set_current(flight: Flight, request: SetCurrent, view: View, settings: Settings) -> Decision:
+    if not 0 <= request.seq < flight.plan.items:
+        return flight, _denied(f"Mission item {request.seq} denied: the mission has {flight.plan.items}")
+    step = next((i for i, seq in enumerate(flight.plan.sequence) if seq >= request.seq), None)
+    if step is None:
+        return flight, _denied(f"Mission item {request.seq} denied: nothing is flown from there")
+    moved = replace(flight, step=step, step_anchor=None, mission_done=False)
+    if flight.phase == Phase.MISSION:
+        return enter(moved, Phase.MISSION, view, settings), ACCEPTED
+    return moved, ACCEPTED
+
+
+def _hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    if flight.phase in ON_GROUND:
+        return replace(flight, selected=Selected.NOTHING), ACCEPTED
+    after = happen(replace(flight, on_mission=False), Event.HOLD, view, settings)
+    return (after, ACCEPTED) if after else (flight, _wrong_phase(flight, "Hold"))
+
+
+def _land(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    if flight.phase in ON_GROUND or flight.phase in (Phase.LOWER, Phase.SET_DOWN):
+        return flight, ACCEPTED
+    after = happen(replace(flight, on_mission=False), Event.LAND, view, settings)
+    return (after, ACCEPTED) if after else (flight, _wrong_phase(flight, "Landing"))
+
+
+def _return_home(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    after = happen(replace(flight, on_mission=False), Event.RETURN, view, settings)
+    return (after, ACCEPTED) if after else (flight, _wrong_phase(flight, "Return"))
+
+
+def _mode_takeoff(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    return _takeoff(flight, Takeoff(None), view, settings)
+
+
+def _mode_mission(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    return _start_mission(flight, StartMission(None), view, settings)
+
+
+_MODES: dict[tuple[int, int], Callable[[Flight, Any, View, Settings], Decision]] = {
+    (identity.AUTO, identity.AUTO_TAKEOFF): _mode_takeoff,
+    (identity.AUTO, identity.AUTO_LOITER): _hold,
+    (identity.AUTO, identity.AUTO_MISSION): _mode_mission,
+    (identity.AUTO, identity.AUTO_RTL): _return_home,
+    (identity.AUTO, identity.AUTO_LAND): _land,
+}
+
+
+def _set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -> Decision:
+    main, sub_mode = request.main, request.sub
+    if (main, sub_mode) == (identity.AUTO, 0):
+        sub_mode = identity.AUTO_MISSION
+    handler = _MODES.get((main, sub_mode))
+    if handler is None:
+        return flight, _denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
+    return handler(flight, request, view, settings)
+
+
+def _replace_mission(flight: Flight, request: ReplaceMission, view: View, settings: Settings) -> Decision:
+    if flight.on_mission and flight.phase not in ON_GROUND:
+        return flight, _denied("Mission denied: the present one is being flown; pause it first")
+    return flight, ACCEPTED
+
+
+def _reposition(flight: Flight, request: Reposition, view: View, settings: Settings) -> Decision:
+    if flight.phase not in CARRYING:
+        return flight, _wrong_phase(flight, "Reposition")
+    if flight.phase != Phase.HOLD and not request.change_mode:
+        return flight, _later("Reposition denied: not holding")
+    held, verdict = _hold(flight, request, view, settings)
+    asked = (request.east_m, request.north_m, request.altitude_m)
+    if verdict.result != mavlink.MAV_RESULT_ACCEPTED or asked == (None, None, None):
+        return held, verdict
+    here = load_setpoint(held, view)
+    there: Vec3 = (
+        here[0] if asked[0] is None else asked[0],
+        here[1] if asked[1] is None else asked[1],
+        here[2] if asked[2] is None else asked[2],
+    )
+    if there[2] < LEAST_ALTITUDE_M:
+        return flight, _denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
+    if norm(sub(there, here)) == 0.0:
+        return held, ACCEPTED
+    go = transfer_leg(here, there, flight.speed_m_s, settings.accel_m_s2, LOAD_POSITION)
+    return replace(held, legs=(go, Hold(there)), leg_start_us=view.now_us), ACCEPTED
+
+
+def _change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Settings) -> Decision:
+    if not 0.05 <= request.speed_m_s <= 15.0:
+        return flight, _denied(f"Speed {request.speed_m_s:.2f} m/s denied; must be 0.05 ... 15")
+    return replace(flight, speed_m_s=request.speed_m_s), ACCEPTED
+
+
+def _terminate(flight: Flight, request: Terminate, view: View, settings: Settings) -> Decision:
+    after = happen(replace(flight, on_mission=False), Event.FAIL, view, settings)
+    return (after if after else flight), ACCEPTED
+
+
+def _run_checks(flight: Flight, request: RunPrearmChecks, view: View, settings: Settings) -> Decision:
+    complaints = arming_complaints(flight, view)
+    return flight, Verdict(mavlink.MAV_RESULT_ACCEPTED, "; ".join(complaints) or "Ready to arm")
+
+
+def with_plan(flight: Flight, plan: Plan) -> Flight:
+    """The flight with another mission, rewound."""
+    return replace(flight, plan=plan, step=0, step_anchor=None, mission_done=False)
+
+
+_HANDLERS: dict[type, Callable[[Flight, Any, View, Settings], Decision]] = {
+    Arm: _arm,
+    Takeoff: _takeoff,
+    Land: _land,
+    ReturnHome: _return_home,
+    SetMode: _set_mode,
+    StartMission: _start_mission,
+    Pause: _hold,
+    Continue: _mode_mission,
+    SetCurrent: _set_current,
+    ReplaceMission: _replace_mission,
+    Reposition: _reposition,
+    ChangeSpeed: _change_speed,
+    Terminate: _terminate,
+    RunPrearmChecks: _run_checks,
+}

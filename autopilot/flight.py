@@ -1,0 +1,154 @@
+"""The record of a flight as the supervisor keeps it, and what it looks at when it decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+from typing import NamedTuple
+
+from autopilot.control.records import Jet
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.guidance import Leg
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameters import ParameterTable
+from missions.model import Step
+
+
+class Phase(IntEnum):
+    """Phases of flight, numbered as PLUMBLINE_PHASE."""
+
+    DISARMED = mavlink.PLUMBLINE_PHASE_DISARMED
+    ARMED = mavlink.PLUMBLINE_PHASE_ARMED
+    TAUTEN = mavlink.PLUMBLINE_PHASE_TAUTEN
+    LIFT = mavlink.PLUMBLINE_PHASE_LIFT
+    HOLD = mavlink.PLUMBLINE_PHASE_HOLD
+    MISSION = mavlink.PLUMBLINE_PHASE_MISSION
+    RETURN = mavlink.PLUMBLINE_PHASE_RETURN
+    LOWER = mavlink.PLUMBLINE_PHASE_LOWER
+    SET_DOWN = mavlink.PLUMBLINE_PHASE_SET_DOWN
+    FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
+
+
+ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
+CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER})
+IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
+
+
+class Event(Enum):
+    """What makes a phase end."""
+
+    ARM = "arm"
+    DISARM = "disarm"
+    TAKEOFF = "take off"
+    TAUT = "cable taut"
+    DONE = "legs done"
+    HOLD = "hold"
+    MISSION = "fly the mission"
+    RETURN = "return"
+    LAND = "land"
+    LOAD_DOWN = "load on the ground"
+    VEHICLE_DOWN = "vehicle on the ground"
+    FAIL = "give up"
+
+
+class Selected(Enum):
+    """What arming begins."""
+
+    NOTHING = "hold"
+    TAKEOFF = "take-off"
+    MISSION = "mission"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The mission in force: its steps, the mission item each came from, and how many items there are."""
+
+    steps: tuple[Step, ...] = ()
+    sequence: tuple[int, ...] = ()
+    items: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """Where the flight stands. `legs[0]` is being flown since `leg_start_us`."""
+
+    phase: Phase = Phase.DISARMED
+    phase_start_us: int = 0
+    legs: tuple[Leg, ...] = ()
+    leg_start_us: int = 0
+    selected: Selected = Selected.NOTHING
+    plan: Plan = Plan()
+    step: int = 0
+    on_mission: bool = False
+    mission_done: bool = False
+    takeoff_altitude_m: float = 0.0
+    speed_m_s: float = 0.0
+    still_since_us: int = -1  # since when the touchdown conditions hold, -1: they do not
+    step_anchor: Vec3 | None = None  # where the present mission step began
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The supervisor's parameters."""
+
+    cable_length_m: float
+    takeoff_altitude_m: float
+    speed_m_s: float
+    accel_m_s2: float
+    lift_speed_m_s: float
+    taut_speed_m_s: float
+    load_error_limit_m: float
+    tilt_limit_rad: float
+    sensor_age_limit_s: float
+
+
+class View(NamedTuple):
+    """What the supervisor sees of the world at a tick: estimates, ENU from home."""
+
+    now_us: int
+    x_quad: Vec3
+    v_quad: Vec3
+    x_load: Vec3
+    v_load: Vec3
+    taut: bool
+    tilt_rad: float
+    complaints: tuple[str, ...]
+
+
+class Report(NamedTuple):
+    """What came of an advance: texts (severity, text) for the operator, mission items reached."""
+
+    texts: tuple[tuple[int, str], ...] = ()
+    reached: tuple[int, ...] = ()
+
+
+def settings_from(table: ParameterTable) -> Settings:
+    """The supervisor's settings from the parameter table."""
+    return Settings(
+        cable_length_m=table["VEH_CABLE_LEN"],
+        takeoff_altitude_m=table["MIS_TAKEOFF_ALT"],
+        speed_m_s=table["MIS_SPEED"],
+        accel_m_s2=table["MIS_ACCEL"],
+        lift_speed_m_s=table["MIS_LIFT_SPEED"],
+        taut_speed_m_s=table["MIS_TAUT_SPEED"],
+        load_error_limit_m=table["FS_LOAD_ERR"],
+        tilt_limit_rad=table["FS_TILT_DEG"] * (3.141592653589793 / 180.0),
+        sensor_age_limit_s=table["FS_SENSOR_S"],
+    )
+
+
+def leg_time_s(flight: Flight, now_us: int) -> float:
+    """Time in the present leg."""
+    return (now_us - flight.leg_start_us) * 1e-6
+
+
+def setpoint(flight: Flight, now_us: int) -> Jet | None:
+    """Position and derivatives asked for now, of load or vehicle as the leg says; None without a leg."""
+    if not flight.legs:
+        return None
+    return flight.legs[0].jet(leg_time_s(flight, now_us))
+
+
+def at_rest(position: Vec3) -> Jet:
+    """A jet that stays."""
+    return (position, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)

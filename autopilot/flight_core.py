@@ -1,0 +1,134 @@
+"""One tick of the flight software: readings in, rotor forces out. No clock, no socket, no hidden state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
+from autopilot.control.records import Command, Jet, Reference, State, Vehicle
+from autopilot.control.thesis import attitude_towards
+from autopilot.decisions import arming_complaints
+from autopilot.estimation.filter import Readings, complaints, control_state, estimate
+from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
+from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, leg_time_s
+from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, neg
+from autopilot.geometry.so3 import tilt_angle
+from autopilot.guidance import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION, Leg, Swing
+from autopilot.laws import Law, Memory
+from autopilot.mixer import MixerResult, mix
+from autopilot.scheduler import is_due
+from autopilot.supervisor import advance
+
+IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
+NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, neg(E3), IDENTITY)
+STOPPED = MixerResult((0.0, 0.0, 0.0, 0.0), 0, 0.0, ZERO)
+IDLE = MixerResult((IDLE_FORCE_N, IDLE_FORCE_N, IDLE_FORCE_N, IDLE_FORCE_N), 0, 4.0 * IDLE_FORCE_N, ZERO)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """All that parameters decide."""
+
+    vehicle: Vehicle
+    limited: float
+    law: Law
+    tuning: EstimatorTuning
+    settings: Settings
+    control_every: int  # ticks
+
+
+class FlightState(NamedTuple):
+    """All that is carried from tick to tick, but for the estimator's history, too large for a record."""
+
+    estimator: EstimatorState
+    flight: Flight
+    memory: Memory  # of the law; None while no rotor is controlled
+    control_mode: int  # that the memory was made for
+    command: Command
+    mixed: MixerResult
+    slack_events: int
+    was_taut: bool
+
+
+def initial_state() -> FlightState:
+    """A disarmed vehicle that knows nothing."""
+    return FlightState(blank_state(), Flight(), None, 0, NO_COMMAND, STOPPED, 0, False)
+
+
+def view_of(estimator: EstimatorState, state: State, settings: Settings, now_us: int) -> View:
+    """What the supervisor sees."""
+    return View(
+        now_us,
+        state.x_quad,
+        state.v_quad,
+        state.x_load,
+        state.v_load,
+        estimator.load.taut > 0.0,
+        tilt_angle(state.R),
+        complaints(estimator, settings.sensor_age_limit_s),
+    )
+
+
+def step(
+    before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
+) -> tuple[FlightState, Report]:
+    """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
+    estimator = estimate(before.estimator, history, readings, setup.tuning, dt)
+    if not is_due(tick, setup.control_every):
+        return before._replace(estimator=estimator), Report()
+
+    state = control_state(estimator)
+    view = view_of(estimator, state, setup.settings, now_us)
+    flight, report = advance(before.flight, view, setup.settings)
+
+    taut = view.taut
+    slack_events = before.slack_events + (before.was_taut and not taut)
+    after = before._replace(estimator=estimator, flight=flight, slack_events=slack_events, was_taut=taut)
+    if flight.phase not in IN_AIR:
+        idle = IDLE if flight.phase == Phase.ARMED else STOPPED
+        return after._replace(memory=None, control_mode=0, command=NO_COMMAND, mixed=idle), report
+
+    leg = flight.legs[0]
+    t = leg_time_s(flight, now_us)
+    jet = leg.jet(t)
+    memory = after.memory
+    if memory is None or leg.control_mode != after.control_mode:
+        memory = setup.law.start(state, jet[0], jet[1])
+    memory, command = track(setup, memory, state, leg, jet, t)
+    mixed = mix(command.thrust, command.moment, setup.vehicle, setup.limited)
+    return after._replace(memory=memory, control_mode=leg.control_mode, command=command, mixed=mixed), report
+
+
+def track(setup: Setup, memory: Memory, state: State, leg: Leg, jet: Jet, t: float) -> tuple[Memory, Command]:
+    """The cascade in the mode that the leg asks for."""
+    law, heading = setup.law, E1
+    if leg.control_mode == LOAD_POSITION:
+        return law.load_position(memory, state, Reference(jet, heading))
+    if leg.control_mode == QUAD_POSITION:
+        return law.quad_position(memory, state, Reference(jet, heading))
+    assert isinstance(leg, Swing)
+    lift = held_height(setup, state, leg.anchor)
+    upward = leg.upward(t)
+    if leg.control_mode == LOAD_ATTITUDE:
+        return law.load_attitude(memory, state, neg(upward), heading, cable_pull(lift, state.q_cable))
+    assert leg.control_mode == QUAD_ATTITUDE
+    return law.quad_attitude(
+        memory, state, attitude_towards(upward, heading, state.R), tilted_thrust(lift, state.R)
+    )
+
+
+def held_height(setup: Setup, state: State, anchor: Vec3) -> float:
+    """Upward force (N) that keeps the load at the anchor's height while an attitude is tracked."""
+    vehicle = setup.vehicle
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    return vertical_force(state.x_load[2] - anchor[2], state.v_load[2], HEIGHT_GAIN, CLIMB_GAIN, weight)
+
+
+def ready_to_arm(state: FlightState, setup: Setup, now_us: int) -> tuple[str, ...]:
+    """What keeps the vehicle from being armed; empty if nothing does."""
+    control = control_state(state.estimator)
+    return arming_complaints(state.flight, view_of(state.estimator, control, setup.settings, now_us))
+
+
+HEIGHT_GAIN, CLIMB_GAIN = 6.0, 2.75  # N/m, N s/m: k_x and k_v of Table 4-3

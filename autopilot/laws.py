@@ -1,0 +1,113 @@
+"""The control laws by name, each filled from the parameter table: one interface for all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+from autopilot.control import quad_position, thesis
+from autopilot.control.records import Command, Reference, State, Vehicle
+from autopilot.geometry.linear import Mat3, Vec3
+from autopilot.vehicle.parameters import LAWS
+from autopilot.wire.parameters import ParameterTable
+
+Memory = Any  # each law's own record; opaque to everyone else
+
+
+class Law(Protocol):
+    """A cascade in its flight modes (3-2) and the vehicle position law of the slack phases."""
+
+    def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
+        """Memory of a law that begins now, without a jump of its command."""
+
+    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
+        """The vehicle's attitude follows R_d under a given thrust (N)."""
+
+    def load_attitude(
+        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+    ) -> tuple[Memory, Command]:
+        """The cable's direction follows q_d under a given pull (N)."""
+
+    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        """The load follows a reference."""
+
+    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        """The vehicle follows a reference, nothing hanging on it."""
+
+
+def believed_vehicle(table: ParameterTable) -> Vehicle:
+    """The vehicle as the parameters describe it."""
+    return Vehicle(
+        quad_mass=table["VEH_QUAD_MASS"],
+        load_mass=table["VEH_LOAD_MASS"],
+        cable_length=table["VEH_CABLE_LEN"],
+        inertia=(table["VEH_J_XX"], table["VEH_J_YY"], table["VEH_J_ZZ"]),
+        gravity=table["VEH_GRAVITY"],
+        arm=table["VEH_ARM_LEN"],
+        torque_ratio=table["VEH_TORQUE"],
+        rotor_min=table["VEH_ROTOR_MIN"],
+        rotor_max=table["VEH_ROTOR_MAX"],
+    )
+
+
+def _diagonal(value: float) -> Vec3:
+    return (value, value, value)
+
+
+class ThesisLaw(NamedTuple):
+    """The cascade of the thesis with its command filters."""
+
+    gains: thesis.ThesisGains
+    filters: thesis.ThesisFilters
+    position_gains: quad_position.QuadPositionGains
+    vehicle: Vehicle
+
+    @classmethod
+    def build(cls, table: ParameterTable, vehicle: Vehicle) -> ThesisLaw:
+        """Gains and filters from the NGC_ and QP_ parameters."""
+        gains = thesis.ThesisGains(
+            k_R=_diagonal(table["NGC_KR"]),
+            k_Omega=_diagonal(table["NGC_KOMEGA"]),
+            k_q=table["NGC_KQ"],
+            k_omega=table["NGC_KW"],
+            k_x=_diagonal(table["NGC_KX"]),
+            k_v=_diagonal(table["NGC_KV"]),
+            epsilon=table["NGC_EPSILON"],
+        )
+        filters = thesis.thesis_filters(
+            1.0 / table["CTL_RATE_HZ"],
+            table["NGC_WN_R"],
+            table["NGC_WN_Q"],
+            table["NGC_WN_X"],
+            table["NGC_ZETA"],
+        )
+        k_x, k_v, k_z, k_w = (table[name] for name in ("QP_KX", "QP_KV", "QP_KZ", "QP_KVZ"))
+        position_gains = quad_position.QuadPositionGains(k_x=(k_x, k_x, k_z), k_v=(k_v, k_v, k_w))
+        return cls(gains, filters, position_gains, vehicle)
+
+    def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
+        return thesis.start(state, x_d, v_d)
+
+    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
+        return thesis.quad_attitude(memory, state, R_d, thrust, self.gains, self.filters, self.vehicle)
+
+    def load_attitude(
+        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+    ) -> tuple[Memory, Command]:
+        return thesis.load_attitude(memory, state, q_d, b1_d, pull, self.gains, self.filters, self.vehicle)
+
+    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        return thesis.load_position(memory, state, reference, self.gains, self.filters, self.vehicle)
+
+    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        return quad_position.quad_position(
+            memory, state, reference, 0.0, self.position_gains, self.gains, self.filters, self.vehicle
+        )
+
+
+_BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {"thesis": ThesisLaw.build}
+
+
+def build_law(table: ParameterTable) -> Law:
+    """The law that CTL_LAW selects."""
+    return _BUILDERS[LAWS[int(table["CTL_LAW"])]](table, believed_vehicle(table))

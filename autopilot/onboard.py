@@ -1,0 +1,189 @@
+"""The whole autopilot without its sockets: datagrams in, datagrams out.
+
+The simulator link drives it: each new tick of sensors runs the flight core once. What ground stations send
+waits until the shell hands it over, between two ticks.
+"""
+
+from __future__ import annotations
+
+from autopilot.decisions import decide, with_plan
+from autopilot.estimation.filter import control_state, estimator_tuning
+from autopilot.estimation.records import new_history
+from autopilot.flight import Phase, Plan, settings_from
+from autopilot.flight_core import Setup, initial_state, step, view_of
+from autopilot.laws import believed_vehicle, build_law
+from autopilot.loss import Loss
+from autopilot.rehearsal import rehearse
+from autopilot.scheduler import RateError, divider
+from autopilot.sensor_link import Tick, read_tick
+from autopilot.services.endpoint import VehicleEndpoint
+from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.records import (
+    Event,
+    Link,
+    MissionChanged,
+    ParameterChanged,
+    TimesyncAnswered,
+    Verdict,
+)
+from autopilot.services.snapshot import Snapshot
+from autopilot.telemetry_view import Options, make_snapshot
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert import HilGps, hil_actuator_controls_message
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import located_steps
+from autopilot.wire.parameters import ParameterTable
+
+
+class Onboard:
+    """One autopilot. `receive_sensors` moves its clock; nothing else does."""
+
+    def __init__(
+        self, parameters: ParameterTable, identity: Identity, options: Options, mission: StoredMission | None
+    ) -> None:
+        self.parameters = parameters
+        self.endpoint = VehicleEndpoint(identity, options.home, parameters, mission)
+        self.now_us = 0
+        self.tick = -1
+        self.fault = ""  # why the vehicle cannot be flown at all
+        self._options = options
+        self._state = initial_state()
+        self._history = new_history()
+        self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
+        self._answer = b""
+        self._last: Tick | None = None
+        self._gps: HilGps | None = None
+        self._sensor_hz = 0.0
+        self._version = parameters.version
+        self.stale = 0  # ticks in a row that lay in the past
+        self._received_loss, self._sent_loss = Loss(0), Loss(1)
+        self._setup = self._build_setup(1)
+        self._take_plan(self.endpoint.mission)
+
+    # ---- simulator link
+
+    def receive_sensors(self, datagram: bytes) -> bytes | None:
+        """The answer to a datagram of sensors: a new one to a new tick, the same again to a repeated one.
+
+        None for anything else: garbage, or a tick that is over.
+        """
+        tick = read_tick(datagram, self._options.home)
+        if tick is None:
+            return None
+        if tick.now_us < self.now_us:
+            self.stale += 1
+            return None
+        self.stale = 0
+        if tick.now_us == self.now_us and self.tick >= 0:
+            return self._answer
+        self._run(tick)
+        frame = hil_actuator_controls_message(
+            tick.now_us, self._state.mixed.forces, self.armed, self._options.lockstep
+        )
+        self._answer = self._writer.frame(frame)
+        return self._answer
+
+    @property
+    def armed(self) -> bool:
+        """Whether rotors may turn."""
+        return self._state.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE)
+
+    def _run(self, tick: Tick) -> None:
+        period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
+        self.tick += 1
+        self.now_us = tick.now_us
+        self._last = tick
+        if tick.gps is not None:
+            self._gps = tick.gps
+        if self.tick == 1:
+            self._sensor_hz = 1e6 / period_us
+            self._follow_parameters()
+        elif self.parameters.version != self._version:
+            self._follow_parameters()
+        if self.fault:
+            return
+        dt = period_us * 1e-6
+        self._state, report = step(
+            self._state, self._history, tick.readings, self._setup, tick.now_us, self.tick, dt
+        )
+        for severity, text in report.texts:
+            self.endpoint.say(severity, text)
+        for seq in report.reached:
+            self.endpoint.item_reached(seq)
+
+    # ---- parameters
+
+    def _build_setup(self, control_every: int) -> Setup:
+        table = self.parameters
+        return Setup(
+            vehicle=believed_vehicle(table),
+            limited=table["VEH_ROTOR_LIM"],
+            law=build_law(table),
+            tuning=estimator_tuning(table),
+            settings=settings_from(table),
+            control_every=control_every,
+        )
+
+    def _follow_parameters(self) -> None:
+        self._version = self.parameters.version
+        try:
+            rate_hz = self.parameters["CTL_RATE_HZ"]
+            every = divider(self._sensor_hz, rate_hz, "CTL_RATE_HZ") if self._sensor_hz else 1
+        except RateError as error:
+            self.fault = str(error)
+            self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
+            return
+        self._setup = self._build_setup(every)
+
+    # ---- ground
+
+    def add_link(self, link: Link) -> None:
+        """A link that always gets telemetry."""
+        self.endpoint.add_link(link, self.now_us)
+
+    def receive_ground(self, datagram: bytes, link: Link) -> list[Event]:
+        """Handle a datagram from a ground station; what must be stored comes back as events."""
+        if self._received_loss.drops(datagram, self.parameters["SIM_LOSS_PCT"]):
+            return []
+        events = self.endpoint.receive(datagram, link, self.now_us, self._decide)
+        for event in events:
+            match event:
+                case MissionChanged(mission):
+                    self._take_plan(mission)
+                case ParameterChanged() | TimesyncAnswered():
+                    pass  # the table holds the value; the shell waits for the answer
+        return events
+
+    def ground_datagrams(self) -> list[tuple[Link, bytes]]:
+        """What is due on the ground links at this tick."""
+        percent = self.parameters["SIM_LOSS_PCT"]
+        sent = self.endpoint.poll(self._snapshot, self.now_us)
+        if percent > 0.0:
+            sent = [
+                (link, datagram) for link, datagram in sent if not self._sent_loss.drops(datagram, percent)
+            ]
+        return sent
+
+    def rehearse(self) -> None:
+        """Call every kernel once, so that none is compiled in flight."""
+        rehearse(self._setup)
+
+    def _decide(self, request: object) -> Verdict:
+        if self.fault:
+            return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
+        state = self._state
+        view = view_of(state.estimator, control_state(state.estimator), self._setup.settings, self.now_us)
+        flight, verdict = decide(state.flight, request, view, self._setup.settings)
+        self._state = state._replace(flight=flight)
+        return verdict
+
+    def _take_plan(self, mission: StoredMission) -> None:
+        steps = located_steps(mission.items, self._options.home)
+        plan = Plan(tuple(s.step for s in steps), tuple(s.last for s in steps), len(mission.items))
+        self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
+
+    def _snapshot(self) -> Snapshot:
+        return make_snapshot(
+            self._state, self._setup, self._options, self.endpoint.mission, self._last, self._gps, self.now_us
+        )

@@ -1,0 +1,54 @@
+"""Every kernel of a flight called once on the ground, so that none has to be compiled in the air."""
+
+from __future__ import annotations
+
+from autopilot.estimation.filter import Readings, control_state
+from autopilot.estimation.records import ImuReading, LoadReading, PoseReading, new_history
+from autopilot.flight_core import Setup, initial_state, step, track
+from autopilot.geometry.linear import ZERO
+from autopilot.geometry.so3 import IDENTITY_QUAT
+from autopilot.guidance import (
+    LOAD_ATTITUDE,
+    LOAD_POSITION,
+    QUAD_ATTITUDE,
+    QUAD_POSITION,
+    Creep,
+    Hold,
+    Leg,
+    Run,
+    Swing,
+    transfer_leg,
+)
+from autopilot.mixer import mix
+from missions.model import Sine, Term
+from missions.signals import signal_table
+
+
+def rehearse(setup: Setup) -> None:
+    """Run estimator, guidance, every mode of the law and the mixer for an instant."""
+    length = setup.vehicle.cable_length
+    over = (0.0, 0.0, 1.0 + length)
+    load = (0.0, 0.0, 1.0)
+    readings = Readings(
+        ImuReading(ZERO, (0.0, 0.0, setup.vehicle.gravity)),
+        (PoseReading(0.0, over, IDENTITY_QUAT, ZERO, 0.001, 0.001, 0.001),),
+        (LoadReading(0.0, load, ZERO, 0.001, 0.001),),
+    )
+    state, history = initial_state(), new_history()
+    for tick in range(3):
+        state, _ = step(state, history, readings, setup, tick * 4000, tick, 0.004)
+    motion = control_state(state.estimator)
+    table = signal_table((Term("x", 1.0, 0.0, 1.0, None, 0.0, (Sine(1.0),)),))
+    legs: tuple[Leg, ...] = (
+        Hold(load),
+        transfer_leg(load, over, 1.0, 1.0, LOAD_POSITION),
+        Creep(over, ZERO, QUAD_POSITION),
+        Run(load, table, 1.0),
+        Swing(load, 0.1, 0.1, 1.0, LOAD_ATTITUDE),
+        Swing(load, 0.1, 0.1, 1.0, QUAD_ATTITUDE),
+    )
+    for leg in legs:
+        jet = leg.jet(0.5)
+        memory = setup.law.start(motion, jet[0], jet[1])
+        _, command = track(setup, memory, motion, leg, jet, 0.5)
+        mix(command.thrust, command.moment, setup.vehicle, setup.limited)

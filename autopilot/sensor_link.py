@@ -1,0 +1,104 @@
+"""The autopilot's end of the simulator link: a datagram of sensor frames is one tick."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from autopilot.estimation.filter import Readings
+from autopilot.estimation.records import ImuReading, LoadReading, PoseReading
+from autopilot.geometry.linear import ZERO, norm
+from autopilot.wire.codec import decode
+from autopilot.wire.convert import (
+    HilGps,
+    Home,
+    read_hil_gps,
+    read_hil_sensor,
+    read_load_sensor,
+    read_odometry,
+)
+from autopilot.wire.dialect import plumbline as mavlink
+
+# a tracker that claims to be perfect is believed to no more than this, so that the filter stays conditioned
+LEAST_POSITION_STD_M = 2e-5
+LEAST_ANGLE_STD_RAD = 2e-5
+LEAST_VELOCITY_STD_M_S = 2e-4
+OLDEST_READING_S = 0.3  # older ones are dropped: the estimator's memory is no longer
+GREATEST_ACCEL_M_S2, GREATEST_RATE_RAD_S = 2000.0, 500.0
+
+
+class Tick(NamedTuple):
+    """All that one datagram of the simulator said; `gps` is None where it held no fix."""
+
+    now_us: int
+    readings: Readings
+    gps: HilGps | None
+    fields_updated: int  # of HIL_SENSOR
+
+
+def read_tick(datagram: bytes, home: Home) -> Tick | None:
+    """The tick in a datagram, or None where there is none (garbage, another message)."""
+    messages, _ = decode(datagram)
+    sensor = None
+    odometry: list[Any] = []
+    load: list[Any] = []
+    gps = None
+    for received in messages:
+        message = received.message
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_HIL_SENSOR:
+                sensor = read_hil_sensor(message)
+            case mavlink.MAVLINK_MSG_ID_ODOMETRY:
+                odometry.append(read_odometry(message))
+            case mavlink.MAVLINK_MSG_ID_LOAD_SENSOR:
+                load.append(read_load_sensor(message))
+            case mavlink.MAVLINK_MSG_ID_HIL_GPS:
+                gps = read_hil_gps(message, home)
+    if sensor is None:
+        return None
+    now_us = sensor.time_us
+    poses = tuple(pose for pose in (_pose(o, now_us) for o in odometry) if pose is not None)
+    loads = tuple(reading for reading in (_load(r, now_us) for r in load) if reading is not None)
+    # written so that NaN fails
+    sane = norm(sensor.accel_body) < GREATEST_ACCEL_M_S2 and norm(sensor.gyro_body) < GREATEST_RATE_RAD_S
+    imu = ImuReading(sensor.gyro_body, sensor.accel_body) if sane else None
+    return Tick(now_us, Readings(imu, poses, loads), gps, sensor.fields)
+
+
+def _age_s(now_us: int, time_us: int) -> float | None:
+    age = (now_us - time_us) * 1e-6
+    return age if 0.0 <= age <= OLDEST_READING_S else None
+
+
+def _at_least(value: float, least: float) -> float:
+    """`value`, but no less than `least`; also for NaN."""
+    return value if value > least else least
+
+
+def _pose(o: Any, now_us: int) -> PoseReading | None:
+    age = _age_s(now_us, o.time_us)
+    values = (*o.position, *o.quat_wxyz, *(o.velocity or ()))
+    if age is None or not all(map(math.isfinite, values)):
+        return None
+    return PoseReading(
+        age,
+        o.position,
+        o.quat_wxyz,
+        o.velocity or ZERO,
+        _at_least(o.position_std, LEAST_POSITION_STD_M),
+        _at_least(o.attitude_std, LEAST_ANGLE_STD_RAD),
+        -1.0 if o.velocity is None else _at_least(o.velocity_std, LEAST_VELOCITY_STD_M_S),
+    )
+
+
+def _load(r: Any, now_us: int) -> LoadReading | None:
+    age = _age_s(now_us, r.time_us)
+    if age is None or r.position is None or not all(map(math.isfinite, (*r.position, *(r.velocity or ())))):
+        return None
+    return LoadReading(
+        age,
+        r.position,
+        r.velocity or ZERO,
+        _at_least(r.position_std, LEAST_POSITION_STD_M),
+        -1.0 if r.velocity is None else _at_least(r.velocity_std, LEAST_VELOCITY_STD_M_S),
+    )

@@ -1,0 +1,359 @@
+"""COMMAND_LONG, COMMAND_INT and the mode and item messages that are commands in all but name.
+
+`PARSERS` says for each command how its parameters become a request, or why they are refused. Who decides
+about a request is an argument. Every command addressed to the vehicle gets one COMMAND_ACK, sent to the asker
+alone; a command for somebody else gets nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from autopilot.geometry.linear import Vec3
+from autopilot.services.identity import Flavour
+from autopilot.services.records import Announce, Decide, Output, Peer, Say, Send, Verdict
+from autopilot.services.requests import (
+    Answered,
+    Arm,
+    ChangeSpeed,
+    Continue,
+    GetMessageInterval,
+    Land,
+    Pause,
+    Reboot,
+    Reposition,
+    Request,
+    RequestCapabilities,
+    RequestMessage,
+    ReturnHome,
+    RunPrearmChecks,
+    SetCurrent,
+    SetHome,
+    SetMessageInterval,
+    SetMode,
+    StartMission,
+    StoreParameters,
+    Takeoff,
+    Terminate,
+)
+from autopilot.wire.convert import Home, enu_from_geodetic
+from autopilot.wire.dialect import plumbline as mavlink
+
+ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
+DENIED = mavlink.MAV_RESULT_DENIED
+UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
+
+FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGroundControl, PX4 and MAVSDK
+# A command repeated with `confirmation` within this time is the same command, whose ACK was lost
+REPEAT_US = 3_000_000
+_MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
+_NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
+
+_AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
+_ABOVE_HOME_FRAMES = (
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+)
+
+
+class Call(NamedTuple):
+    """A command as it came: `frame` None for COMMAND_LONG, whose coordinates are degrees."""
+
+    command: int
+    p: tuple[float, float, float, float]
+    x: float  # param5: latitude in degE7 (COMMAND_INT) or degrees
+    y: float  # param6
+    z: float  # param7
+    frame: int | None
+
+
+class Context(NamedTuple):
+    """What a parser needs to know of the vehicle."""
+
+    home: Home
+    flavour: Flavour
+
+
+Parser = Callable[[Call, Context], Request | Verdict]
+
+
+def _refused(text: str) -> Verdict:
+    return Verdict(DENIED, text)
+
+
+def _whole(value: float) -> int | None:
+    """The integer that `value` is, or None."""
+    return int(value) if math.isfinite(value) and value.is_integer() else None
+
+
+def _altitude_above_home(call: Call, context: Context) -> float | None:
+    """param7 as height above home [m]; None for NaN."""
+    if not math.isfinite(call.z):
+        return None
+    above_sea = call.frame in _AMSL_FRAMES or (call.frame is None and not context.flavour.takeoff_above_home)
+    return call.z - context.home.altitude_m if above_sea else call.z
+
+
+def _place(call: Call, context: Context) -> Vec3 | None:
+    """param5 ... param7 as ENU from home [m]; NaN stays NaN, None for coordinates that are none."""
+    if call.frame is None:
+        latitude, longitude = call.x * 1e7, call.y * 1e7
+    elif call.frame in _AMSL_FRAMES or call.frame in _ABOVE_HOME_FRAMES:
+        latitude, longitude = call.x, call.y
+    else:
+        return None
+    if abs(latitude) > 90e7 or abs(longitude) > 180e7 or math.isinf(call.z):
+        return None
+    up = call.z
+    if call.frame not in _ABOVE_HOME_FRAMES:
+        up -= context.home.altitude_m
+    if math.isnan(latitude) or math.isnan(longitude):
+        return (math.nan, math.nan, up)
+    east, north, _ = enu_from_geodetic(round(latitude), round(longitude), 0, context.home)
+    return (east, north, up)
+
+
+def _arm(call: Call, context: Context) -> Request | Verdict:
+    if call.p[0] not in (0.0, 1.0):
+        return _refused(f"Arm: param1 = {call.p[0]:g}; must be 1 (arm) or 0 (disarm)")
+    return Arm(arm=call.p[0] == 1.0, force=call.p[1] in FORCE_ARM)
+
+
+def _takeoff(call: Call, context: Context) -> Request | Verdict:
+    altitude_m = _altitude_above_home(call, context)
+    if altitude_m is not None and altitude_m <= 0.0:
+        reference = "above home" if altitude_m == call.z else f"above sea level, {altitude_m:g} m above home"
+        return _refused(f"Take-off: param7 = {call.z:g} m {reference}; must be above home")
+    return Takeoff(altitude_m)
+
+
+def _mode_of_pair(main: int, sub: int, context: Context) -> Request | Verdict:
+    mode = context.flavour.mode(main, sub)
+    if mode is None:
+        return _refused(f"Mode {main}/{sub} is unknown to the {context.flavour.name} flavour")
+    return SetMode(mode.main, mode.sub)
+
+
+def _mode_of_number(number: int, context: Context) -> Request | Verdict:
+    mode = context.flavour.mode_of_number(number)
+    if mode is None:
+        return _refused(f"Custom mode {number} is unknown to the {context.flavour.name} flavour")
+    return SetMode(mode.main, mode.sub)
+
+
+def _set_mode(call: Call, context: Context) -> Request | Verdict:
+    flags, number = _whole(call.p[0]), _whole(call.p[1])
+    sub = 0 if math.isnan(call.p[2]) else _whole(call.p[2])
+    if flags is None or number is None or sub is None or number < 0:
+        return _refused("Set mode: param1 ... param3 must be whole numbers")
+    if not flags & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        return Verdict(UNSUPPORTED, "Set mode: only custom modes are known (param1 must have bit 0)")
+    if number <= _MODE_BYTE:
+        return _mode_of_pair(number, sub, context)
+    return _mode_of_number(number, context)
+
+
+def _start_mission(call: Call, context: Context) -> Request | Verdict:
+    if math.isnan(call.p[0]):
+        return StartMission(None)
+    first = _whole(call.p[0])
+    if first is None or first < 0:
+        return _refused(f"Mission start: param1 = {call.p[0]:g}; must be an item number")
+    return StartMission(first)
+
+
+def _pause_continue(call: Call, context: Context) -> Request | Verdict:
+    choice: dict[float, Request] = {0.0: Pause(), 1.0: Continue()}
+    request = choice.get(call.p[0])
+    return request or _refused(f"Pause: param1 = {call.p[0]:g}; must be 0 (pause) or 1 (continue)")
+
+
+def _set_current(call: Call, context: Context) -> Request | Verdict:
+    seq = _whole(call.p[0])
+    if seq is None or seq < 0:
+        return _refused(f"Set current item: param1 = {call.p[0]:g}; must be an item number")
+    return SetCurrent(seq)
+
+
+def _reposition(call: Call, context: Context) -> Request | Verdict:
+    place = _place(call, context)
+    if place is None:
+        return _refused("Reposition: no such place; must be latitude and longitude of a global frame")
+    east, north, up = (None if math.isnan(value) else value for value in place)
+    if east is None and up is None:
+        return Pause()  # what ground stations send for "hold here"
+    flags = _whole(call.p[1]) or 0
+    change_mode = bool(flags & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+    return Reposition(east, north, up, change_mode)
+
+
+def _change_speed(call: Call, context: Context) -> Request | Verdict:
+    if not (math.isfinite(call.p[1]) and call.p[1] > 0.0):
+        return _refused(f"Change speed: param2 = {call.p[1]:g} m/s; must be > 0")
+    return ChangeSpeed(call.p[1])
+
+
+def _set_home(call: Call, context: Context) -> Request | Verdict:
+    if call.p[0] == 1.0:
+        return SetHome(None)
+    place = _place(call, context)
+    if place is None or any(math.isnan(value) for value in place):
+        return _refused("Set home: param5 ... param7 must be latitude, longitude and altitude")
+    return SetHome(place)
+
+
+def _terminate(call: Call, context: Context) -> Request | Verdict:
+    if call.p[0] != 1.0:
+        return _refused(f"Terminate: param1 = {call.p[0]:g}; must be 1, there is no way back")
+    return Terminate()
+
+
+def _reboot(call: Call, context: Context) -> Request | Verdict:
+    choice: dict[float, Request] = {1.0: Reboot(shutdown=False), 2.0: Reboot(shutdown=True)}
+    return choice.get(call.p[0]) or Verdict(UNSUPPORTED)
+
+
+def _store_parameters(call: Call, context: Context) -> Request | Verdict:
+    # 0 load, 1 save; others (reset to defaults and the like) are not offered
+    return StoreParameters() if call.p[0] in (0.0, 1.0) else Verdict(UNSUPPORTED)
+
+
+def _request_message(call: Call, context: Context) -> Request | Verdict:
+    message_id = _whole(call.p[0])
+    return Verdict(UNSUPPORTED) if message_id is None else RequestMessage(message_id, call.p[1])
+
+
+def _set_message_interval(call: Call, context: Context) -> Request | Verdict:
+    message_id = _whole(call.p[0])
+    interval = call.p[1]
+    if message_id is None:
+        return Verdict(UNSUPPORTED)
+    if not math.isfinite(interval) or (interval < 0.0 and interval != -1.0):
+        return _refused(f"Message interval: param2 = {interval:g} us; must be > 0, 0 (default) or -1 (off)")
+    return SetMessageInterval(message_id, math.ceil(interval))
+
+
+def _get_message_interval(call: Call, context: Context) -> Request | Verdict:
+    message_id = _whole(call.p[0])
+    return Verdict(UNSUPPORTED) if message_id is None else GetMessageInterval(message_id)
+
+
+def _request_capabilities(call: Call, context: Context) -> Request | Verdict:
+    return RequestCapabilities()
+
+
+def _plain(request: Request) -> Parser:
+    return lambda call, context: request
+
+
+PARSERS: dict[int, Parser] = {
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
+    mavlink.MAV_CMD_NAV_TAKEOFF: _takeoff,
+    mavlink.MAV_CMD_NAV_LAND: _plain(Land()),
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _plain(ReturnHome()),
+    mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
+    mavlink.MAV_CMD_MISSION_START: _start_mission,
+    mavlink.MAV_CMD_DO_PAUSE_CONTINUE: _pause_continue,
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
+    mavlink.MAV_CMD_DO_REPOSITION: _reposition,
+    mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
+    mavlink.MAV_CMD_DO_SET_HOME: _set_home,
+    mavlink.MAV_CMD_DO_FLIGHTTERMINATION: _terminate,
+    mavlink.MAV_CMD_RUN_PREARM_CHECKS: _plain(RunPrearmChecks()),
+    mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
+    mavlink.MAV_CMD_PREFLIGHT_STORAGE: _store_parameters,
+    mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message,
+    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_message_interval,
+    mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_message_interval,
+    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_capabilities,
+}
+
+
+def _call_of_long(m: Any) -> Call:
+    p = (m.param1, m.param2, m.param3, m.param4)
+    return Call(m.command, p, m.param5, m.param6, m.param7, None)
+
+
+def _call_of_int(m: Any) -> Call:
+    p = (m.param1, m.param2, m.param3, m.param4)
+    x, y = (math.nan if value == _NO_INT else float(value) for value in (m.x, m.y))
+    return Call(m.command, p, x, y, m.z, m.frame)
+
+
+class _Done(NamedTuple):
+    """An accepted command and when: a repetition is answered, not executed."""
+
+    call: str
+    verdict: Verdict
+    at_us: int
+
+
+class CommandService:
+    """Commands in, COMMAND_ACK out; what happens is decided by the `decide` given with each message."""
+
+    def __init__(self, home: Home, flavour: Flavour) -> None:
+        self.context = Context(home, flavour)
+        self._done: dict[tuple[Peer, int], _Done] = {}
+
+    def receive_long(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """Execute COMMAND_LONG."""
+        call = _call_of_long(message)
+        if message.confirmation:
+            done = self._done.get((peer, call.command))
+            if done and done.call == repr(call) and now_us - done.at_us <= REPEAT_US:
+                return [_ack(call.command, done.verdict.result, peer)]
+        return self._execute(call, peer, now_us, decide)
+
+    def receive_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """Execute COMMAND_INT."""
+        return self._execute(_call_of_int(message), peer, now_us, decide)
+
+    def receive_set_mode(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """Execute SET_MODE, the message older than the command; acknowledged as the command."""
+        request: Request | Verdict = Verdict(UNSUPPORTED, "Set mode: only custom modes are known")
+        if message.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            request = _mode_of_number(message.custom_mode, self.context)
+        verdict = request if isinstance(request, Verdict) else decide(request)
+        return _answer(mavlink.MAV_CMD_DO_SET_MODE, verdict, peer)
+
+    def receive_set_current(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """Execute MISSION_SET_CURRENT; it is answered by MISSION_CURRENT, a refusal also by a text."""
+        verdict = decide(SetCurrent(message.seq))
+        outputs: list[Output] = [Announce(peer.link, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
+        return _said(verdict) + outputs
+
+    def _execute(self, call: Call, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        parser = PARSERS.get(call.command)
+        if parser is None:
+            return [_ack(call.command, UNSUPPORTED, peer)]
+        request = parser(call, self.context)
+        verdict = request if isinstance(request, Verdict) else decide(request)
+        if verdict.result == ACCEPTED and not isinstance(request, Answered):
+            self._done = {k: d for k, d in self._done.items() if now_us - d.at_us <= REPEAT_US}
+            self._done[peer, call.command] = _Done(repr(call), verdict, now_us)
+        outputs = _answer(call.command, verdict, peer)
+        if isinstance(request, SetCurrent):
+            outputs.append(Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,)))
+        return outputs
+
+
+def _said(verdict: Verdict) -> list[Output]:
+    if verdict.text is None:
+        return []
+    accepted = verdict.result in (ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
+    severity = mavlink.MAV_SEVERITY_INFO if accepted else mavlink.MAV_SEVERITY_WARNING
+    return [Say(severity, verdict.text)]
+
+
+def _ack(command: int, result: int, peer: Peer) -> Output:
+    message = mavlink.MAVLink_command_ack_message(
+        command, result, target_system=peer.system, target_component=peer.component
+    )
+    return Send(peer.link, message)
+
+
+def _answer(command: int, verdict: Verdict, peer: Peer) -> list[Output]:
+    """The reason first, so that it is there when the ACK is shown."""
+    return [*_said(verdict), _ack(command, verdict.result, peer)]

@@ -1,0 +1,375 @@
+"""The vehicle as any number of ground stations see it: datagrams in, events out; snapshots in, datagrams out.
+
+The shell owns sockets, clock and files. It calls `receive` for each datagram, then `poll` once per tick:
+
+    for event in endpoint.receive(datagram, link, now_us, decide): ...
+    for link, datagram in endpoint.poll(make_snapshot, now_us): ...
+
+`decide` is the supervisor's word on a request; `make_snapshot` is called only where something is due.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from autopilot.services.answers import (
+    answer_ftp,
+    answer_log_data,
+    answer_log_list,
+    answer_ping,
+    answer_timesync,
+)
+from autopilot.services.commands import CommandService
+from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT, Identity
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.missions import MissionService
+from autopilot.services.parameters import ParameterService
+from autopilot.services.records import (
+    Announce,
+    Decide,
+    Event,
+    Handler,
+    Link,
+    Output,
+    Peer,
+    Say,
+    Send,
+    Verdict,
+)
+from autopilot.services.requests import (
+    GetMessageInterval,
+    RequestCapabilities,
+    RequestMessage,
+    SetMessageInterval,
+    StoreParameters,
+)
+from autopilot.services.snapshot import Snapshot
+from autopilot.services.statustext import TextWriter
+from autopilot.services.streams import OFF, Streams
+from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
+from autopilot.wire.codec import FrameWriter, Received, decode
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameters import ParameterTable
+
+DATAGRAM_BYTES = 1400  # below the MTU of any common network, with headers
+LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
+MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
+_INT32 = 2**31 - 1
+_UINT16 = 2**16 - 1
+
+_ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
+_UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
+_HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
+
+SnapshotFactory = Callable[[], Snapshot]
+# a system and a component that speak, and what they say
+_Outgoing = tuple[tuple[int, int], Any]
+
+
+class _LinkState:
+    """One way to clients: its streams, its sequence counters, and what waits to be sent."""
+
+    __slots__ = ("announced", "configured", "heard_us", "queue", "streams", "writers")
+
+    def __init__(self, configured: bool, defaults: dict[int, int], now_us: int) -> None:
+        self.configured = configured
+        self.heard_us = now_us
+        self.streams = Streams(defaults, now_us)
+        self.writers: dict[tuple[int, int], FrameWriter] = {}
+        self.queue: list[Any] = []  # answers of the autopilot
+        self.announced: dict[int, None] = {_HEARTBEAT: None}  # streamed messages out of turn, in order
+
+    def frame(self, outgoing: _Outgoing) -> bytes:
+        """The next frame of a source on this link."""
+        source, message = outgoing
+        writer = self.writers.get(source)
+        if writer is None:
+            writer = self.writers[source] = FrameWriter(*source)
+        return writer.frame(message)
+
+
+class VehicleEndpoint:
+    """All services of one vehicle joined over all its links."""
+
+    def __init__(
+        self, identity: Identity, home: Home, parameters: ParameterTable, mission: StoredMission | None = None
+    ) -> None:
+        self.identity = identity
+        self._missions = MissionService(home, mission or StoredMission())
+        self._parameters = ParameterService(parameters)
+        self._commands = CommandService(home, identity.flavour)
+        self._texts = TextWriter()
+        self._links: dict[Link, _LinkState] = {}
+        self._table: dict[int, Stream] = dict(STREAMS)
+        if identity.load_system:
+            self._table |= LOAD_STREAMS
+        self._defaults = {key: stream.interval_us for key, stream in self._table.items()}
+        self._watched: dict[int, Any] = {}
+        self._work = False  # something waits in a queue
+        self._handlers = self._handler_table()
+
+    @property
+    def mission(self) -> StoredMission:
+        """The mission in force."""
+        return self._missions.mission
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """The links that get telemetry now."""
+        return tuple(self._links)
+
+    # ---- what the shell calls
+
+    def add_link(self, link: Link, now_us: int = 0) -> None:
+        """A link that always gets telemetry, whether or not somebody is heard on it."""
+        self._links[link] = _LinkState(True, self._defaults, now_us)
+        self._work = True
+
+    def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
+        """Handle what came over `link`; answers leave with the next `poll`. No bytes raise anything."""
+        events: list[Event] = []
+        for received in decode(datagram)[0]:
+            if self._is_own(received):
+                continue
+            state = self._heard(link, now_us)
+            message_id = received.message.get_msgId()  # some messages have a field called id
+            handler = self._handlers.get(message_id)
+            if handler and self._is_for_us(message_id, received.message):
+                peer = Peer(link, received.system, received.component)
+                wrapped = self._decider(state, peer, now_us, decide)
+                self._do(handler(received.message, peer, now_us, wrapped), events)
+        return events
+
+    def say(self, severity: int, text: str) -> None:
+        """A text for the operators of all links."""
+        self._do([Say(severity, text)], [])
+
+    def item_reached(self, seq: int) -> None:
+        """The mission came to the end of an item."""
+        self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
+
+    def state_changed(self) -> None:
+        """Mode or arming changed: tell everybody with the next `poll`, whatever is due."""
+        self._do([Announce(None, (_HEARTBEAT,))], [])
+
+    def parameter_changed(self, name: str) -> None:
+        """The vehicle itself changed a parameter: show it to all links."""
+        self._do([Send(None, self._parameters.value_message(name))], [])
+
+    def datagram(self, link: Link, message: Any) -> bytes:
+        """One message of the autopilot for a link, now, in the link's sequence."""
+        return self._links[link].frame(((self.identity.system, AUTOPILOT_COMPONENT), message))
+
+    def due(self, now_us: int) -> bool:
+        """Whether `poll` has anything to do."""
+        return (
+            self._work
+            or any(state.streams.next_us <= now_us for state in self._links.values())
+            or self._missions.next_timer() <= now_us
+            or self._parameters.next_timer() <= now_us
+        )
+
+    def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:
+        """All that is due now: answers first, then streams, packed into datagrams by link."""
+        if not self.due(now_us):
+            return []
+        self._forget_silent(now_us)
+        self._do(self._missions.poll(now_us), [])
+        self._do(self._parameters.poll(now_us), [])
+        self._work = False
+        taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
+        if any(taken.values()) or any(state.announced for state in self._links.values()):
+            snapshot = make_snapshot()
+            self._watch(snapshot)
+        datagrams: list[tuple[Link, bytes]] = []
+        built: dict[int, list[_Outgoing]] = {}
+        own = (self.identity.system, AUTOPILOT_COMPONENT)
+        for link, state in self._links.items():
+            outgoing: list[_Outgoing] = [(own, message) for message in state.queue]
+            for key in dict.fromkeys((*state.announced, *taken[link])):
+                if key not in built:
+                    built[key] = self._build(key, snapshot)
+                outgoing += built[key]
+            state.queue.clear()
+            state.announced.clear()
+            datagrams += [(link, datagram) for datagram in self._packed(state, outgoing)]
+        return datagrams
+
+    # ---- sending
+
+    def _build(self, key: int, snapshot: Snapshot) -> list[_Outgoing]:
+        stream = self._table[key]
+        system = self.identity.load_system if key & LOAD_SYSTEM else self.identity.system
+        source = (system, stream.component)
+        return [(source, message) for message in stream.build(snapshot, self.identity)]
+
+    def _packed(self, state: _LinkState, outgoing: list[_Outgoing]) -> list[bytes]:
+        datagrams: list[bytes] = []
+        frames: list[bytes] = []
+        size = 0
+        for one in outgoing:
+            frame = state.frame(one)
+            if size + len(frame) > DATAGRAM_BYTES:
+                datagrams.append(b"".join(frames))
+                frames, size = [], 0
+            frames.append(frame)
+            size += len(frame)
+        if frames:
+            datagrams.append(b"".join(frames))
+        return datagrams
+
+    def _watch(self, snapshot: Snapshot) -> None:
+        """Announce what changed since it was last looked at."""
+        for key, pick in WATCHED.items():
+            picked = pick(snapshot)
+            if self._watched.get(key) != picked:
+                self._watched[key] = picked
+                self._announce(None, key)
+
+    def _announce(self, link: Link | None, key: int) -> None:
+        for state in self._states(link):
+            state.announced[key] = None
+
+    def _states(self, link: Link | None) -> list[_LinkState]:
+        if link is None:
+            return list(self._links.values())
+        state = self._links.get(link)
+        return [state] if state else []
+
+    def _do(self, outputs: list[Output], events: list[Event]) -> None:
+        """Carry out what a service returned; events are added to `events`."""
+        for output in outputs:
+            match output:
+                case Send(link, message):
+                    for state in self._states(link):
+                        state.queue.append(message)
+                case Say(severity, text):
+                    for message in self._texts.messages(severity, text):
+                        for state in self._links.values():
+                            state.queue.append(message)
+                case Announce(link, keys):
+                    for key in keys:
+                        self._announce(link, key)
+                case _:
+                    events.append(output)
+        self._work = self._work or bool(outputs)
+
+    # ---- links
+
+    def _heard(self, link: Link, now_us: int) -> _LinkState:
+        state = self._links.get(link)
+        if state is None:
+            self._make_room()
+            state = self._links[link] = _LinkState(False, self._defaults, now_us)
+            self._work = True
+        state.heard_us = now_us
+        return state
+
+    def _make_room(self) -> None:
+        learned = {link: state for link, state in self._links.items() if not state.configured}
+        if len(learned) >= MAX_LINKS:
+            self._forget(min(learned, key=lambda link: learned[link].heard_us))
+
+    def _forget_silent(self, now_us: int) -> None:
+        for link, state in list(self._links.items()):
+            if not state.configured and now_us - state.heard_us > LINK_SILENCE_US:
+                self._forget(link)
+
+    def _forget(self, link: Link) -> None:
+        del self._links[link]
+        self._parameters.forget(link)
+
+    # ---- receiving
+
+    def _is_own(self, received: Received) -> bool:
+        """Our own words come back where a link is looped."""
+        own_components = (AUTOPILOT_COMPONENT, DIALECT_COMPONENT)
+        own = received.system == self.identity.system and received.component in own_components
+        return own or received.system == self.identity.load_system != 0
+
+    def _is_for_us(self, message_id: int, message: Any) -> bool:
+        """Addressed to the autopilot, or to all (0); what has no address is for all."""
+        if message_id == mavlink.MAVLINK_MSG_ID_PING:
+            return True  # its target says whether it is a question
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in (0, self.identity.system) and component in (0, AUTOPILOT_COMPONENT)
+
+    def _decider(self, state: _LinkState, peer: Peer, now_us: int, decide: Decide) -> Decide:
+        """`decide` for the supervisor's requests, joined with what is answered here."""
+
+        def decided(request: Any) -> Verdict:
+            match request:
+                case StoreParameters():
+                    return _ACCEPTED
+                case RequestCapabilities():
+                    return self._request_message(state, peer, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0)
+                case RequestMessage(message_id, argument):
+                    return self._request_message(state, peer, message_id, argument)
+                case GetMessageInterval(message_id):
+                    return self._request_interval(state, message_id)
+                case SetMessageInterval(message_id, interval_us):
+                    return self._set_interval(state, message_id, interval_us, now_us)
+            verdict = decide(request)
+            if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
+                self.state_changed()
+            return verdict
+
+        return decided
+
+    def _request_message(self, state: _LinkState, peer: Peer, message_id: int, argument: float) -> Verdict:
+        if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+            return self._request_interval(state, int(argument) if 0.0 <= argument <= _UINT16 else -1)
+        if message_id not in STREAMS:
+            return _UNSUPPORTED
+        self._do([Announce(peer.link, (message_id,))], [])
+        return _ACCEPTED
+
+    def _request_interval(self, state: _LinkState, message_id: int) -> Verdict:
+        if not 0 <= message_id <= _UINT16:
+            return _UNSUPPORTED
+        interval = state.streams.interval(message_id) or 0  # 0: not available
+        state.queue.append(mavlink.MAVLink_message_interval_message(message_id, min(interval, _INT32)))
+        return _ACCEPTED
+
+    def _set_interval(self, state: _LinkState, message_id: int, interval_us: int, now_us: int) -> Verdict:
+        if message_id not in STREAMS:
+            return _UNSUPPORTED
+        slowest = STREAMS[_HEARTBEAT].interval_us
+        if message_id == _HEARTBEAT and (interval_us == OFF or interval_us > slowest):
+            return Verdict(
+                mavlink.MAV_RESULT_DENIED, f"HEARTBEAT interval {interval_us} us; at most {slowest} us"
+            )
+        state.streams.set_interval(message_id, interval_us, now_us)
+        return _ACCEPTED
+
+    def _handler_table(self) -> dict[int, Handler]:
+        """What is done about each message; all others are for somebody else."""
+        commands, missions, parameters = self._commands, self._missions, self._parameters
+        m = mavlink
+        return {
+            m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
+            m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
+            m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
+            m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: parameters.receive_request_list,
+            m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: parameters.receive_request_read,
+            m.MAVLINK_MSG_ID_PARAM_SET: parameters.receive_set,
+            m.MAVLINK_MSG_ID_MISSION_COUNT: missions.receive_count,
+            m.MAVLINK_MSG_ID_MISSION_ITEM_INT: missions.receive_item_int,
+            m.MAVLINK_MSG_ID_MISSION_ITEM: missions.receive_item,
+            m.MAVLINK_MSG_ID_MISSION_ACK: missions.receive_ack,
+            m.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: missions.receive_clear_all,
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: missions.receive_request_list,
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_INT: missions.receive_request_int,
+            m.MAVLINK_MSG_ID_MISSION_REQUEST: missions.receive_request,
+            m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: missions.receive_partial,
+            m.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST: missions.receive_partial,
+            m.MAVLINK_MSG_ID_TIMESYNC: answer_timesync,
+            m.MAVLINK_MSG_ID_PING: answer_ping,
+            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: answer_ftp,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: answer_log_list,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_DATA: answer_log_data,
+        }

@@ -1,0 +1,39 @@
+"""HEARTBEAT: that the vehicle is there, its mode, and whether its rotors may turn."""
+
+from __future__ import annotations
+
+from autopilot.services.identity import Identity
+from autopilot.services.snapshot import Snapshot
+from autopilot.wire.dialect import plumbline as mavlink
+
+HEARTBEAT_US = 1_000_000
+_PROTOCOL_VERSION = 3  # HEARTBEAT.mavlink_version, the same since MAVLink 1
+
+
+def heartbeat_message(snapshot: Snapshot, identity: Identity) -> mavlink.MAVLink_heartbeat_message:
+    """The vehicle's HEARTBEAT; a mode that is not in the flavour's table is said as custom mode 0."""
+    flavour = identity.flavour
+    mode = flavour.mode(snapshot.main_mode, snapshot.sub_mode)
+    base_mode = mode.base_mode if mode else mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    if snapshot.armed:
+        base_mode |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    return mavlink.MAVLink_heartbeat_message(
+        type=flavour.vehicle_type,
+        autopilot=flavour.autopilot,
+        base_mode=base_mode,
+        custom_mode=mode.custom_mode if mode else 0,
+        system_status=snapshot.system_status,
+        mavlink_version=_PROTOCOL_VERSION,
+    )
+
+
+def load_heartbeat_message(snapshot: Snapshot) -> mavlink.MAVLink_heartbeat_message:
+    """HEARTBEAT of the load as a system of its own: no autopilot, nothing to command."""
+    return mavlink.MAVLink_heartbeat_message(
+        type=mavlink.MAV_TYPE_AIRSHIP,
+        autopilot=mavlink.MAV_AUTOPILOT_INVALID,
+        base_mode=0,
+        custom_mode=0,
+        system_status=snapshot.system_status,
+        mavlink_version=_PROTOCOL_VERSION,
+    )

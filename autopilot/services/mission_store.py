@@ -1,0 +1,80 @@
+"""An accepted mission, and its bytes on disk.
+
+    magic "PLMI" | uint16 version | uint16 count | count records | uint32 CRC-32 of all before
+
+little-endian; a record is MISSION_ITEM_INT without its addresses, so what is read back is bit for bit what a
+ground station uploaded, NaN included.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from dataclasses import dataclass
+
+from autopilot.wire.convert import Home
+from autopilot.wire.mission_items import LocatedStep, MissionItemError, WireItem, located_steps
+
+MAX_ITEMS = 2000
+
+_MAGIC = b"PLMI"
+_VERSION = 1
+_HEAD = struct.Struct("<4sHH")
+_RECORD = struct.Struct("<BHBBffffiif")
+_CHECK = struct.Struct("<I")
+
+
+@dataclass(frozen=True, slots=True)
+class StoredMission:
+    """The items as they were uploaded, and the steps they mean."""
+
+    items: tuple[WireItem, ...] = ()
+    steps: tuple[LocatedStep, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CorruptMission:
+    """Stored bytes that are no mission, and why."""
+
+    reason: str
+
+
+def serialise(items: tuple[WireItem, ...]) -> bytes:
+    """The bytes that `deserialise` reads."""
+    records = b"".join(
+        _RECORD.pack(
+            item.frame,
+            item.command,
+            item.current,
+            item.autocontinue,
+            item.param1,
+            item.param2,
+            item.param3,
+            item.param4,
+            item.x,
+            item.y,
+            item.z,
+        )
+        for item in items
+    )
+    body = _HEAD.pack(_MAGIC, _VERSION, len(items)) + records
+    return body + _CHECK.pack(zlib.crc32(body))
+
+
+def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
+    """The mission in `data`; anything but what `serialise` wrote is `CorruptMission`."""
+    if len(data) < _HEAD.size + _CHECK.size or not data.startswith(_MAGIC):
+        return CorruptMission(f"{len(data)} bytes that do not begin as a mission file")
+    _, version, count = _HEAD.unpack_from(data)
+    if version != _VERSION:
+        return CorruptMission(f"version {version}; this program reads version {_VERSION}")
+    if len(data) != _HEAD.size + count * _RECORD.size + _CHECK.size:
+        return CorruptMission(f"{len(data)} bytes; {count} items need another length")
+    body, (check,) = data[: -_CHECK.size], _CHECK.unpack(data[-_CHECK.size :])
+    if zlib.crc32(body) != check:
+        return CorruptMission("its checksum is wrong")
+    items = tuple(WireItem(*record) for record in _RECORD.iter_unpack(body[_HEAD.size :]))
+    try:
+        return StoredMission(items, located_steps(items, home))
+    except MissionItemError as error:
+        return CorruptMission(str(error))

@@ -1,0 +1,346 @@
+"""The mission protocol: upload as a state machine, download without any state, clear, and what is refused.
+
+Upload, seen from here (one at a time; the old mission stays in force until the last item is in and checked):
+
+    idle       COUNT n > 0          ask for item 0                        -> receiving
+    receiving  item asked for       ask for the next one                  -> receiving
+               the last item        check all; ACK; mission replaced      -> idle
+               an item before it    nothing (a duplicate)                 -> receiving
+               an item behind it    ask again for the one that is missing -> receiving
+               COUNT, same peer     begin again                           -> receiving
+               anything, other peer DENIED for its COUNT, else nothing    -> receiving
+               ACK from the peer    it has given up                       -> idle
+               silence              ask again; after MAX_ASKS: ACK OPERATION_CANCELLED -> idle
+
+Fences and rally points are not served: their lists are empty, their upload is UNSUPPORTED.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from autopilot.services.mission_store import MAX_ITEMS, StoredMission
+from autopilot.services.records import Announce, Decide, MissionChanged, Output, Peer, Say, Send
+from autopilot.services.requests import ReplaceMission
+from autopilot.services.streams import NEVER_US
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import MissionItemError, WireItem, located_steps
+
+ASK_US = 500_000  # an item that was asked for is asked for again after this silence
+MAX_ASKS = 6  # times that one item is asked for: once, and five times more
+# Times that the first item is asked for as MISSION_ITEM_INT, before a client that knows only MISSION_ITEM
+# (DroneKit) is taken to be there. Never asked the other way round: MAVSDK cancels on a MISSION_REQUEST.
+INT_ASKS = 3
+LATE_US = 5_000_000  # a last item repeated within this time after the end means that our ACK was lost
+
+_MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+_ALL = mavlink.MAV_MISSION_TYPE_ALL
+_UNSERVED = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
+_ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
+
+_NO_INT = 2**31 - 1
+_LOCAL_FRAMES = (
+    mavlink.MAV_FRAME_LOCAL_NED,
+    mavlink.MAV_FRAME_LOCAL_ENU,
+    mavlink.MAV_FRAME_LOCAL_OFFSET_NED,
+)
+_DEGREE_SCALE, _METRE_SCALE = 1e7, 1e4
+
+
+@dataclass(slots=True)
+class _Upload:
+    """A transfer under way."""
+
+    peer: Peer
+    count: int
+    ask_again_us: int
+    asks: int = 1  # times that the next item was asked for
+    as_float: bool = False  # the client speaks MISSION_ITEM
+    items: list[WireItem] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ended:
+    """The transfer that ended last, to answer its last item again."""
+
+    peer: Peer
+    count: int
+    result: int
+    at_us: int
+
+
+class MissionService:
+    """Holds the mission and serves it to any number of links."""
+
+    def __init__(self, home: Home, mission: StoredMission) -> None:
+        self.home = home
+        self.mission = mission
+        self._upload: _Upload | None = None
+        self._ended: _Ended | None = None
+
+    # ---- upload
+
+    def receive_count(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_COUNT: a client wants to upload."""
+        kind, count = message.mission_type, message.count
+        if kind != _MISSION:
+            empty = kind in _UNSERVED and count == 0
+            return [_ack(peer, _ACCEPTED if empty else mavlink.MAV_MISSION_UNSUPPORTED, kind)]
+        if self._upload and self._upload.peer != peer:
+            return [_ack(peer, mavlink.MAV_MISSION_DENIED)]
+        self._upload = None
+        if count > MAX_ITEMS:
+            why = f"Mission of {count} items; at most {MAX_ITEMS} are kept"
+            return [Say(mavlink.MAV_SEVERITY_WARNING, why), _ack(peer, mavlink.MAV_MISSION_NO_SPACE)]
+        refused = self._refusal(count, peer, decide)
+        if refused:
+            return refused
+        if count == 0:
+            return [*self._replaced(StoredMission()), _ack(peer, _ACCEPTED)]
+        self._upload = _Upload(peer, count, now_us + ASK_US)
+        return [self._ask()]
+
+    def receive_item_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_ITEM_INT."""
+        return self._item(message, _item_of_int(message), False, peer, now_us, decide)
+
+    def receive_item(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_ITEM, the older form with coordinates as floats."""
+        return self._item(message, _item_of_float(message), True, peer, now_us, decide)
+
+    def receive_ack(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_ACK: the end of a download, or the client gives up its upload."""
+        if self._upload and self._upload.peer == peer and message.mission_type == _MISSION:
+            self._upload = None
+        return []
+
+    def next_timer(self) -> int:
+        """When `poll` has something to do, in us."""
+        return self._upload.ask_again_us if self._upload else NEVER_US
+
+    def poll(self, now_us: int) -> list[Output]:
+        """Ask again for an item that has not come, or give the upload up."""
+        upload = self._upload
+        if upload is None or now_us < upload.ask_again_us:
+            return []
+        if upload.asks == MAX_ASKS:
+            self._end(mavlink.MAV_MISSION_OPERATION_CANCELLED, now_us)
+            why = f"Mission upload given up: item {len(upload.items)} of {upload.count} did not come"
+            cancelled = _ack(upload.peer, mavlink.MAV_MISSION_OPERATION_CANCELLED)
+            return [Say(mavlink.MAV_SEVERITY_WARNING, why), cancelled]
+        if not upload.items and upload.asks >= INT_ASKS:
+            upload.as_float = True
+        upload.asks += 1
+        upload.ask_again_us = now_us + ASK_US
+        return [self._ask()]
+
+    def _item(
+        self,
+        message: Any,
+        item: WireItem | None,
+        as_float: bool,
+        peer: Peer,
+        now_us: int,
+        decide: Decide,
+    ) -> list[Output]:
+        if message.mission_type != _MISSION:
+            return []
+        upload = self._upload
+        if upload is None or upload.peer != peer:
+            return self._late_item(message, peer, now_us)
+        expected = len(upload.items)
+        if message.seq < expected:
+            return []
+        if message.seq > expected:
+            return [self._ask()]
+        if item is None:
+            self._end(mavlink.MAV_MISSION_INVALID_PARAM5_X, now_us)
+            why = f"Mission item {expected}: x or y is no coordinate"
+            return [
+                Say(mavlink.MAV_SEVERITY_WARNING, why),
+                _ack(peer, mavlink.MAV_MISSION_INVALID_PARAM5_X),
+            ]
+        upload.items.append(item)
+        upload.asks, upload.ask_again_us, upload.as_float = 1, now_us + ASK_US, as_float
+        if len(upload.items) < upload.count:
+            return [self._ask()]
+        return self._complete(upload, now_us, decide)
+
+    def _complete(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
+        """All items are here: check them as a whole, and only then replace the mission."""
+        items = tuple(upload.items)
+        try:
+            steps = located_steps(items, self.home)
+        except MissionItemError as error:
+            self._end(error.result, now_us)
+            return [Say(mavlink.MAV_SEVERITY_WARNING, str(error)), _ack(upload.peer, error.result)]
+        refused = self._refusal(upload.count, upload.peer, decide)
+        if refused:
+            self._end(mavlink.MAV_MISSION_DENIED, now_us)
+            return refused
+        self._end(_ACCEPTED, now_us)
+        return [*self._replaced(StoredMission(items, steps)), _ack(upload.peer, _ACCEPTED)]
+
+    def _late_item(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
+        ended = self._ended
+        if (
+            ended
+            and ended.peer == peer
+            and message.seq == ended.count - 1
+            and now_us - ended.at_us <= LATE_US
+        ):
+            return [_ack(peer, ended.result)]
+        return []
+
+    def _end(self, result: int, now_us: int) -> None:
+        if self._upload:
+            self._ended = _Ended(self._upload.peer, self._upload.count, result, now_us)
+        self._upload = None
+
+    def _ask(self) -> Output:
+        upload = self._upload
+        assert upload is not None
+        request = (
+            mavlink.MAVLink_mission_request_message
+            if upload.as_float
+            else mavlink.MAVLink_mission_request_int_message
+        )
+        peer = upload.peer
+        return Send(peer.link, request(peer.system, peer.component, len(upload.items), _MISSION))
+
+    # ---- replace and clear
+
+    def receive_clear_all(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_CLEAR_ALL."""
+        kind = message.mission_type
+        if kind in _UNSERVED:
+            return [_ack(peer, _ACCEPTED, kind)]
+        if kind not in (_MISSION, _ALL):
+            return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
+        if self._upload and self._upload.peer != peer:
+            return [_ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
+        refused = self._refusal(0, peer, decide, kind)
+        if refused:
+            return refused
+        self._upload = None
+        return [*self._replaced(StoredMission()), _ack(peer, _ACCEPTED, kind)]
+
+    def _refusal(self, count: int, peer: Peer, decide: Decide, kind: int = _MISSION) -> list[Output]:
+        """Why the mission may not be replaced now; empty if it may."""
+        verdict = decide(ReplaceMission(count))
+        if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
+            return []
+        said: list[Output] = [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
+        return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
+
+    def _replaced(self, mission: StoredMission) -> list[Output]:
+        self.mission = mission
+        return [MissionChanged(mission), Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
+
+    # ---- download
+
+    def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_REQUEST_LIST: how many items there are, told to the asker alone."""
+        kind = message.mission_type
+        if kind != _MISSION and kind not in _UNSERVED:
+            return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
+        count = len(self.mission.items) if kind == _MISSION else 0
+        answer = mavlink.MAVLink_mission_count_message(peer.system, peer.component, count, kind)
+        return [Send(peer.link, answer)]
+
+    def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_REQUEST_INT: any item in any order, as often as asked."""
+        return self._download(message, peer, mavlink.MAVLink_mission_item_int_message, _coordinates_as_int)
+
+    def receive_request(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_REQUEST, answered in the older form."""
+        return self._download(message, peer, mavlink.MAVLink_mission_item_message, _coordinates_as_float)
+
+    def _download(self, message: Any, peer: Peer, answer: Any, coordinates: Any) -> list[Output]:
+        kind, seq = message.mission_type, message.seq
+        if kind != _MISSION or seq >= len(self.mission.items):
+            return [_ack(peer, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
+        item = self.mission.items[seq]
+        x, y = coordinates(item)
+        return [
+            Send(
+                peer.link,
+                answer(
+                    target_system=peer.system,
+                    target_component=peer.component,
+                    seq=seq,
+                    frame=item.frame,
+                    command=item.command,
+                    current=item.current,
+                    autocontinue=item.autocontinue,
+                    param1=item.param1,
+                    param2=item.param2,
+                    param3=item.param3,
+                    param4=item.param4,
+                    x=x,
+                    y=y,
+                    z=item.z,
+                    mission_type=kind,
+                ),
+            )
+        ]
+
+    def receive_partial(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """MISSION_WRITE_PARTIAL_LIST and MISSION_REQUEST_PARTIAL_LIST: not served."""
+        return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)]
+
+
+def _ack(peer: Peer, result: int, kind: int = _MISSION) -> Output:
+    return Send(peer.link, mavlink.MAVLink_mission_ack_message(peer.system, peer.component, result, kind))
+
+
+def _item_of_int(m: Any) -> WireItem:
+    return WireItem(
+        frame=m.frame,
+        command=m.command,
+        current=m.current,
+        autocontinue=m.autocontinue,
+        param1=m.param1,
+        param2=m.param2,
+        param3=m.param3,
+        param4=m.param4,
+        x=m.x,
+        y=m.y,
+        z=m.z,
+    )
+
+
+def _scale(frame: int) -> float:
+    """What a float coordinate is multiplied with to become the integer of MISSION_ITEM_INT."""
+    if frame == mavlink.MAV_FRAME_MISSION:
+        return 1.0
+    return _METRE_SCALE if frame in _LOCAL_FRAMES else _DEGREE_SCALE
+
+
+def _int_coordinate(value: float, scale: float) -> int | None:
+    if math.isnan(value):
+        return _NO_INT
+    scaled = value * scale
+    return round(scaled) if abs(scaled) < _NO_INT else None
+
+
+def _item_of_float(m: Any) -> WireItem | None:
+    """The item with integer coordinates; None where they are beyond the range."""
+    scale = _scale(m.frame)
+    x, y = _int_coordinate(m.x, scale), _int_coordinate(m.y, scale)
+    if x is None or y is None:
+        return None
+    return _item_of_int(m)._replace(x=x, y=y)
+
+
+def _coordinates_as_int(item: WireItem) -> tuple[int, int]:
+    return item.x, item.y
+
+
+def _coordinates_as_float(item: WireItem) -> tuple[float, float]:
+    scale = _scale(item.frame)
+    x, y = (math.nan if value == _NO_INT else value / scale for value in (item.x, item.y))
+    return x, y

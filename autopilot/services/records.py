@@ -1,0 +1,89 @@
+"""What the services say to each other and to the shell: plain records, no behaviour.
+
+A service takes a message, the peer it came from and `now_us`; it returns outputs. `Send` and `Say` go out on
+the wire, `Announce` asks for messages that are made from the next snapshot, and the rest are events for the
+shell, named as facts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from autopilot.services.mission_store import StoredMission
+
+Link = Hashable  # opaque name of a way to a client, chosen by the shell
+
+
+class Peer(NamedTuple):
+    """Who sent a message, and over which link."""
+
+    link: Link
+    system: int
+    component: int
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """A message for one link, or for all of them (None)."""
+
+    link: Link | None
+    message: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Say:
+    """A text for the operators of all links; MAV_SEVERITY 0 (emergency) ... 7 (debug)."""
+
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Announce:
+    """Send these streamed messages once, out of turn, to one link or to all of them (None)."""
+
+    link: Link | None
+    message_ids: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterChanged:
+    """A ground station set a parameter; the table already holds `value`."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class MissionChanged:
+    """A whole mission was accepted in place of the last one, or the mission was cleared (no items)."""
+
+    mission: StoredMission
+
+
+@dataclass(frozen=True, slots=True)
+class TimesyncAnswered:
+    """A peer answered our TIMESYNC: both stamps as they stand in its message, ns."""
+
+    link: Link
+    tc1: int
+    ts1: int
+
+
+Event = ParameterChanged | MissionChanged | TimesyncAnswered
+Output = Send | Say | Announce | Event
+
+
+class Verdict(NamedTuple):
+    """What becomes of a request: a MAV_RESULT, and why in one line where there is something to say."""
+
+    result: int
+    text: str | None = None
+
+
+# A request is one of the dataclasses of `requests`; the supervisor decides.
+Decide = Callable[[Any], Verdict]
+# What a service does about a message: (message, peer, now_us, decide) -> outputs
+Handler = Callable[[Any, Peer, int, Decide], list[Output]]

@@ -1,0 +1,170 @@
+"""What a ground station can ask for, as facts in SI units and ENU from home, apart from how it was said.
+
+The first group is decided by the supervisor, the second is answered by the endpoint itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from autopilot.geometry.linear import Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """Start the rotors (`arm`) or stop them; `force` overrides the checks."""
+
+    arm: bool
+    force: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Takeoff:
+    """Take off to a height above home; None: the height of the parameter MIS_TAKEOFF_ALT."""
+
+    altitude_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Land:
+    """Land here."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnHome:
+    """Return to home."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """Enter a mode of the flavour's table."""
+
+    main: int
+    sub: int
+
+
+@dataclass(frozen=True, slots=True)
+class StartMission:
+    """Fly the mission; `first`: from this item, None: from the current one."""
+
+    first: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Hold where the load is now, keep the mission."""
+
+
+@dataclass(frozen=True, slots=True)
+class Continue:
+    """Go on with the paused mission."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetCurrent:
+    """Make this item the current one."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaceMission:
+    """May the mission be replaced now (`count` items), or cleared (0)? Asked at the begin and the end."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reposition:
+    """Bring the load to a place and hold it there; a component that is None is kept."""
+
+    east_m: float | None
+    north_m: float | None
+    altitude_m: float | None
+    change_mode: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeSpeed:
+    """Peak speed of the load on transfers."""
+
+    speed_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetHome:
+    """Move home to a place in the present coordinates; None: to where the vehicle is."""
+
+    position: Vec3 | None
+
+
+@dataclass(frozen=True, slots=True)
+class Terminate:
+    """Stop the rotors at once, wherever the vehicle is."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunPrearmChecks:
+    """Say what would keep the vehicle from arming."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reboot:
+    """Start the autopilot anew (`shutdown`: stop it)."""
+
+    shutdown: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StoreParameters:
+    """Save or load the parameters: both always in effect, because each change is stored at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class RequestMessage:
+    """Send one message now; `argument` is param2 of the command."""
+
+    message_id: int
+    argument: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetMessageInterval:
+    """Send a message every `interval_us` on the asker's link; 0: the default rate, -1: never."""
+
+    message_id: int
+    interval_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class GetMessageInterval:
+    """Tell the interval of a message on the asker's link."""
+
+    message_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class RequestCapabilities:
+    """Send AUTOPILOT_VERSION."""
+
+
+Decided = (
+    Arm
+    | Takeoff
+    | Land
+    | ReturnHome
+    | SetMode
+    | StartMission
+    | Pause
+    | Continue
+    | SetCurrent
+    | ReplaceMission
+    | Reposition
+    | ChangeSpeed
+    | SetHome
+    | Terminate
+    | RunPrearmChecks
+    | Reboot
+)
+Answered = StoreParameters | RequestMessage | SetMessageInterval | GetMessageInterval | RequestCapabilities
+Request = Decided | Answered

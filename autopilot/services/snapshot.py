@@ -1,0 +1,122 @@
+"""The flight at one instant, as telemetry needs it: SI, world ENU from home, body FLU.
+
+The flight core fills one where `VehicleEndpoint.poll` asks for it; no service reaches into the core.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.so3 import Quat
+from autopilot.wire.convert import Forces, Home
+from autopilot.wire.dialect import plumbline as mavlink
+
+_UNKNOWN: Vec3 = (math.nan, math.nan, math.nan)
+_DOWN: Vec3 = (0.0, 0.0, -1.0)
+_LEVEL: Quat = (1.0, 0.0, 0.0, 0.0)
+
+# Sensors that this vehicle may have, as bits of SYS_STATUS
+GYRO = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+ACCEL = mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+MAG = mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+BARO = mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+TRACKER = mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
+MOTORS = mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+AHRS = mavlink.MAV_SYS_STATUS_AHRS
+BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK  # health: the vehicle may be armed
+
+
+class GpsFix(NamedTuple):
+    """The last fix of the receiver, as the receiver gave it (not the estimate)."""
+
+    time_us: int
+    fix_type: int  # GPS_FIX_TYPE
+    position: Vec3
+    velocity: Vec3
+    horizontal_std: float  # m
+    vertical_std: float  # m
+    satellites: int
+
+
+class Snapshot(NamedTuple):
+    """One instant of the flight. The defaults are a vehicle that stands at home and has measured nothing."""
+
+    now_us: int
+    boot_unix_us: int
+    home: Home
+
+    # what it is doing
+    armed: bool
+    phase: int  # PLUMBLINE_PHASE
+    main_mode: int  # PX4's pair, see identity
+    sub_mode: int
+    landed_state: int  # MAV_LANDED_STATE
+    system_status: int  # MAV_STATE
+
+    # estimate of the vehicle
+    x_quad: Vec3 = ZERO
+    v_quad: Vec3 = ZERO
+    quat_wxyz: Quat = _LEVEL
+    omega_body: Vec3 = ZERO
+    estimator_flags: int = 0  # ESTIMATOR_STATUS_FLAGS
+    horizontal_std: float = math.nan  # m
+    vertical_std: float = math.nan  # m
+
+    # estimate of load and cable
+    x_load: Vec3 = ZERO
+    v_load: Vec3 = ZERO
+    q_cable: Vec3 = _DOWN
+    q_cable_dot: Vec3 = ZERO
+    distance: float = 0.0
+    tension: float = 0.0
+    taut: bool = False
+    slack_events: int = 0
+
+    # what the cascade tracks
+    control_mode: int = mavlink.PLUMBLINE_CONTROL_NONE
+    seq: int = 0  # mission item in force
+    elapsed_s: float = 0.0
+    duration_s: float = math.nan
+    x_load_d: Vec3 = ZERO
+    v_load_d: Vec3 = ZERO
+    a_load_d: Vec3 = ZERO
+    q_cable_c: Vec3 = _DOWN
+    x_quad_d: Vec3 = _UNKNOWN  # where that wants the vehicle; NaN while it is not wanted anywhere
+    v_quad_d: Vec3 = ZERO
+    a_quad_d: Vec3 = ZERO
+    quat_c_wxyz: Quat = _LEVEL
+    omega_c_body: Vec3 = ZERO
+
+    # its errors and what it asks of the mixer
+    e_x: Vec3 = ZERO
+    e_v: Vec3 = ZERO
+    e_q: Vec3 = ZERO
+    e_q_dot: Vec3 = ZERO
+    e_R: Vec3 = ZERO
+    e_Omega: Vec3 = ZERO
+    psi_R: float = 0.0
+    psi_q: float = 0.0
+    thrust: float = 0.0
+    moment: Vec3 = ZERO
+
+    # rotors
+    forces: Forces = (0.0, 0.0, 0.0, 0.0)  # commanded, N
+    rotor_min: float = 0.0
+    rotor_max: float = math.inf
+    saturated: int = 0  # bit i: rotor i+1 was cut
+
+    # the rest of the vehicle
+    sensors_present: int = 0  # the bits above
+    sensors_healthy: int = 0
+    gps: GpsFix | None = None
+    battery_voltage: float = math.nan  # V
+    battery_remaining: float = math.nan  # 0 ... 1
+
+    # mission
+    mission_current: int = 0
+    mission_total: int = 0
+    mission_state: int = mavlink.MISSION_STATE_NO_MISSION

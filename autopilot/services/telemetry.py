@@ -1,0 +1,331 @@
+"""What is streamed: one table from message id to sender, default interval and builder.
+
+A builder makes its messages from one `Snapshot`; numbers too large for a scaled field saturate. Messages of
+the private dialect leave from their own component, so that ground stations that do not know them do not count
+them as losses of the autopilot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from autopilot.geometry.frames import ned_from_enu
+from autopilot.geometry.linear import cross, dot
+from autopilot.services.heartbeat import HEARTBEAT_US, heartbeat_message, load_heartbeat_message
+from autopilot.services.identity import (
+    AUTOPILOT_COMPONENT,
+    DIALECT_COMPONENT,
+    LOAD_COMPONENT,
+    Identity,
+    autopilot_version_message,
+)
+from autopilot.services.snapshot import PREARM, Snapshot
+from autopilot.services.streams import OFF
+from autopilot.wire.convert import (
+    ROTOR_FMAX,
+    altitude_message,
+    attitude_message,
+    attitude_quaternion_message,
+    attitude_target_message,
+    boot_ms,
+    cascade_errors_message,
+    global_position_int_message,
+    gps_global_origin_message,
+    gps_raw_int_message,
+    home_position_message,
+    load_setpoint_message,
+    load_state_message,
+    local_position_ned_message,
+    position_target_local_ned_message,
+    rotor_state_message,
+    saturated,
+    uint16,
+    vfr_hud_message,
+    winch_status_message,
+)
+from autopilot.wire.dialect import plumbline as mavlink
+
+Builder = Callable[[Snapshot, Identity], tuple[Any, ...]]
+
+_UINT16 = 0xFFFF  # "unknown" in most unsigned fields
+_INT16 = 0x7FFF  # "unknown" temperature
+_UINT32 = 0xFFFFFFFF
+_ESTIMATED = mavlink.PLUMBLINE_SOURCE_ESTIMATED
+_PWM_STOP, _PWM_FULL = 1000, 2000  # SERVO_OUTPUT_RAW as most tools expect it, us
+
+
+def _force_fraction(force: float, snapshot: Snapshot) -> float:
+    """Share of what one rotor can give; a rotor without limit counts as the nominal one."""
+    scale = snapshot.rotor_max if math.isfinite(snapshot.rotor_max) else ROTOR_FMAX
+    return force / scale
+
+
+def _heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (heartbeat_message(s, identity),)
+
+
+def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    # There is no fence, so none is breached: some tools read a missing health bit as a breach
+    health = s.sensors_healthy | mavlink.MAV_SYS_STATUS_GEOFENCE
+    present = s.sensors_present | PREARM
+    return (
+        mavlink.MAVLink_sys_status_message(
+            onboard_control_sensors_present=present,
+            onboard_control_sensors_enabled=present,
+            onboard_control_sensors_health=health,
+            load=0,
+            voltage_battery=_battery_mv(s),
+            current_battery=-1,
+            battery_remaining=_battery_percent(s),
+            drop_rate_comm=0,
+            errors_comm=0,
+            errors_count1=0,
+            errors_count2=0,
+            errors_count3=0,
+            errors_count4=0,
+        ),
+    )
+
+
+def _battery_mv(s: Snapshot) -> int:
+    if math.isnan(s.battery_voltage):
+        return _UINT16
+    return saturated(s.battery_voltage * 1e3, 0, _UINT16 - 1)
+
+
+def _battery_percent(s: Snapshot) -> int:
+    return -1 if math.isnan(s.battery_remaining) else saturated(s.battery_remaining * 100.0, 0, 100)
+
+
+def _battery_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (
+        mavlink.MAVLink_battery_status_message(
+            id=0,
+            battery_function=mavlink.MAV_BATTERY_FUNCTION_ALL,
+            type=mavlink.MAV_BATTERY_TYPE_LIPO,
+            temperature=_INT16,
+            voltages=(_battery_mv(s), *(_UINT16,) * 9),
+            current_battery=-1,
+            current_consumed=-1,
+            energy_consumed=-1,
+            battery_remaining=_battery_percent(s),
+        ),
+    )
+
+
+def _extended_sys_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    vtol = mavlink.MAV_VTOL_STATE_UNDEFINED
+    return (mavlink.MAVLink_extended_sys_state_message(vtol, s.landed_state),)
+
+
+def _gps_raw_int(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    fix = s.gps
+    if fix is None:
+        unknown = (_UINT16,) * 4
+        none = mavlink.GPS_FIX_TYPE_NO_GPS
+        return (mavlink.MAVLink_gps_raw_int_message(s.now_us, none, 0, 0, 0, *unknown, 255),)
+    accuracy = (fix.horizontal_std, fix.vertical_std, fix.satellites)
+    return (gps_raw_int_message(fix.time_us, fix.fix_type, fix.position, fix.velocity, *accuracy, s.home),)
+
+
+def _global_position_int(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (global_position_int_message(s.now_us, s.x_quad, s.v_quad, s.quat_wxyz, s.home),)
+
+
+def _gps_global_origin(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (gps_global_origin_message(s.now_us, s.home),)
+
+
+def _home_position(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (home_position_message(s.now_us, s.home),)
+
+
+def _local_position_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (local_position_ned_message(s.now_us, s.x_quad, s.v_quad),)
+
+
+def _attitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (attitude_message(s.now_us, s.quat_wxyz, s.omega_body),)
+
+
+def _attitude_quaternion(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (attitude_quaternion_message(s.now_us, s.quat_wxyz, s.omega_body),)
+
+
+def _altitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (altitude_message(s.now_us, s.x_quad[2], s.home),)
+
+
+def _vfr_hud(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    throttle = _force_fraction(0.25 * sum(s.forces), s)
+    return (vfr_hud_message(s.v_quad, s.quat_wxyz, s.x_quad[2], throttle, s.home),)
+
+
+def _mission_current(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    seq, total = uint16(s.mission_current), uint16(s.mission_total)
+    return (mavlink.MAVLink_mission_current_message(seq, total, s.mission_state),)
+
+
+def _system_time(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (mavlink.MAVLink_system_time_message(s.boot_unix_us + s.now_us, boot_ms(s.now_us)),)
+
+
+def _estimator_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    ratios = (math.nan,) * 6  # the filter has no innovation tests of this kind
+    accuracy = (s.horizontal_std, s.vertical_std)
+    return (mavlink.MAVLink_estimator_status_message(s.now_us, s.estimator_flags, *ratios, *accuracy),)
+
+
+def _position_target_local_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    if math.isnan(s.x_quad_d[0]):
+        return ()
+    return (position_target_local_ned_message(s.now_us, s.x_quad_d, s.v_quad_d, s.a_quad_d),)
+
+
+def _attitude_target(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    thrust = _force_fraction(0.25 * s.thrust, s)
+    return (attitude_target_message(s.now_us, s.quat_c_wxyz, s.omega_c_body, thrust),)
+
+
+def _servo_output_raw(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    span = _PWM_FULL - _PWM_STOP
+    pwm = [saturated(_PWM_STOP + span * _force_fraction(f, s), _PWM_STOP, _PWM_FULL) for f in s.forces]
+    pwm += [0] * 4
+    return (mavlink.MAVLink_servo_output_raw_message(s.now_us & _UINT32, 0, *pwm),)
+
+
+def _debug_vect(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    vectors = (
+        (b"LOAD_POS", s.x_load),
+        (b"LOAD_VEL", s.v_load),
+        (b"CABLE_Q", s.q_cable),
+        (b"LOAD_ERR", s.e_x),
+    )
+    return tuple(
+        mavlink.MAVLink_debug_vect_message(name, s.now_us, *ned_from_enu(vector)) for name, vector in vectors
+    )
+
+
+def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    values = (
+        (b"TENSION", s.tension),
+        (b"LOAD_ERR", math.hypot(*s.e_x)),
+        (b"PSI_R", s.psi_R),
+        (b"PSI_Q", s.psi_q),
+    )
+    return tuple(
+        mavlink.MAVLink_named_value_float_message(boot_ms(s.now_us), name, value) for name, value in values
+    )
+
+
+def _winch_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (winch_status_message(s.now_us, s.distance, s.tension),)
+
+
+def _autopilot_version(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (autopilot_version_message(identity),)
+
+
+def _load_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    load = (s.x_load, s.v_load, s.q_cable, s.q_cable_dot, s.distance, s.tension, s.taut, s.slack_events)
+    return (load_state_message(s.now_us, _ESTIMATED, *load),)
+
+
+def _load_setpoint(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    desired = (s.x_load_d, s.v_load_d, s.a_load_d, s.q_cable_c, s.elapsed_s, s.duration_s)
+    return (load_setpoint_message(s.now_us, s.phase, s.control_mode, s.seq, *desired),)
+
+
+def _cascade_errors(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    errors = (s.e_x, s.e_v, s.e_q, s.e_q_dot, s.e_R, s.e_Omega, s.psi_R, s.psi_q)
+    return (cascade_errors_message(s.now_us, s.control_mode, *errors, s.thrust, s.moment),)
+
+
+def _rotor_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (rotor_state_message(s.now_us, _ESTIMATED, s.forces, s.rotor_min, s.rotor_max, s.saturated),)
+
+
+def _load_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (load_heartbeat_message(s),)
+
+
+def _load_global_position_int(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (global_position_int_message(s.now_us, s.x_load, s.v_load, None, s.home),)
+
+
+def _load_attitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """The cable as an attitude without yaw whose z axis points from vehicle to load."""
+    d, d_dot = ned_from_enu(s.q_cable), ned_from_enu(s.q_cable_dot)
+    roll = math.asin(max(-1.0, min(1.0, -d[1])))
+    pitch = math.atan2(d[0], d[2])
+    omega = cross(d, d_dot)
+    x_axis = (math.cos(pitch), 0.0, -math.sin(pitch))
+    rates = (dot(omega, x_axis), dot(omega, cross(d, x_axis)), 0.0)
+    return (mavlink.MAVLink_attitude_message(boot_ms(s.now_us), roll, pitch, 0.0, *rates),)
+
+
+class Stream(NamedTuple):
+    """One row of the table."""
+
+    component: int
+    interval_us: int  # by default; OFF: sent on request only
+    build: Builder
+
+
+def _rate(hertz: int) -> int:
+    return 1_000_000 // hertz
+
+
+_AUTOPILOT, _DIALECT = AUTOPILOT_COMPONENT, DIALECT_COMPONENT
+
+STREAMS: dict[int, Stream] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(_AUTOPILOT, HEARTBEAT_US, _heartbeat),
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: Stream(_AUTOPILOT, _rate(2), _sys_status),
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(_AUTOPILOT, _rate(1), _system_time),
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Stream(_AUTOPILOT, _rate(1), _extended_sys_state),
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: Stream(_AUTOPILOT, _rate(1), _battery_status),
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(_AUTOPILOT, _rate(5), _gps_raw_int),
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: Stream(_AUTOPILOT, _rate(1), _home_position),
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(_AUTOPILOT, _rate(1), _mission_current),
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(_AUTOPILOT, _rate(1), _estimator_status),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(_AUTOPILOT, _rate(25), _attitude),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(_AUTOPILOT, _rate(25), _attitude_quaternion),
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(_AUTOPILOT, _rate(20), _local_position_ned),
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(_AUTOPILOT, _rate(10), _global_position_int),
+    mavlink.MAVLINK_MSG_ID_ALTITUDE: Stream(_AUTOPILOT, _rate(5), _altitude),
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: Stream(_AUTOPILOT, _rate(5), _vfr_hud),
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: Stream(
+        _AUTOPILOT, _rate(10), _position_target_local_ned
+    ),
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: Stream(_AUTOPILOT, _rate(10), _attitude_target),
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: Stream(_AUTOPILOT, _rate(5), _servo_output_raw),
+    mavlink.MAVLINK_MSG_ID_DEBUG_VECT: Stream(_AUTOPILOT, _rate(10), _debug_vect),
+    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Stream(_AUTOPILOT, _rate(10), _named_value_float),
+    mavlink.MAVLINK_MSG_ID_WINCH_STATUS: Stream(_AUTOPILOT, _rate(2), _winch_status),
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: Stream(_AUTOPILOT, OFF, _autopilot_version),
+    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(_AUTOPILOT, OFF, _gps_global_origin),
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE: Stream(_DIALECT, _rate(20), _load_state),
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: Stream(_DIALECT, _rate(20), _load_setpoint),
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: Stream(_DIALECT, _rate(20), _cascade_errors),
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _rate(20), _rotor_state),
+}
+
+# The load as a MAVLink system of its own. The keys stand beside those above: a message id has 24 bits.
+LOAD_SYSTEM = 1 << 24
+LOAD_STREAMS: dict[int, Stream] = {
+    LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(LOAD_COMPONENT, HEARTBEAT_US, _load_heartbeat),
+    LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(
+        LOAD_COMPONENT, _rate(5), _load_global_position_int
+    ),
+    LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(LOAD_COMPONENT, _rate(5), _load_attitude),
+}
+
+# Sent at once to every link when what is picked here has changed, besides their rate
+WATCHED: dict[int, Callable[[Snapshot], tuple[Any, ...]]] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: lambda s: (s.armed, s.main_mode, s.sub_mode, s.system_status),
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda s: (s.landed_state,),
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda s: (s.mission_current, s.mission_total, s.mission_state),
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home,),
+}

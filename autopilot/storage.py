@@ -1,0 +1,86 @@
+"""What must outlive the process: the mission and the parameters that a ground station set, as files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
+from autopilot.wire.convert import Home
+from autopilot.wire.parameters import ParameterError, ParameterTable, parse_text
+
+MISSION_FILE = "mission.bin"
+PARAMETER_FILE = "parameters.txt"
+
+
+class StorageError(OSError):
+    """The storage directory cannot be used."""
+
+
+class Storage:
+    """A directory; every write is a whole new file put in place at once."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._parameters: dict[str, float] = {}
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StorageError(
+                f"--storage {directory}: {error.strerror}; name a directory that can be made"
+            ) from None
+
+    def load_mission(self, home: Home) -> tuple[StoredMission | None, str]:
+        """The stored mission, and what is wrong with the file if it is none (empty: nothing)."""
+        path = self._directory / MISSION_FILE
+        try:
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return None, ""
+        except OSError as error:
+            return None, f"{path}: {error.strerror}; starting without a mission"
+        mission = deserialise(data, home)
+        if isinstance(mission, CorruptMission):
+            aside = path.with_suffix(".corrupt")
+            path.replace(aside)
+            return None, f"{path}: {mission.reason}; moved to {aside.name}, starting without a mission"
+        return mission, ""
+
+    def load_parameters(self, table: ParameterTable) -> list[str]:
+        """Set what is stored; returns a line for each stored value that no longer fits."""
+        path = self._directory / PARAMETER_FILE
+        try:
+            stored = parse_text(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return []
+        except (OSError, UnicodeDecodeError, ParameterError) as error:
+            return [f"{path}: {error}; starting with the defaults"]
+        troubles = []
+        for name, value in stored.items():
+            try:
+                self._parameters[name] = table.set(name, value)
+            except ParameterError as error:
+                troubles.append(f"{path}: {error}; left out")
+        return troubles
+
+    def keep_mission(self, mission: StoredMission) -> None:
+        """Store the mission; an empty one is stored as none."""
+        path = self._directory / MISSION_FILE
+        if mission.items:
+            self._write(path, serialise(mission.items))
+        else:
+            path.unlink(missing_ok=True)
+
+    def keep_parameter(self, name: str, value: float) -> None:
+        """Store one more parameter."""
+        self._parameters[name] = value
+        lines = [f"{name} {value!r}\n" for name, value in sorted(self._parameters.items())]
+        self._write(self._directory / PARAMETER_FILE, "".join(lines).encode())
+
+    def _write(self, path: Path, data: bytes) -> None:
+        new = path.with_suffix(".new")
+        with new.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)

@@ -1,0 +1,373 @@
+"""The supervisor: which phase the flight is in, as a table, and what each phase sets out to do.
+
+`TRANSITIONS` says where each event leads; an event that is not in the table for a phase does not happen
+there, and a request for it is refused. Entering a phase lays out its legs. Everything is a function of the
+flight, the view and the settings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import degrees
+
+from autopilot.flight import (
+    CARRYING,
+    IN_AIR,
+    Event,
+    Flight,
+    Phase,
+    Report,
+    Selected,
+    Settings,
+    View,
+    leg_time_s,
+    setpoint,
+)
+from autopilot.geometry.linear import Vec3, axpy, norm, sub
+from autopilot.guidance import (
+    LOAD_ATTITUDE,
+    LOAD_POSITION,
+    QUAD_ATTITUDE,
+    QUAD_POSITION,
+    Creep,
+    Hold,
+    Leg,
+    Run,
+    Swing,
+    transfer_leg,
+)
+from autopilot.wire.dialect import plumbline as mavlink
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    ReturnHome,
+    Signals,
+    Speed,
+    Step,
+    Takeoff,
+    Waypoint,
+)
+from missions.signals import signal_table
+
+P, E = Phase, Event
+TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
+    (P.DISARMED, E.ARM): P.ARMED,
+    (P.ARMED, E.DISARM): P.DISARMED,
+    (P.ARMED, E.TAKEOFF): P.TAUTEN,
+    (P.ARMED, E.FAIL): P.DISARMED,
+    (P.TAUTEN, E.TAUT): P.LIFT,
+    (P.TAUTEN, E.LAND): P.SET_DOWN,
+    (P.LIFT, E.DONE): P.HOLD,
+    (P.LIFT, E.HOLD): P.HOLD,
+    (P.LIFT, E.LAND): P.LOWER,
+    (P.HOLD, E.HOLD): P.HOLD,
+    (P.HOLD, E.MISSION): P.MISSION,
+    (P.HOLD, E.RETURN): P.RETURN,
+    (P.HOLD, E.LAND): P.LOWER,
+    (P.MISSION, E.DONE): P.HOLD,
+    (P.MISSION, E.HOLD): P.HOLD,
+    (P.MISSION, E.MISSION): P.MISSION,
+    (P.MISSION, E.RETURN): P.RETURN,
+    (P.MISSION, E.LAND): P.LOWER,
+    (P.RETURN, E.DONE): P.LOWER,
+    (P.RETURN, E.HOLD): P.HOLD,
+    (P.RETURN, E.MISSION): P.MISSION,
+    (P.RETURN, E.LAND): P.LOWER,
+    (P.LOWER, E.LOAD_DOWN): P.SET_DOWN,
+    (P.LOWER, E.HOLD): P.HOLD,
+    (P.LOWER, E.MISSION): P.MISSION,
+    (P.LOWER, E.RETURN): P.RETURN,
+    (P.SET_DOWN, E.VEHICLE_DOWN): P.DISARMED,
+    (P.FAILSAFE, E.DISARM): P.DISARMED,
+    **{(phase, E.FAIL): P.FAILSAFE for phase in IN_AIR},
+    **{(phase, E.DISARM): P.DISARMED for phase in IN_AIR},  # forced disarming only
+}
+
+INFO, WARNING, CRITICAL = (
+    mavlink.MAV_SEVERITY_INFO,
+    mavlink.MAV_SEVERITY_WARNING,
+    mavlink.MAV_SEVERITY_CRITICAL,
+)
+
+CLEARANCE = 0.6  # height over the load, in cable lengths, at which the slack vehicle moves sideways
+ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
+SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
+TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
+TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
+LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
+STILL_SPEED, STILL_US = 0.05, 200_000
+IDLE_DISARM_US = 10_000_000
+FAILSAFE_DISARM_US = 3_000_000
+BRAKE_S = 0.6  # a load that swings freely is asked to stop this far ahead
+SETTLE_S = 3.0  # hold after an attitude run
+
+
+def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Flight:
+    """The flight in `phase`, with the legs with which the phase begins."""
+    legs = _ENTRY[phase](flight, view, settings) if phase in _ENTRY else ()
+    return replace(
+        flight,
+        phase=phase,
+        phase_start_us=view.now_us,
+        legs=legs,
+        leg_start_us=view.now_us,
+        still_since_us=-1,
+    )
+
+
+def happen(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
+    """The flight after an event; None where the table has no room for it."""
+    phase = TRANSITIONS.get((flight.phase, event))
+    return None if phase is None else enter(flight, phase, view, settings)
+
+
+def load_setpoint(flight: Flight, view: View) -> Vec3:
+    """Where the load is asked to be; where it is (or will stop) if nothing is asked of its position."""
+    if flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
+        jet = setpoint(flight, view.now_us)
+        if jet is not None:
+            return jet[0]
+    if flight.phase in CARRYING:
+        return axpy(BRAKE_S, view.v_load, view.x_load)
+    return view.x_load
+
+
+# ---- entry of each phase
+
+
+def _tauten(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    clear = view.x_load[2] + CLEARANCE * settings.cable_length_m
+    up = (view.x_quad[0], view.x_quad[1], clear)
+    over = (view.x_load[0], view.x_load[1], clear)
+    return (
+        transfer_leg(view.x_quad, up, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        transfer_leg(up, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        Creep(over, (0.0, 0.0, settings.taut_speed_m_s), QUAD_POSITION),
+    )
+
+
+def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    top = (view.x_load[0], view.x_load[1], flight.takeoff_altitude_m)
+    return (_carry(view.x_load, top, settings.lift_speed_m_s, settings),)
+
+
+def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    jet = setpoint(flight, view.now_us)
+    here = load_setpoint(flight, view)
+    if jet is not None and flight.legs[0].control_mode == LOAD_POSITION:
+        here = axpy(BRAKE_S, jet[1], here)
+    return (Hold(here),)
+
+
+def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    here = load_setpoint(flight, view)
+    return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings),)
+
+
+def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    here = load_setpoint(flight, view)
+    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT))
+    return (
+        _carry(here, low, settings.lift_speed_m_s, settings),
+        Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION),
+    )
+
+
+def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    clear = min(view.x_quad[2], view.x_load[2] + CLEARANCE * settings.cable_length_m)
+    down = (view.x_quad[0], view.x_quad[1], clear)
+    aside = (view.x_load[0] - ASIDE * settings.cable_length_m, view.x_load[1], clear)
+    return (
+        transfer_leg(view.x_quad, down, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        transfer_leg(down, aside, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        Creep(aside, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
+    )
+
+
+def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings) -> Leg:
+    return transfer_leg(begin, end, speed, settings.accel_m_s2, LOAD_POSITION)
+
+
+def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    step = flight.plan.steps[flight.step]
+    here = load_setpoint(flight, view)
+    anchor = flight.step_anchor
+    if anchor is not None and isinstance(step, Signals | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
+        # a step that is taken up again after a pause begins anew, from where it began
+        back = _carry(here, anchor, flight.speed_m_s, settings)
+        return (back, *_step_legs(step, anchor, flight, settings))
+    return _step_legs(step, here, flight, settings)
+
+
+def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tuple[Leg, ...]:
+    match step:
+        case Takeoff(altitude_m=altitude):
+            return (_carry(here, (here[0], here[1], altitude), settings.lift_speed_m_s, settings),)
+        case Waypoint(east_m=east, north_m=north, altitude_m=altitude, hold_s=hold):
+            there = (east, north, altitude)
+            go = _carry(here, there, flight.speed_m_s, settings)
+            return (go, Hold(there, hold)) if hold > 0.0 else (go,)
+        case Delay(duration_s=duration):
+            return (Hold(here, duration),)
+        case ReturnHome():
+            return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings),)
+        case Signals(duration_s=duration, terms=terms):
+            return (Run(here, signal_table(terms), duration),)
+        case AttitudeRun(
+            controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
+        ):
+            mode = QUAD_ATTITUDE if controlled == "vehicle" else LOAD_ATTITUDE
+            return (Swing(here, north, east, duration, mode),)
+        case Speed() | Land():
+            return ()
+    raise AssertionError(step)
+
+
+_ENTRY = {
+    P.TAUTEN: _tauten,
+    P.LIFT: _lift,
+    P.HOLD: _hold,
+    P.MISSION: _mission,
+    P.RETURN: _return,
+    P.LOWER: _lower,
+    P.SET_DOWN: _set_down,
+}
+
+
+# ---- from tick to tick
+
+
+def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
+    """The flight at `view.now_us`: legs that are over, events that the world brings, and what they mean."""
+    if flight.phase in IN_AIR:
+        trouble = _trouble(flight, view, settings)
+        if trouble:
+            return _given_up(flight, trouble, view, settings)
+    if flight.phase == P.ARMED and view.now_us - flight.phase_start_us > IDLE_DISARM_US:
+        return _to(flight, E.DISARM, view, settings, (INFO, "Disarmed: nothing was asked of the vehicle"))
+    if flight.phase == P.FAILSAFE and view.now_us - flight.phase_start_us > FAILSAFE_DISARM_US:
+        return _to(flight, E.DISARM, view, settings, (WARNING, "Disarmed after failsafe"))
+    if flight.phase == P.TAUTEN and view.taut and len(flight.legs) == 1:
+        return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
+    if flight.phase in (P.LOWER, P.SET_DOWN):
+        flight = _watch_touchdown(flight, view)
+        if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= STILL_US:
+            if flight.phase == P.LOWER:
+                return _to(flight, E.LOAD_DOWN, view, settings, (INFO, "Load on the ground"))
+            return _landed(flight, view, settings)
+    reached: tuple[int, ...] = ()
+    texts: tuple[tuple[int, str], ...] = ()
+    # a step may take no time at all: go on until one does
+    while flight.phase in IN_AIR and (
+        not flight.legs or leg_time_s(flight, view.now_us) >= flight.legs[0].duration_s
+    ):
+        if len(flight.legs) > 1:
+            ended = flight.leg_start_us + round(flight.legs[0].duration_s * 1e6)
+            flight = replace(flight, legs=flight.legs[1:], leg_start_us=ended)
+            continue
+        flight, more = _legs_done(flight, view, settings)
+        reached += more.reached
+        texts += more.texts
+    return flight, Report(texts, reached)
+
+
+def _to(
+    flight: Flight, event: Event, view: View, settings: Settings, text: tuple[int, str]
+) -> tuple[Flight, Report]:
+    after = happen(flight, event, view, settings)
+    assert after is not None, (flight.phase, event)
+    if after.phase == P.DISARMED:
+        after = disarmed(after)
+    return after, Report((text,))
+
+
+def disarmed(flight: Flight) -> Flight:
+    """The flight with its rotors stopped: nothing selected, the mission rewound."""
+    return replace(flight, selected=Selected.NOTHING, on_mission=False, step=0, step_anchor=None, legs=())
+
+
+def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
+    reached: tuple[int, ...] = ()
+    if flight.on_mission:
+        reached = (flight.plan.sequence[flight.step],)
+        flight = replace(flight, mission_done=flight.step + 1 >= len(flight.plan.steps))
+    after, report = _to(flight, E.VEHICLE_DOWN, view, settings, (INFO, "Landed, disarmed"))
+    return after, Report(report.texts, reached)
+
+
+def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
+    """The last leg of the present phase is over."""
+    if flight.on_mission and flight.phase in (P.LIFT, P.MISSION):
+        return _step_done(flight, view, settings)
+    after = happen(flight, E.DONE, view, settings)
+    if after is None:  # a phase whose last leg has no end
+        return replace(flight, legs=(Hold(load_setpoint(flight, view)),), leg_start_us=view.now_us), Report()
+    return after, Report()
+
+
+def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
+    """The present mission step is over: the next one, or the end of the mission."""
+    plan = flight.plan
+    reached: tuple[int, ...] = ()
+    step = plan.steps[flight.step]
+    lifted_unasked = flight.phase == P.LIFT and not isinstance(step, Takeoff)
+    if not lifted_unasked:
+        if isinstance(step, AttitudeRun) and isinstance(flight.legs[0], Swing):
+            # the load swings freely then: let the position law catch it before anything else is asked
+            there = axpy(BRAKE_S, view.v_load, view.x_load)
+            return replace(flight, legs=(Hold(there, SETTLE_S),), leg_start_us=view.now_us), Report()
+        reached = (plan.sequence[flight.step],)
+        flight = replace(flight, step=flight.step + 1, step_anchor=None)
+    if flight.step >= len(plan.steps):
+        after = enter(replace(flight, on_mission=False, mission_done=True, step=0), P.HOLD, view, settings)
+        return after, Report(((INFO, "Mission complete, holding"),), reached)
+    step = plan.steps[flight.step]
+    if isinstance(step, Speed):
+        flight = replace(flight, speed_m_s=step.speed_m_s)
+        return replace(flight, legs=(Hold(load_setpoint(flight, view), 0.0),), phase=P.MISSION), Report(
+            (), reached
+        )
+    if isinstance(step, Land):
+        return enter(flight, P.LOWER, view, settings), Report((), reached)
+    anchored = replace(flight, step_anchor=load_setpoint(flight, view))
+    return enter(anchored, P.MISSION, view, settings), Report((), reached)
+
+
+def _watch_touchdown(flight: Flight, view: View) -> Flight:
+    """Note since when the thing that is set down no longer follows its sinking setpoint.
+
+    The vehicle must stand still as well: a gust may hold it up. The load's velocity says nothing once the
+    cable is slack.
+    """
+    leg = flight.legs[0]
+    if isinstance(leg, Creep):
+        target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
+        if leg.control_mode == LOAD_POSITION:
+            down = view.x_load[2] - target > LOAD_SUNK
+        else:
+            down = view.x_quad[2] - target > VEHICLE_SUNK and abs(view.v_quad[2]) < STILL_SPEED
+        if down:
+            return flight if flight.still_since_us >= 0 else replace(flight, still_since_us=view.now_us)
+    return flight if flight.still_since_us < 0 else replace(flight, still_since_us=-1)
+
+
+def _trouble(flight: Flight, view: View, settings: Settings) -> str:
+    """Why the flight cannot go on, or an empty string."""
+    if view.complaints:
+        return view.complaints[0]
+    if view.tilt_rad > settings.tilt_limit_rad:
+        limit = degrees(settings.tilt_limit_rad)
+        return f"tilt {degrees(view.tilt_rad):.0f} deg exceeds FS_TILT_DEG {limit:.0f}"
+    if flight.phase in CARRYING and flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
+        jet = setpoint(flight, view.now_us)
+        error = norm(sub(view.x_load, jet[0])) if jet is not None else 0.0
+        if not error <= settings.load_error_limit_m:
+            return f"load error {error:.1f} m exceeds FS_LOAD_ERR {settings.load_error_limit_m:.1f} m"
+    return ""
+
+
+def _given_up(flight: Flight, why: str, view: View, settings: Settings) -> tuple[Flight, Report]:
+    after = happen(replace(flight, on_mission=False), E.FAIL, view, settings)
+    assert after is not None, flight.phase
+    return after, Report(((mavlink.MAV_SEVERITY_EMERGENCY, f"Flight given up: {why}"),))

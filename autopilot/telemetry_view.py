@@ -1,0 +1,228 @@
+"""The flight core's state as the services' snapshot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, nan
+
+from autopilot.decisions import arming_complaints
+from autopilot.estimation.filter import control_state
+from autopilot.flight import CARRYING, ON_GROUND, Flight, Phase, Selected, leg_time_s
+from autopilot.flight_core import FlightState, Setup, view_of
+from autopilot.geometry.linear import ZERO, norm, sub
+from autopilot.geometry.so3 import quat_from_rotation
+from autopilot.guidance import LOAD_POSITION, QUAD_POSITION
+from autopilot.sensor_link import Tick
+from autopilot.services import identity, snapshot
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.snapshot import GpsFix, Snapshot
+from autopilot.wire.convert import ACCEL, GYRO, MAG, PRESSURE, HilGps, Home
+from autopilot.wire.dialect import plumbline as mavlink
+
+FRESH_S = 0.5  # a tracker is healthy while its last reading is no older
+NOMINAL_VOLTAGE_V = 11.1  # a battery that does not drain is simulated
+
+_PHASE_MODES = {
+    Phase.TAUTEN: identity.AUTO_TAKEOFF,
+    Phase.LIFT: identity.AUTO_TAKEOFF,
+    Phase.HOLD: identity.AUTO_LOITER,
+    Phase.MISSION: identity.AUTO_MISSION,
+    Phase.RETURN: identity.AUTO_RTL,
+    Phase.LOWER: identity.AUTO_LAND,
+    Phase.SET_DOWN: identity.AUTO_LAND,
+    Phase.FAILSAFE: identity.AUTO_LAND,
+}
+_SELECTED_MODES = {
+    Selected.NOTHING: identity.AUTO_LOITER,
+    Selected.TAKEOFF: identity.AUTO_TAKEOFF,
+    Selected.MISSION: identity.AUTO_MISSION,
+}
+_LANDED_STATES = {
+    Phase.DISARMED: mavlink.MAV_LANDED_STATE_ON_GROUND,
+    Phase.ARMED: mavlink.MAV_LANDED_STATE_ON_GROUND,
+    Phase.TAUTEN: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    Phase.LIFT: mavlink.MAV_LANDED_STATE_TAKEOFF,
+    Phase.LOWER: mavlink.MAV_LANDED_STATE_LANDING,
+    Phase.SET_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
+}
+_ESTIMATING = (
+    mavlink.ESTIMATOR_ATTITUDE
+    | mavlink.ESTIMATOR_VELOCITY_HORIZ
+    | mavlink.ESTIMATOR_VELOCITY_VERT
+    | mavlink.ESTIMATOR_POS_HORIZ_REL
+    | mavlink.ESTIMATOR_POS_HORIZ_ABS
+    | mavlink.ESTIMATOR_POS_VERT_ABS
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line decides for the whole run."""
+
+    home: Home
+    boot_unix_us: int
+    lockstep: bool = True
+
+
+def sub_mode(flight: Flight) -> int:
+    """Sub-mode of AUTO: what was asked for, of which the phase is a part."""
+    if flight.on_mission:
+        return identity.AUTO_MISSION
+    if flight.phase in ON_GROUND:
+        return _SELECTED_MODES[flight.selected]
+    return _PHASE_MODES[flight.phase]
+
+
+def system_status(flight: Flight, ready: bool) -> int:
+    """MAV_STATE of the flight."""
+    if flight.phase == Phase.FAILSAFE:
+        return mavlink.MAV_STATE_EMERGENCY
+    if flight.phase == Phase.DISARMED:
+        return mavlink.MAV_STATE_STANDBY if ready else mavlink.MAV_STATE_CALIBRATING
+    return mavlink.MAV_STATE_ACTIVE
+
+
+def mission_state(flight: Flight, items: int) -> int:
+    """MISSION_STATE of the flight."""
+    if items == 0:
+        return mavlink.MISSION_STATE_NO_MISSION
+    if flight.on_mission:
+        return mavlink.MISSION_STATE_ACTIVE
+    if flight.mission_done:
+        return mavlink.MISSION_STATE_COMPLETE
+    if flight.phase not in ON_GROUND and (flight.step > 0 or flight.step_anchor is not None):
+        return mavlink.MISSION_STATE_PAUSED
+    return mavlink.MISSION_STATE_NOT_STARTED
+
+
+def sensor_bits(tick: Tick | None, state: FlightState, gps: HilGps | None, ready: bool) -> tuple[int, int]:
+    """Sensors present and healthy, as bits of SYS_STATUS."""
+    present = snapshot.MOTORS | snapshot.AHRS | snapshot.BATTERY
+    healthy = present
+    fields = tick.fields_updated if tick else 0
+    for field, bit in (
+        (ACCEL, snapshot.ACCEL),
+        (GYRO, snapshot.GYRO),
+        (MAG, snapshot.MAG),
+        (PRESSURE, snapshot.BARO),
+    ):
+        if fields & field:
+            present |= bit
+            healthy |= bit
+    estimator = state.estimator
+    if estimator.vehicle.age_s < inf:
+        present |= snapshot.TRACKER
+        if estimator.vehicle.age_s < FRESH_S and estimator.load.age_s < FRESH_S:
+            healthy |= snapshot.TRACKER
+    if gps is not None:
+        present |= snapshot.GPS
+        healthy |= snapshot.GPS
+    if ready:
+        healthy |= snapshot.PREARM
+    return present, healthy
+
+
+def make_snapshot(
+    state: FlightState,
+    setup: Setup,
+    options: Options,
+    mission: StoredMission,
+    tick: Tick | None,
+    gps: HilGps | None,
+    now_us: int,
+) -> Snapshot:
+    """All that telemetry tells of this instant."""
+    flight, estimator, command = state.flight, state.estimator, state.command
+    control = control_state(estimator)
+    view = view_of(estimator, control, setup.settings, now_us)
+    ready = not arming_complaints(flight, view)
+    present, healthy = sensor_bits(tick, state, gps, ready)
+
+    leg = flight.legs[0] if flight.legs else None
+    x_d, v_d, a_d, x_quad_d = control.x_load, ZERO, ZERO, (nan, nan, nan)
+    elapsed, duration = (now_us - flight.phase_start_us) * 1e-6, nan
+    if leg is not None:
+        elapsed = leg_time_s(flight, now_us)
+        duration = leg.duration_s if leg.duration_s < inf else nan
+        jet = leg.jet(elapsed)
+        if leg.control_mode == LOAD_POSITION:
+            x_d, v_d, a_d = jet[0], jet[1], jet[2]
+        elif leg.control_mode == QUAD_POSITION:
+            x_quad_d = jet[0]
+    sequence = flight.plan.sequence
+    seq = sequence[min(flight.step, len(sequence) - 1)] if sequence else 0
+    carrying = flight.phase in CARRYING
+    return Snapshot(
+        now_us=now_us,
+        boot_unix_us=options.boot_unix_us,
+        home=options.home,
+        armed=flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
+        phase=int(flight.phase),
+        main_mode=identity.AUTO,
+        sub_mode=sub_mode(flight),
+        landed_state=_LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
+        system_status=system_status(flight, ready),
+        x_quad=control.x_quad,
+        v_quad=control.v_quad,
+        quat_wxyz=estimator.vehicle.quat_wxyz,
+        omega_body=control.omega_body,
+        estimator_flags=0 if view.complaints else _ESTIMATING,
+        horizontal_std=estimator.vehicle.covariance[0] ** 0.5,
+        vertical_std=estimator.vehicle.covariance[0] ** 0.5,
+        x_load=control.x_load,
+        v_load=control.v_load,
+        q_cable=control.q_cable,
+        q_cable_dot=control.q_cable_dot,
+        distance=norm(sub(control.x_load, control.x_quad)),
+        tension=estimator.load.tension,
+        taut=view.taut,
+        slack_events=state.slack_events,
+        control_mode=state.control_mode,
+        seq=seq,
+        elapsed_s=elapsed,
+        duration_s=duration,
+        x_load_d=x_d,
+        v_load_d=v_d,
+        a_load_d=a_d,
+        q_cable_c=command.q_c,
+        x_quad_d=x_quad_d,
+        quat_c_wxyz=quat_from_rotation(command.R_c),
+        e_x=command.e_x if carrying else ZERO,
+        e_v=command.e_v if carrying else ZERO,
+        e_q=command.e_q,
+        e_q_dot=command.e_q_dot,
+        e_R=command.e_R,
+        e_Omega=command.e_Omega,
+        psi_R=command.psi_R,
+        psi_q=command.psi_q,
+        thrust=command.thrust,
+        moment=command.moment,
+        forces=state.mixed.forces,
+        rotor_min=setup.vehicle.rotor_min if setup.limited else -inf,
+        rotor_max=setup.vehicle.rotor_max if setup.limited else inf,
+        saturated=state.mixed.saturated,
+        sensors_present=present,
+        sensors_healthy=healthy,
+        gps=_fix(gps),
+        battery_voltage=NOMINAL_VOLTAGE_V,
+        battery_remaining=1.0,
+        mission_current=seq,
+        mission_total=len(mission.items),
+        mission_state=mission_state(flight, len(mission.items)),
+    )
+
+
+def _fix(gps: HilGps | None) -> GpsFix | None:
+    if gps is None:
+        return None
+    return GpsFix(
+        gps.time_us,
+        gps.fix_type,
+        gps.position,
+        gps.velocity,
+        gps.horizontal_std,
+        gps.vertical_std,
+        gps.satellites,
+    )

@@ -1,0 +1,217 @@
+"""The dialect's telemetry: load, setpoint, errors of the cascade, rotors."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from autopilot.geometry.frames import enu_from_ned, flu_from_frd, frd_from_flu, ned_from_enu
+from autopilot.geometry.linear import Vec3
+from autopilot.wire.convert.scaling import uint16
+from autopilot.wire.convert.simulator import Forces
+from autopilot.wire.dialect import plumbline as mavlink
+
+
+class LoadState(NamedTuple):
+    """LOAD_STATE: load and cable, `source` one of PLUMBLINE_SOURCE."""
+
+    time_us: int
+    source: int
+    x_load: Vec3
+    v_load: Vec3
+    q_cable: Vec3  # unit vector from vehicle to load
+    q_cable_dot: Vec3
+    distance: float  # m, vehicle to load
+    tension: float  # N
+    taut: bool
+    slack_events: int
+
+
+def load_state_message(
+    time_us: int,
+    source: int,
+    x_load: Vec3,
+    v_load: Vec3,
+    q_cable: Vec3,
+    q_cable_dot: Vec3,
+    distance: float,
+    tension: float,
+    taut: bool,
+    slack_events: int,
+) -> Any:
+    """LOAD_STATE, see `LoadState`."""
+    return mavlink.MAVLink_load_state_message(
+        time_us,
+        *ned_from_enu(x_load),
+        *ned_from_enu(v_load),
+        *ned_from_enu(q_cable),
+        *ned_from_enu(q_cable_dot),
+        distance,
+        tension,
+        uint16(slack_events),
+        1 if taut else 0,
+        source,
+    )
+
+
+def read_load_state(m: Any) -> LoadState:
+    """Inverse of `load_state_message`."""
+    return LoadState(
+        m.time_usec,
+        m.source,
+        enu_from_ned((m.x, m.y, m.z)),
+        enu_from_ned((m.vx, m.vy, m.vz)),
+        enu_from_ned((m.qx, m.qy, m.qz)),
+        enu_from_ned((m.qx_dot, m.qy_dot, m.qz_dot)),
+        m.distance,
+        m.tension,
+        bool(m.taut),
+        m.slack_events,
+    )
+
+
+class LoadSetpoint(NamedTuple):
+    """LOAD_SETPOINT: the load's setpoint; PLUMBLINE_PHASE of the flight, PLUMBLINE_CONTROL_MODE tracked."""
+
+    time_us: int
+    phase: int
+    control_mode: int
+    seq: int  # mission item
+    position: Vec3
+    velocity: Vec3
+    acceleration: Vec3
+    q_cable_c: Vec3  # commanded direction of the cable
+    elapsed: float  # s since the item or phase began
+    duration: float  # s, NaN if open
+
+
+def load_setpoint_message(
+    time_us: int,
+    phase: int,
+    control_mode: int,
+    seq: int,
+    position: Vec3,
+    velocity: Vec3,
+    acceleration: Vec3,
+    q_cable_c: Vec3,
+    elapsed: float,
+    duration: float,
+) -> Any:
+    """LOAD_SETPOINT, see `LoadSetpoint`."""
+    return mavlink.MAVLink_load_setpoint_message(
+        time_us,
+        *ned_from_enu(position),
+        *ned_from_enu(velocity),
+        *ned_from_enu(acceleration),
+        *ned_from_enu(q_cable_c),
+        elapsed,
+        duration,
+        uint16(seq),
+        phase,
+        control_mode,
+    )
+
+
+def read_load_setpoint(m: Any) -> LoadSetpoint:
+    """Inverse of `load_setpoint_message`."""
+    return LoadSetpoint(
+        m.time_usec,
+        m.phase,
+        m.control_mode,
+        m.seq,
+        enu_from_ned((m.x, m.y, m.z)),
+        enu_from_ned((m.vx, m.vy, m.vz)),
+        enu_from_ned((m.ax, m.ay, m.az)),
+        enu_from_ned((m.qx, m.qy, m.qz)),
+        m.elapsed,
+        m.duration,
+    )
+
+
+class CascadeErrors(NamedTuple):
+    """CASCADE_ERRORS: (3-1) ... (3-25) as the autopilot computes them, and what it asks of the mixer."""
+
+    time_us: int
+    control_mode: int
+    e_x: Vec3
+    e_v: Vec3
+    e_q: Vec3
+    e_q_dot: Vec3
+    e_R: Vec3  # body
+    e_Omega: Vec3  # body, rad/s
+    psi_R: float
+    psi_q: float
+    thrust: float  # N
+    moment: Vec3  # body, N m
+
+
+def cascade_errors_message(
+    time_us: int,
+    control_mode: int,
+    e_x: Vec3,
+    e_v: Vec3,
+    e_q: Vec3,
+    e_q_dot: Vec3,
+    e_R: Vec3,
+    e_Omega: Vec3,
+    psi_R: float,
+    psi_q: float,
+    thrust: float,
+    moment: Vec3,
+) -> Any:
+    """CASCADE_ERRORS, see `CascadeErrors`."""
+    return mavlink.MAVLink_cascade_errors_message(
+        time_us,
+        ned_from_enu(e_x),
+        ned_from_enu(e_v),
+        ned_from_enu(e_q),
+        ned_from_enu(e_q_dot),
+        frd_from_flu(e_R),
+        frd_from_flu(e_Omega),
+        psi_R,
+        psi_q,
+        thrust,
+        frd_from_flu(moment),
+        control_mode,
+    )
+
+
+def read_cascade_errors(m: Any) -> CascadeErrors:
+    """Inverse of `cascade_errors_message`."""
+    return CascadeErrors(
+        m.time_usec,
+        m.control_mode,
+        enu_from_ned(tuple(m.e_x)),
+        enu_from_ned(tuple(m.e_v)),
+        enu_from_ned(tuple(m.e_q)),
+        enu_from_ned(tuple(m.e_q_dot)),
+        flu_from_frd(tuple(m.e_r)),
+        flu_from_frd(tuple(m.e_omega)),
+        m.psi_r,
+        m.psi_q,
+        m.thrust,
+        flu_from_frd(tuple(m.moment)),
+    )
+
+
+class RotorState(NamedTuple):
+    """ROTOR_STATE: commanded (estimated source) or true forces; bit i of `saturated`: rotor i+1 was cut."""
+
+    time_us: int
+    source: int
+    forces: Forces  # N
+    force_min: float  # N
+    force_max: float  # N, inf if unlimited
+    saturated: int
+
+
+def rotor_state_message(
+    time_us: int, source: int, forces: Forces, force_min: float, force_max: float, saturated: int
+) -> Any:
+    """ROTOR_STATE, see `RotorState`."""
+    return mavlink.MAVLink_rotor_state_message(time_us, forces, force_min, force_max, saturated, source)
+
+
+def read_rotor_state(m: Any) -> RotorState:
+    """Inverse of `rotor_state_message`."""
+    f1, f2, f3, f4 = m.force
+    return RotorState(m.time_usec, m.source, (f1, f2, f3, f4), m.force_min, m.force_max, m.saturated)

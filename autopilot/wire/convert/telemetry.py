@@ -1,0 +1,216 @@
+"""Common telemetry of a vehicle, built from ENU and FLU; any ground station reads it.
+
+`now_us` is the time since boot. Read back is what our own ground station reads: attitude and local position.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from autopilot.geometry.frames import (
+    enu_from_ned,
+    flu_from_frd,
+    frd_from_flu,
+    ned_from_enu,
+    quat_enu_flu_from_ned_frd,
+    quat_ned_frd_from_enu_flu,
+)
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.so3 import Quat
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
+from autopilot.wire.convert.scaling import course_cdeg, int16, int32, saturated, uint16
+from autopilot.wire.dialect import plumbline as mavlink
+
+_UPRIGHT = [1.0, 0.0, 0.0, 0.0]
+_POSITION_VELOCITY_ACCELERATION = 0xC00  # POSITION_TARGET_TYPEMASK: yaw and yaw rate are not given
+
+
+def boot_ms(now_us: int) -> int:
+    """time_boot_ms of a message."""
+    return now_us // 1000 & 0xFFFF_FFFF
+
+
+def euler_ned_frd(quat_wxyz: Quat) -> Vec3:
+    """(roll, pitch, yaw) in rad of MAVLink, from the attitude body FLU to world ENU; yaw 0 is north."""
+    w, x, y, z = quat_ned_frd_from_enu_flu(quat_wxyz)
+    return (
+        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        math.asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x)))),
+        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+def heading_cdeg(quat_wxyz: Quat) -> int:
+    """Heading in 0 ... 35999 hundredths of a degree from north; 65535 (unknown) for an attitude of NaN."""
+    yaw = euler_ned_frd(quat_wxyz)[2]
+    return 0xFFFF if math.isnan(yaw) else round(math.degrees(yaw) * 100.0) % 36000
+
+
+def attitude_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Any:
+    """ATTITUDE."""
+    return mavlink.MAVLink_attitude_message(
+        boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body)
+    )
+
+
+class AttitudeQuaternion(NamedTuple):
+    """ATTITUDE_QUATERNION."""
+
+    boot_ms: int
+    quat_wxyz: Quat
+    omega_body: Vec3
+
+
+def attitude_quaternion_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Any:
+    """ATTITUDE_QUATERNION."""
+    return mavlink.MAVLink_attitude_quaternion_message(
+        boot_ms(now_us), *quat_ned_frd_from_enu_flu(quat_wxyz), *frd_from_flu(omega_body)
+    )
+
+
+def read_attitude_quaternion(m: Any) -> AttitudeQuaternion:
+    """Inverse of `attitude_quaternion_message`."""
+    return AttitudeQuaternion(
+        m.time_boot_ms,
+        quat_enu_flu_from_ned_frd((m.q1, m.q2, m.q3, m.q4)),
+        flu_from_frd((m.rollspeed, m.pitchspeed, m.yawspeed)),
+    )
+
+
+class LocalPosition(NamedTuple):
+    """LOCAL_POSITION_NED."""
+
+    boot_ms: int
+    position: Vec3
+    velocity: Vec3
+
+
+def local_position_ned_message(now_us: int, position: Vec3, velocity: Vec3) -> Any:
+    """LOCAL_POSITION_NED."""
+    return mavlink.MAVLink_local_position_ned_message(
+        boot_ms(now_us), *ned_from_enu(position), *ned_from_enu(velocity)
+    )
+
+
+def read_local_position_ned(m: Any) -> LocalPosition:
+    """Inverse of `local_position_ned_message`."""
+    return LocalPosition(m.time_boot_ms, enu_from_ned((m.x, m.y, m.z)), enu_from_ned((m.vx, m.vy, m.vz)))
+
+
+def global_position_int_message(
+    now_us: int, position: Vec3, velocity: Vec3, quat_wxyz: Quat | None, home: Home
+) -> Any:
+    """GLOBAL_POSITION_INT; without an attitude the heading is unknown."""
+    latitude, longitude, altitude = geodetic_from_enu(position, home)
+    north, east, down = ned_from_enu(velocity)
+    return mavlink.MAVLink_global_position_int_message(
+        boot_ms(now_us),
+        latitude,
+        longitude,
+        altitude,
+        int32(position[2] * 1e3),
+        int16(north * 100.0),
+        int16(east * 100.0),
+        int16(down * 100.0),
+        0xFFFF if quat_wxyz is None else heading_cdeg(quat_wxyz),
+    )
+
+
+def gps_raw_int_message(
+    now_us: int,
+    fix_type: int,
+    position: Vec3,
+    velocity: Vec3,
+    horizontal_std: float,
+    vertical_std: float,
+    satellites: int,
+    home: Home,
+) -> Any:
+    """GPS_RAW_INT, its dilutions given as standard deviations in cm, as PX4 does."""
+    latitude, longitude, altitude = geodetic_from_enu(position, home)
+    north, east, _ = ned_from_enu(velocity)
+    return mavlink.MAVLink_gps_raw_int_message(
+        now_us,
+        fix_type,
+        latitude,
+        longitude,
+        altitude,
+        saturated(horizontal_std * 100.0, 0, 0xFFFE),
+        saturated(vertical_std * 100.0, 0, 0xFFFE),
+        saturated(math.hypot(north, east) * 100.0, 0, 0xFFFE),
+        course_cdeg(north, east),
+        saturated(satellites, 0, 255),
+    )
+
+
+def altitude_message(now_us: int, height: float, home: Home) -> Any:
+    """ALTITUDE for a height in m above home; the ground is flat at home's altitude."""
+    above_sea = home.altitude_m + height
+    return mavlink.MAVLink_altitude_message(
+        now_us, height, above_sea, height, height, home.altitude_m, height
+    )
+
+
+def vfr_hud_message(velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home) -> Any:
+    """VFR_HUD; `throttle` is a fraction, speeds are taken through still air."""
+    heading = heading_cdeg(quat_wxyz)
+    return mavlink.MAVLink_vfr_hud_message(
+        math.hypot(*velocity),
+        math.hypot(velocity[0], velocity[1]),
+        0 if heading == 0xFFFF else heading // 100,
+        uint16(min(1.0, max(0.0, throttle)) * 100.0),
+        home.altitude_m + height,
+        velocity[2],
+    )
+
+
+def home_position_message(now_us: int, home: Home) -> Any:
+    """HOME_POSITION: the origin of the world."""
+    return mavlink.MAVLink_home_position_message(
+        *geodetic_from_enu(ZERO, home), 0.0, 0.0, 0.0, _UPRIGHT, 0.0, 0.0, 0.0, now_us
+    )
+
+
+def gps_global_origin_message(now_us: int, home: Home) -> Any:
+    """GPS_GLOBAL_ORIGIN: the origin of LOCAL_POSITION_NED."""
+    return mavlink.MAVLink_gps_global_origin_message(*geodetic_from_enu(ZERO, home), now_us)
+
+
+def position_target_local_ned_message(now_us: int, position: Vec3, velocity: Vec3, acceleration: Vec3) -> Any:
+    """POSITION_TARGET_LOCAL_NED: the setpoint in force."""
+    return mavlink.MAVLink_position_target_local_ned_message(
+        boot_ms(now_us),
+        mavlink.MAV_FRAME_LOCAL_NED,
+        _POSITION_VELOCITY_ACCELERATION,
+        *ned_from_enu(position),
+        *ned_from_enu(velocity),
+        *ned_from_enu(acceleration),
+        0.0,
+        0.0,
+    )
+
+
+def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float) -> Any:
+    """ATTITUDE_TARGET: what the inner loop is asked for."""
+    return mavlink.MAVLink_attitude_target_message(
+        boot_ms(now_us),
+        0,
+        quat_ned_frd_from_enu_flu(quat_wxyz),
+        *frd_from_flu(omega_body),
+        thrust_fraction,
+    )
+
+
+def winch_status_message(now_us: int, cable_length: float, tension: float) -> Any:
+    """WINCH_STATUS of a cable that is neither reeled in nor out; what a winch would measure is unknown."""
+    return mavlink.MAVLink_winch_status_message(
+        now_us,
+        cable_length,
+        0.0,
+        tension,
+        math.nan,
+        math.nan,
+        0x7FFF,
+        mavlink.MAV_WINCH_STATUS_HEALTHY,
+    )

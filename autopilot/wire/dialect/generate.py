@@ -1,0 +1,58 @@
+"""Writes plumbline.py from plumbline.xml: `python -m autopilot.wire.dialect.generate`.
+
+The included common.xml, standard.xml and minimal.xml are those of the installed pymavlink; its version stands
+in the first line of the result. No network is needed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+import sys
+import tempfile
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+
+from pymavlink.generator import mavgen
+
+DIALECT = Path(__file__).with_name("plumbline.xml")
+MODULE = Path(__file__).with_name("plumbline.py")
+_INCLUDED = ("common.xml", "standard.xml", "minimal.xml")
+_STAMP = "# Generated with pymavlink "
+
+
+def generated() -> bytes:
+    """The module that the installed pymavlink makes of plumbline.xml."""
+    definitions = Path(str(files("pymavlink") / "dialects" / "v20"))
+    with tempfile.TemporaryDirectory() as folder:
+        for source in (DIALECT, *(definitions / name for name in _INCLUDED)):
+            shutil.copy(source, folder)
+        output = Path(folder) / "out" / "plumbline.py"
+        output.parent.mkdir()
+        options = mavgen.Opts(str(output), wire_protocol="2.0", language="Python3", validate=False)
+        chatter = io.StringIO()
+        with contextlib.redirect_stdout(chatter), contextlib.redirect_stderr(chatter):
+            done = mavgen.mavgen(options, [str(Path(folder) / DIALECT.name)])
+        if not done or not output.is_file():
+            raise RuntimeError(f"mavgen refused {DIALECT.name}:\n{chatter.getvalue()}")
+        return f"{_STAMP}{version('pymavlink')}\n".encode() + output.read_bytes()
+
+
+def generated_with() -> str:
+    """The version of pymavlink that made the module on disk; empty if it does not say."""
+    with MODULE.open(encoding="utf-8") as module:
+        first = module.readline().strip()
+    return first.removeprefix(_STAMP) if first.startswith(_STAMP) else ""
+
+
+def main() -> None:
+    """Replace plumbline.py."""
+    text = generated()
+    MODULE.write_bytes(text)
+    sys.stdout.write(f"{MODULE}: {len(text)} bytes, pymavlink {version('pymavlink')}\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""Telemetry logs: records of 8 bytes (big-endian microseconds since 1970) and one raw frame.
+
+The format of MAVProxy, Mission Planner and QGroundControl; `pymavlink.mavutil.mavlink_connection` reads it.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from autopilot.wire.codec import LONGEST_FRAME, MAGICS, Received, announced_length, decode
+
+_STAMP = struct.Struct(">Q")
+_CHUNK = 1 << 16
+
+
+class TlogWriter:
+    """Appends records to a binary file that somebody else opens and closes."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def write(self, unix_us: int, frame: bytes) -> None:
+        """One record."""
+        self._file.write(_STAMP.pack(unix_us) + frame)
+
+
+def read_tlog(source: Path | str | BinaryIO) -> Iterator[tuple[int, Received]]:
+    """(unix_us, message) of each record, in the order of the file.
+
+    A record cut off at the end is left out. Damaged stretches are stepped over, as are frames of unknown ids.
+    """
+    if isinstance(source, Path | str):
+        with Path(source).open("rb") as file:
+            yield from _read(file)
+    else:
+        yield from _read(source)
+
+
+def _read(file: BinaryIO) -> Iterator[tuple[int, Received]]:
+    buffer = b""
+    while chunk := file.read(_CHUNK):
+        buffer += chunk
+        used = yield from _records(buffer, len(buffer) - _STAMP.size - LONGEST_FRAME)
+        buffer = buffer[used:]
+    yield from _records(buffer, len(buffer))
+
+
+def _records(buffer: bytes, before: int) -> Generator[tuple[int, Received], None, int]:
+    """The records that begin before offset `before`; returns the offset behind the last."""
+    start = 0
+    while start < before:
+        begin = start + _STAMP.size
+        length = announced_length(buffer, begin)
+        end = begin + length
+        if not length or end > len(buffer):
+            start += 1
+            continue
+        received, junk = decode(buffer[begin:end])
+        if received and not junk:
+            yield _STAMP.unpack_from(buffer, start)[0], received[0]
+            start = end
+        elif end + _STAMP.size < len(buffer) and buffer[end + _STAMP.size] in MAGICS:
+            start = end  # a frame that is damaged or unknown, but whole
+        else:
+            start += 1
+    return start

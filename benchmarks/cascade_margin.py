@@ -1,0 +1,395 @@
+"""How much gain and delay the thesis's cascade can lose: margins against rotor lag, control rate and delay.
+
+The loop is linearised numerically about hover: the vehicle from (2-30)-(2-35) with first-order rotors, the
+laws from the very functions that fly, filters and all, sampled with a zero-order hold of the commands. The
+margins are those of the loop cut at the roll moment (the axis of least inertia), everything else closed:
+
+* gain: the factors by which the roll command may grow and shrink before the loop is lost; * phase: at the
+crossover where it is least; * delay: the additional transport delay at which an eigenvalue leaves the unit
+circle, all commands delayed alike.
+
+`delay` is all that passes between a motion and the command that answers it, besides the hold: sensor latency,
+computation, transport.
+
+    python benchmarks/cascade_margin.py [--loop attitude|position] [--set k_R=0.45 ...]
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, solve_discrete_lyapunov
+
+from autopilot.control import thesis
+from autopilot.control.command_filter import FilterState
+from autopilot.control.records import Reference, State, Vehicle
+
+Array = NDArray[np.float64]
+
+# Table 4-1; torque ratio and limits play no part in a linear model
+BEBOP = Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
+ZERO = (0.0, 0.0, 0.0)
+HOVER = 0.25 * (BEBOP.quad_mass + BEBOP.load_mass) * BEBOP.gravity  # N, each rotor
+HEADING = (1.0, 0.0, 0.0)
+# central differences: truncation and rounding both below 1e-9
+STEP = 1e-5
+GREATEST_DELAY = 0.2  # s; more is reported as this
+GREATEST_GAIN = 101.0
+LOST = 1.0 + 1e-9  # spectral radius
+
+# coordinates of the motion about hover: x_L, v_L, q_x, q_y, their rates, rotation vector, Omega
+MOTION = 16
+ROTATION = slice(10, 16)
+ROLL = 1  # of the inputs f, M_x, M_y, M_z
+# name, coordinates, standard deviation: what an estimator over motion capture may leave
+NOISES = (
+    ("load position, m", slice(0, 3), 0.0005),
+    ("load velocity, m/s", slice(3, 6), 0.003),
+    ("cable direction, rad", slice(6, 8), 0.0007),
+    ("cable rate, rad/s", slice(8, 10), 0.008),
+    ("attitude, rad", slice(10, 13), 0.002),
+    ("body rate, rad/s", slice(13, 16), 0.005),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is varied. Times in seconds."""
+
+    rotor_tau: float = 0.0
+    period: float = 0.004
+    delay: float = 0.0
+    loop: str = "position"
+    gains: thesis.ThesisGains = thesis.THESIS_GAINS
+    filters: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Margins of one setting; factors, degrees, seconds, rad/s."""
+
+    radius: float
+    gain_up: float
+    gain_down: float
+    phase_deg: float
+    crossover: float
+    delay: float
+
+    @property
+    def stable(self) -> bool:
+        return self.radius < LOST
+
+
+def plant(vehicle: Vehicle) -> tuple[Array, Array]:
+    """(A, B) of (2-30)-(2-35) at hover in the coordinates MOTION, inputs f, M: linearised by hand.
+
+    With q = (q_x, q_y, -1) and R e3 = (theta, -phi, 1) to first order and f = (m_Q + m_L) g:
+    x_L'' = -g (q_x, q_y) across, f/(m_Q + m_L) - g up; m_Q L q'' = -(f R e3 - (f R e3 . q) q) across.
+    """
+    m_Q, L, g = vehicle.quad_mass, vehicle.cable_length, vehicle.gravity
+    m = m_Q + vehicle.load_mass
+    A, B = np.zeros((MOTION, MOTION)), np.zeros((MOTION, 4))
+    A[0:3, 3:6] = np.eye(3)
+    A[3, 6] = A[4, 7] = -g
+    B[5, 0] = 1.0 / m
+    A[6:8, 8:10] = np.eye(2)
+    A[8, 6] = A[9, 7] = -m * g / (m_Q * L)
+    A[8, 11] = -m * g / (m_Q * L)
+    A[9, 10] = m * g / (m_Q * L)
+    A[10:13, 13:16] = np.eye(3)
+    B[13:16, 1:4] = np.diag(1.0 / np.array(vehicle.inertia))
+    return A, B
+
+
+def state_at(motion: Array, vehicle: Vehicle) -> State:
+    """The state near hover with these coordinates, on its manifolds to second order."""
+    q_x, q_y = float(motion[6]), float(motion[7])
+    q_z = -math.sqrt(1.0 - q_x * q_x - q_y * q_y)
+    q = np.array([q_x, q_y, q_z])
+    q_dot = np.array([motion[8], motion[9], -(q_x * motion[8] + q_y * motion[9]) / q_z])
+    a, b, c = motion[10:13]
+    R = expm(np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]]))
+    x, v, L = motion[0:3], motion[3:6], vehicle.cable_length
+    return State(
+        _vec(x),
+        _vec(v),
+        _vec(q),
+        _vec(q_dot),
+        _vec(x - L * q),
+        _vec(v - L * q_dot),
+        (_vec(R[0]), _vec(R[1]), _vec(R[2])),
+        _vec(motion[13:16]),
+    )
+
+
+def _vec(a: Any) -> tuple[float, float, float]:
+    return (float(a[0]), float(a[1]), float(a[2]))
+
+
+def _flat(memory: thesis.ThesisMemory) -> Array:
+    return np.array([number for part in memory for vector in part for number in vector])
+
+
+def _memory(numbers: Array) -> thesis.ThesisMemory:
+    vectors = [_vec(numbers[i : i + 3]) for i in range(0, len(numbers), 3)]
+    return thesis.ThesisMemory(*(FilterState(*vectors[i : i + 3]) for i in range(0, len(vectors), 3)))
+
+
+def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
+    """(memory, motion) -> (memory, f, M) of one control tick, as arrays."""
+    filters = thesis.thesis_filters(settings.period, **settings.filters)
+    reference = Reference((ZERO,) * 7, HEADING)
+    level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+
+    def tick(numbers: Array) -> Array:
+        memory, state = _memory(numbers[:-MOTION]), state_at(numbers[-MOTION:], vehicle)
+        if settings.loop == "attitude":
+            after, command = thesis.quad_attitude(
+                memory, state, level, weight, settings.gains, filters, vehicle
+            )
+        else:
+            after, command = thesis.load_position(memory, state, reference, settings.gains, filters, vehicle)
+        return np.concatenate([_flat(after), [command.thrust], command.moment])
+
+    return tick
+
+
+def linearised_law(settings: Settings, vehicle: Vehicle) -> tuple[Array, Array, Array, Array]:
+    """(A, B, C, D) of the law at hover: memory, motion in; memory, (f, M) out."""
+    tick = law(settings, vehicle)
+    hover = _flat(thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO))
+    n = len(hover)
+    at = np.concatenate([hover, np.zeros(MOTION)])
+    jacobian = np.empty((n + 4, n + MOTION))
+    for j in range(n + MOTION):
+        step = np.zeros(n + MOTION)
+        step[j] = STEP
+        jacobian[:, j] = (tick(at + step) - tick(at - step)) / (2.0 * STEP)
+    return jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
+
+
+def sampled_plant(settings: Settings, vehicle: Vehicle, delay: float) -> tuple[Array, Array, Array]:
+    """(A, B, C) from one tick to the next: motion, rotors and the commands on their way; exact for held
+    commands.
+
+    A command of tick k works from t_k + delay until that of tick k + 1 does.
+    """
+    A, B = plant(vehicle)
+    if settings.loop == "attitude":
+        keep = np.r_[ROTATION]
+        A, B = A[np.ix_(keep, keep)], B[keep]
+    n = len(A)
+    if settings.rotor_tau > 0.0:
+        A = np.block([[A, B], [np.zeros((4, n)), -np.eye(4) / settings.rotor_tau]])
+        B = np.vstack([np.zeros((n, 4)), np.eye(4) / settings.rotor_tau])
+    whole = math.floor(delay / settings.period + 1e-9)
+    late = max(0.0, delay - whole * settings.period)
+
+    def hold(duration: float) -> tuple[Array, Array]:
+        E = expm(np.block([[A, B], [np.zeros((4, len(A) + 4))]]) * duration)
+        return E[: len(A), : len(A)], E[: len(A), len(A) :]
+
+    Phi, _ = hold(settings.period)
+    Phi_new, Gamma_new = hold(settings.period - late)
+    _, Gamma_old = hold(late)
+    Gamma_old = Phi_new @ Gamma_old
+    # commands on their way, oldest first: u_{k-whole-1} ... u_{k-1}
+    m, queue = len(A), whole + 1
+    size = m + 4 * queue
+    A_d, B_d = np.zeros((size, size)), np.zeros((size, 4))
+    A_d[:m, :m] = Phi
+    A_d[:m, m : m + 4] = Gamma_old
+    if whole == 0:
+        B_d[:m] = Gamma_new
+    else:
+        A_d[:m, m + 4 : m + 8] = Gamma_new
+    for i in range(queue - 1):
+        A_d[m + 4 * i : m + 4 * i + 4, m + 4 * i + 4 : m + 4 * i + 8] = np.eye(4)
+    B_d[size - 4 :] = np.eye(4)
+    C_d = np.zeros((MOTION, size))
+    rows = ROTATION if settings.loop == "attitude" else slice(0, MOTION)
+    C_d[rows, :n] = np.eye(n)
+    return A_d, B_d, C_d
+
+
+def joined(plant_model: tuple[Array, ...], law_model: tuple[Array, ...], shut: Array) -> Array:
+    """State matrix of plant and law together, with the channels of `shut` (1 or 0 for f and each moment)."""
+    A, B, C = plant_model
+    Ac, Bc, Cc, Dc = law_model
+    S = np.diag(shut)
+    return np.block([[A + B @ S @ Dc @ C, B @ S @ Cc], [Bc @ C, Ac]])
+
+
+def radius(A: Array) -> float:
+    return float(np.max(np.abs(np.linalg.eigvals(A))))
+
+
+def margin(settings: Settings, vehicle: Vehicle = BEBOP) -> Margin:
+    """Margins of one setting."""
+    law_model = linearised_law(settings, vehicle)
+    plant_model = sampled_plant(settings, vehicle, settings.delay)
+    everything = np.ones(4)
+    spectral = radius(joined(plant_model, law_model, everything))
+
+    cut = everything.copy()
+    cut[ROLL] = 0.0
+    A = joined(plant_model, law_model, cut)
+    b = np.concatenate([plant_model[1][:, ROLL], np.zeros(len(law_model[0]))])
+    c = np.concatenate([law_model[3][ROLL] @ plant_model[2], law_model[2][ROLL]])
+    omega = np.geomspace(0.5, 0.999 * math.pi / settings.period, 1000)
+    eye = np.eye(len(A))
+    response = [-(c @ np.linalg.solve(np.exp(1j * w * settings.period) * eye - A, b)) for w in omega]
+    _, phases, _, _, crossings, _ = control.stability_margins(
+        control.FRD(np.array(response), omega), returnall=True
+    )
+    least = int(np.argmin(np.abs(phases)))
+
+    def scaled(factor: float) -> bool:
+        shut = everything.copy()
+        shut[ROLL] = factor
+        return radius(joined(plant_model, law_model, shut)) < LOST
+
+    def delayed(extra: float) -> bool:
+        late = sampled_plant(settings, vehicle, settings.delay + extra)
+        return radius(joined(late, law_model, everything)) < LOST
+
+    stable = spectral < LOST
+    return Margin(
+        radius=spectral,
+        gain_up=boundary(scaled, 1.0, GREATEST_GAIN) if stable else 1.0,
+        gain_down=boundary(scaled, 1.0, 0.0) if stable else 1.0,
+        phase_deg=float(phases[least]),
+        crossover=float(crossings[least]),
+        delay=boundary(delayed, 0.0, GREATEST_DELAY) if stable else 0.0,
+    )
+
+
+def boundary(holds: Callable[[float], bool], inside: float, outside: float) -> float:
+    """Where on the way from `inside` to `outside` it first ceases to hold: in 100 strides, then by
+    bisection."""
+    strides = np.linspace(inside, outside, 101)[1:]
+    first = next((float(x) for x in strides if not holds(float(x))), None)
+    if first is None:
+        return outside
+    low, high = first - (outside - inside) / 100.0, first
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def rotor_noise(settings: Settings, vehicle: Vehicle = BEBOP) -> list[tuple[str, float, float]]:
+    """Standard deviation of a rotor command (N; the worst of the four) for each source of white noise in
+    turn.
+
+    The noise is drawn anew each tick, with the deviation given in NOISES on each coordinate: what an
+    estimator leaves, not what a sensor gives. Assumes a stable loop.
+    """
+    A_p, B_p, C_p = sampled_plant(settings, vehicle, settings.delay)
+    A_c, B_c, C_c, D_c = linearised_law(settings, vehicle)
+    A = joined((A_p, B_p, C_p), (A_c, B_c, C_c, D_c), np.ones(4))
+    arm, ratio = 2.0 * vehicle.arm, 4.0 * vehicle.torque_ratio
+    mixer = np.array(
+        [
+            [0.25, 0.0, 1.0 / arm, -1.0 / ratio],
+            [0.25, -1.0 / arm, 0.0, 1.0 / ratio],
+            [0.25, 0.0, -1.0 / arm, -1.0 / ratio],
+            [0.25, 1.0 / arm, 0.0, 1.0 / ratio],
+        ]
+    )
+    B = np.vstack([B_p @ D_c, B_c])
+    C = mixer @ np.hstack([D_c @ C_p, C_c])
+    D = mixer @ D_c
+    rows = []
+    for name, coordinates, deviation in NOISES:
+        W = np.zeros((MOTION, MOTION))
+        W[coordinates, coordinates] = deviation**2 * np.eye(MOTION)[coordinates, coordinates]
+        P = solve_discrete_lyapunov(A, B @ W @ B.T)
+        variance = np.diag(C @ P @ C.T + D @ W @ D.T)
+        rows.append((name, deviation, float(np.sqrt(variance.max()))))
+    return rows
+
+
+def row(settings: Settings) -> str:
+    result = margin(settings)
+    head = f"{settings.rotor_tau * 1e3:6.0f} {1.0 / settings.period:6.0f} {settings.delay * 1e3:6.1f}"
+    if not result.stable:
+        # the time in which the growing mode grows by e
+        growth = settings.period / math.log(result.radius)
+        return f"{head}   lost: grows by e every {growth * 1e3:6.0f} ms"
+    return (
+        f"{head} {result.gain_up:7.2f} {result.gain_down:7.2f} {result.phase_deg:7.1f}"
+        f" {result.crossover:8.1f} {result.delay * 1e3:8.1f}"
+    )
+
+
+def table(grid: Iterable[Settings]) -> str:
+    title = (
+        " tau_ms     Hz  delay gain up    down   phase crossing    delay\n"
+        "                    ms  factor  factor     deg    rad/s  left ms"
+    )
+    return "\n".join([title, *(row(settings) for settings in grid)])
+
+
+def parsed(pairs: Iterable[str]) -> tuple[thesis.ThesisGains, dict[str, float]]:
+    """Gains and filter arguments from NAME=VALUE: fields of ThesisGains, arguments of thesis_filters."""
+    gains: dict[str, Any] = {}
+    filters: dict[str, float] = {}
+    for pair in pairs:
+        name, _, text = pair.partition("=")
+        value = float(text)
+        if name in thesis.ThesisGains._fields:
+            is_vector = isinstance(getattr(thesis.THESIS_GAINS, name), tuple)
+            gains[name] = (value,) * 3 if is_vector else value
+        elif name in ("omega_attitude", "omega_direction", "omega_reference", "zeta"):
+            filters[name] = value
+        else:
+            raise SystemExit(
+                f"--set {pair}: unknown name; allowed: {', '.join(thesis.ThesisGains._fields)},"
+                " omega_attitude, omega_direction, omega_reference, zeta"
+            )
+    return thesis.THESIS_GAINS._replace(**gains), filters
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--loop", choices=("attitude", "position", "both"), default="both")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="gain or filter")
+    arguments = parser.parse_args()
+    gains, filters = parsed(arguments.set)
+    loops = ("attitude", "position") if arguments.loop == "both" else (arguments.loop,)
+    for loop in loops:
+        print(f"\n{loop} loop, {' '.join(arguments.set) or 'gains of Table 4-3, filters of 4-3'}")
+        grid = [
+            Settings(tau * 1e-3, 1.0 / hz, delay * 1e-3, loop, gains, filters)
+            for tau, hz, delay in (
+                *((tau, 250, 0) for tau in (0, 5, 10, 15, 20, 30, 40)),
+                *((tau, 1000, 0) for tau in (0, 10, 20, 30)),
+                *((tau, 100, 0) for tau in (0, 10, 20)),
+                *((tau, 250, delay) for tau in (0, 10, 20) for delay in (4, 8, 12)),
+            )
+        ]
+        print(table(grid))
+    print("\nrotor command, standard deviation, for noise white from tick to tick; 250 Hz, rotor lag 20 ms")
+    settings = Settings(0.02, 0.004, 0.0, "position", gains, filters)
+    if not margin(settings).stable:
+        print("  none: the loop is lost")
+        return
+    noises = rotor_noise(settings)
+    for name, deviation, newtons in noises:
+        print(f"  {name:22s} {deviation:8.4f} {newtons:8.4f} N")
+    total = math.sqrt(sum(newtons**2 for _, _, newtons in noises))
+    room = min(BEBOP.rotor_max - HOVER, HOVER - BEBOP.rotor_min)
+    print(f"  {'all together':31s} {total:8.4f} N; three of them should fit into {room:.2f} N")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,196 @@
+"""Numbers of a flight. Each function gives some keys of the record; None stands for what cannot be known.
+
+The mission window (`gcs.analysis.samples.in_window`) is taken at the time stamps of the true load state, or
+of the quantity itself for what the autopilot sends. `gcs.analysis.record` says what every key means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.axes import Floats, swing, tilt
+from gcs.analysis.samples import AIRBORNE, CARRIED, HOLD, MISSION, UNKNOWN, Samples, in_window
+from gcs.analysis.step import find_step, step_response
+from gcs.analysis.tracks import Telemetry
+
+Numbers = dict[str, float | int | None]
+
+_LEAD_S = 0.5  # of hold before a step: shows that it begins at rest
+_WRAP = 65536  # slack_events is a uint16
+_AXES = "xyz"
+
+
+def _over(values: Floats, measure: Callable[[Floats], float]) -> float | None:
+    """`measure` of the finite values, None if there are none."""
+    finite = values[np.isfinite(values)]
+    return float(measure(finite)) if finite.size else None
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values * values)))
+
+
+def time_numbers(telemetry: Telemetry, wall_s: float | None) -> Numbers:
+    """Durations on the vehicle's clock, and how they compare with the wall's."""
+    setpoint = telemetry.setpoint
+    airborne = np.flatnonzero(np.isin(setpoint.phase, AIRBORNE))
+    in_mission = setpoint.phase[:-1] == MISSION
+    span = telemetry.span_s
+    recorded = None if span is None else span[1] - span[0]
+    return {
+        "recorded_s": recorded,
+        "flight_s": float(setpoint.time_s[airborne[-1]] - setpoint.time_s[airborne[0]])
+        if len(airborne)
+        else None,
+        "mission_s": float(np.diff(setpoint.time_s)[in_mission].sum()) if in_mission.any() else None,
+        "wall_s": wall_s,
+        "real_time_factor": recorded / wall_s if recorded is not None and wall_s else None,
+    }
+
+
+def tracking_numbers(samples: Samples) -> Numbers:
+    """Load position error over the mission window, norm and axes; (3-40)."""
+    error = samples.error_m[samples.position_tracked]
+    norm = np.linalg.norm(error, axis=1)
+    known = norm[np.isfinite(norm)]
+    numbers: Numbers = {
+        "load_error_max_m": _over(norm, np.max),
+        "load_error_rms_m": _over(norm, _rms),
+        "load_error_final_m": float(known[-1]) if len(known) else None,
+    }
+    for i, axis in enumerate(_AXES):
+        numbers[f"load_error_max_{axis}_m"] = _over(np.abs(error[:, i]), np.max)
+    for i, axis in enumerate(_AXES):
+        numbers[f"load_error_rms_{axis}_m"] = _over(error[:, i], _rms)
+    speed = np.linalg.norm(samples.actual_m_s[samples.in_mission], axis=1)
+    numbers["load_speed_max_m_s"] = _over(speed, np.max)
+    return numbers
+
+
+def step_window(samples: Samples) -> NDArray[np.bool_]:
+    """(n,) from half a second before the mission to the end of the hold after it, with a desired path."""
+    window = np.zeros(len(samples.time_s), dtype=np.bool_)
+    first = np.flatnonzero(samples.in_mission)
+    if len(first) == 0:
+        return window
+    begin = int(first[0])
+    held = np.isin(samples.phase, (MISSION, HOLD))
+    end = begin + int(np.argmin(np.append(held[begin:], False)))
+    earliest = samples.time_s[begin] - _LEAD_S
+    while begin > 0 and held[begin - 1] and samples.time_s[begin - 1] >= earliest:
+        begin -= 1
+    window[begin:end] = True
+    return window & np.isfinite(samples.desired_m).all(axis=1) & np.isfinite(samples.desired_m_s).all(axis=1)
+
+
+def step_numbers(samples: Samples) -> Numbers:
+    """Step response, all None unless the mission is one step."""
+    numbers: Numbers = dict.fromkeys(
+        ("step_height_m", "rise_time_90_s", "overshoot_pct", "settling_time_5pct_s")
+    )
+    window = step_window(samples)
+    if not samples.position_tracked[window].any():
+        return numbers
+    time_s = samples.time_s[window]
+    step = find_step(time_s, samples.desired_m[window], samples.desired_m_s[window])
+    if step is None:
+        return numbers
+    response = step_response(step, time_s, samples.actual_m[window])
+    return dict(zip(numbers, response, strict=True))
+
+
+def cascade_numbers(telemetry: Telemetry) -> Numbers:
+    """Error functions of the cascade over the mission window; (3-1), (3-8)."""
+    cascade = telemetry.cascade
+    window = in_window(telemetry, cascade.time_s)
+    return {
+        "psi_R_max": _over(cascade.psi_R[window], np.max),
+        "psi_q_max": _over(cascade.psi_q[window], np.max),
+    }
+
+
+def rotor_numbers(telemetry: Telemetry) -> Numbers:
+    """Use of the rotors over the mission window: what the autopilot asked for, and the true forces."""
+    commanded, true = telemetry.rotors_commanded, telemetry.rotors_truth
+    saturated = commanded.saturated[in_window(telemetry, commanded.time_s)] != 0
+    force = true.force_n[in_window(telemetry, true.time_s)]
+    return {
+        "saturated_fraction": float(np.mean(saturated)) if len(saturated) else None,
+        "rotor_force_min_n": _over(force, np.min),
+        "rotor_force_max_n": _over(force, np.max),
+    }
+
+
+def cable_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
+    """True attitude, swing and tension over the mission window; slack while the load is carried."""
+    truth = telemetry.load_truth
+    window = samples.in_mission
+    tilt_max = _over(tilt(samples.quat_wxyz[window]), np.max)
+    swing_max = _over(swing(truth.q_cable[window]), np.max)
+    went_slack = np.diff(truth.slack_events, prepend=truth.slack_events[:1]) % _WRAP
+    carried = np.isin(samples.phase, CARRIED)
+    return {
+        "tilt_max_deg": None if tilt_max is None else float(np.degrees(tilt_max)),
+        "swing_max_deg": None if swing_max is None else float(np.degrees(swing_max)),
+        "tension_min_n": _over(truth.tension_n[window], np.min),
+        "tension_max_n": _over(truth.tension_n[window], np.max),
+        "slack_events": int(went_slack[carried].sum()) if carried.any() else None,
+    }
+
+
+def estimator_numbers(samples: Samples) -> Numbers:
+    """Estimated minus true load position over the mission window."""
+    norm = np.linalg.norm((samples.estimated_m - samples.actual_m)[samples.in_mission], axis=1)
+    return {"estimator_error_max_m": _over(norm, np.max), "estimator_error_rms_m": _over(norm, _rms)}
+
+
+def clock_numbers(telemetry: Telemetry) -> Numbers:
+    """How well the simulator kept its rate; None in lockstep, where there is no wall clock to be late for."""
+    status = telemetry.simulation
+    timed = status.rate_hz > 0.0
+
+    def worst(late_us: NDArray[np.int64]) -> int | None:
+        return int(late_us[timed].max()) if timed.any() else None
+
+    return {
+        "rate_hz": _over(status.rate_hz[timed], lambda v: float(np.median(v))),
+        "late_p50_us": worst(status.late_p50_us),
+        "late_p99_us": worst(status.late_p99_us),
+        "late_max_us": worst(status.late_max_us),
+        "missed_ticks": int(status.missed.max()) if len(status.missed) else None,
+    }
+
+
+def coverage_numbers(samples: Samples) -> Numbers:
+    """How complete the capture is: the numbers above are only as good."""
+    window = samples.in_mission
+    stamps = samples.time_s[window]
+    error = samples.error_m[samples.position_tracked]
+    return {
+        "samples": int(window.sum()),
+        "gap_max_s": float(np.diff(stamps).max()) if len(stamps) > 1 else None,
+        "matched_fraction": float(np.isfinite(error).all(axis=1).mean()) if len(error) else None,
+    }
+
+
+DIVERGED_M = 2.0  # two cable lengths of the nominal vehicle and more: nothing is being tracked any longer
+
+
+def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
+    """What became of the flight as far as telemetry tells, for logs without a word of who flew it."""
+    phase = telemetry.setpoint.phase
+    if len(phase) == 0 and len(samples.time_s) == 0:
+        return "no telemetry"
+    error = np.linalg.norm(samples.error_m[samples.position_tracked], axis=1)
+    if not np.isfinite(samples.actual_m).all() or bool((error > DIVERGED_M).any()):
+        return "diverged"
+    known = phase[phase != UNKNOWN]
+    if (known == mavlink.PLUMBLINE_PHASE_FAILSAFE).any():
+        return "failsafe"
+    if (known == MISSION).any() and known[-1] == mavlink.PLUMBLINE_PHASE_DISARMED:
+        return "completed"
+    return "incomplete"

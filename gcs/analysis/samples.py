@@ -1,0 +1,110 @@
+"""The flight on one time base: every quantity that a report compares, at the stamps of the true load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.align import as_of, hermite, linear
+from gcs.analysis.axes import Floats
+from gcs.analysis.tracks import Ints, Telemetry
+
+UNKNOWN = -1
+
+HOLD = mavlink.PLUMBLINE_PHASE_HOLD
+MISSION = mavlink.PLUMBLINE_PHASE_MISSION
+# the load hangs on the cable and nobody lifts or lowers it
+CARRIED = (HOLD, MISSION, mavlink.PLUMBLINE_PHASE_RETURN)
+AIRBORNE = (
+    mavlink.PLUMBLINE_PHASE_TAUTEN,
+    mavlink.PLUMBLINE_PHASE_LIFT,
+    *CARRIED,
+    mavlink.PLUMBLINE_PHASE_LOWER,
+    mavlink.PLUMBLINE_PHASE_SET_DOWN,
+    mavlink.PLUMBLINE_PHASE_FAILSAFE,
+)
+_ATTITUDE_MODES = (
+    mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE,
+    mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE,
+)
+PHASE_NAMES = {
+    value: entry.name.removeprefix("PLUMBLINE_PHASE_").lower()
+    for value, entry in mavlink.enums["PLUMBLINE_PHASE"].items()
+    if not entry.name.endswith("ENUM_END")
+}
+
+
+@dataclass(frozen=True)
+class Samples:
+    """n samples at the stamps of the true load; ENU, SI; NaN (or UNKNOWN) where nothing was received."""
+
+    time_s: Floats  # (n,)
+    phase: Ints  # (n,)
+    item: Ints  # (n,)
+    control_mode: Ints  # (n,)
+    in_mission: NDArray[np.bool_]  # (n,) the mission window, see `in_window`
+    actual_m: Floats  # (n, 3) true load position
+    actual_m_s: Floats  # (n, 3) true load velocity
+    desired_m: Floats  # (n, 3)
+    desired_m_s: Floats  # (n, 3)
+    estimated_m: Floats  # (n, 3) load position as the autopilot believes it
+    vehicle_m: Floats  # (n, 3) true vehicle position: load - distance * q_cable
+    quat_wxyz: Floats  # (n, 4) true attitude, FLU -> ENU
+
+    @property
+    def error_m(self) -> Floats:
+        """(n, 3) true minus desired load position, e_x of (3-40)."""
+        return self.actual_m - self.desired_m
+
+    @property
+    def error_m_s(self) -> Floats:
+        """(n, 3) true minus desired load velocity."""
+        return self.actual_m_s - self.desired_m_s
+
+    @property
+    def position_tracked(self) -> NDArray[np.bool_]:
+        """(n,) in the mission window, and the cascade tracks a position rather than an attitude."""
+        return self.in_mission & ~np.isin(self.control_mode, _ATTITUDE_MODES)
+
+
+def phase_at(telemetry: Telemetry, at_s: Floats) -> Ints:
+    """(n,) the phase of the setpoint in force at each time, UNKNOWN where none is."""
+    return _whole_as_of(telemetry, telemetry.setpoint.phase, at_s)
+
+
+def in_window(telemetry: Telemetry, at_s: Floats) -> NDArray[np.bool_]:
+    """(n,) the mission window: the setpoint in force says phase MISSION.
+
+    Of a flight without that phase (a load that was only lifted and held) phase HOLD is the window.
+    """
+    flown = bool((telemetry.setpoint.phase == MISSION).any())
+    return np.asarray(phase_at(telemetry, at_s) == (MISSION if flown else HOLD))
+
+
+def _whole_as_of(telemetry: Telemetry, values: Ints, at_s: Floats) -> Ints:
+    found = as_of(telemetry.setpoint.time_s, values.astype(np.float64), at_s)
+    return np.where(np.isnan(found), UNKNOWN, found).astype(np.int64)
+
+
+def samples_of(telemetry: Telemetry) -> Samples:
+    """Setpoint and estimate are sent on the ticks of the truth: then nothing is interpolated."""
+    truth, setpoint, estimate = telemetry.load_truth, telemetry.setpoint, telemetry.load_estimated
+    time_s = truth.time_s
+    # the derivative of the desired velocity is sent too, so that it is a cubic between stamps as well
+    return Samples(
+        time_s=time_s,
+        phase=phase_at(telemetry, time_s),
+        item=_whole_as_of(telemetry, setpoint.item, time_s),
+        control_mode=_whole_as_of(telemetry, setpoint.control_mode, time_s),
+        in_mission=in_window(telemetry, time_s),
+        actual_m=truth.position_m,
+        actual_m_s=truth.velocity_m_s,
+        desired_m=hermite(setpoint.time_s, setpoint.position_m, setpoint.velocity_m_s, time_s),
+        desired_m_s=hermite(setpoint.time_s, setpoint.velocity_m_s, setpoint.acceleration_m_s2, time_s),
+        estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),
+        vehicle_m=truth.position_m - truth.distance_m[:, None] * truth.q_cable,
+        quat_wxyz=linear(telemetry.attitude_truth.time_s, telemetry.attitude_truth.quat_wxyz, time_s),
+    )

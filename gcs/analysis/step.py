@@ -1,0 +1,103 @@
+"""Step response of the load along the line of a step-like path: rise, overshoot, settling."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gcs.analysis.axes import Floats
+
+MIN_HEIGHT_M = 0.01  # below a centimetre the noise of a tracker is a tenth of the step
+_OFF_LINE = 1e-3  # of the height: a path that bends more is no step
+_BACK = 1e-4  # of the height: single-precision wire values of a monotone path go back by less
+_BEGUN = 1e-4  # of the height: the desired path has left its start
+_ARRIVED = 1.0 - 1e-4  # of the height
+_PAUSE = 0.01  # of the peak speed: a path that slows down further in between is two moves
+_MIDDLE = (0.02, 0.98)  # of the height: where pauses are looked for
+_REST = 0.01  # of the peak speed: at rest
+_HELD_S = 0.5  # a shorter hold says nothing about settling
+
+
+class Step(NamedTuple):
+    """A step-like desired path: where along which line, and when."""
+
+    start_s: float
+    height_m: float
+    origin_m: Floats  # (3,)
+    direction: Floats  # (3,) unit vector
+
+
+class StepResponse(NamedTuple):
+    """Times count from the start of the step; None where the load never got there."""
+
+    height_m: float
+    rise_90_s: float | None  # first time at 90 % of the height
+    overshoot_pct: float  # greatest excess over the height, % of it
+    settling_5_s: float | None  # last time more than 5 % of the height away from the end
+
+
+def find_step(time_s: Floats, desired_m: Floats, desired_m_s: Floats) -> Step | None:
+    """The step of a desired path (n,), (n, 3), (n, 3), or None.
+
+    A step begins at rest, moves once along one straight line, never back, and holds at least half a second
+    at its end. It starts at the last rest; between samples from position and speed, as for a path that
+    leaves rest with constant acceleration (which is how a half-sine step leaves it).
+    """
+    if len(time_s) < 3 or not (np.isfinite(desired_m).all() and np.isfinite(desired_m_s).all()):
+        return None
+    line = desired_m[-1] - desired_m[0]
+    height = float(np.linalg.norm(line))
+    if height < MIN_HEIGHT_M:
+        return None
+    direction = line / height
+    offset = desired_m - desired_m[0]
+    along = offset @ direction
+    speed = desired_m_s @ direction
+    peak = float(speed.max())
+    middle = (along > _MIDDLE[0] * height) & (along < _MIDDLE[1] * height)
+    moved = (along > _BEGUN * height) | (speed > _REST * peak)
+    begun = int(np.argmax(moved))
+    arrived = int(np.argmax(along >= _ARRIVED * height))
+    if (
+        np.linalg.norm(offset - along[:, None] * direction, axis=1).max() > _OFF_LINE * height
+        or np.diff(along).min() < -_BACK * height
+        or along.max() > (1.0 + _BACK) * height
+        or abs(speed[0]) > _REST * peak
+        or abs(speed[-1]) > _REST * peak
+        or bool((speed[middle] < _PAUSE * peak).any())
+        or begun == 0
+        or time_s[-1] - time_s[arrived] < _HELD_S
+    ):
+        return None
+    start = time_s[begun]
+    if speed[begun] > 0.0:
+        start = max(time_s[begun - 1], start - 2.0 * along[begun] / speed[begun])
+    return Step(float(start), height, desired_m[0], direction)
+
+
+def step_response(step: Step, time_s: Floats, actual_m: Floats) -> StepResponse:
+    """What the load (n,), (n, 3) made of the step, crossings interpolated between the samples."""
+    known = (time_s >= step.start_s) & np.isfinite(actual_m).all(axis=1)
+    t = time_s[known] - step.start_s
+    along = (actual_m[known] - step.origin_m) @ step.direction / step.height_m
+    if len(t) == 0:
+        return StepResponse(step.height_m, None, 0.0, None)
+    away = np.abs(along - 1.0)
+    outside = np.flatnonzero(away > 0.05)
+    settling: float | None = None
+    if len(outside) == 0:
+        settling = 0.0
+    elif outside[-1] + 1 < len(t):
+        settling = _crossing(t, away, int(outside[-1]), 0.05)
+    reached = np.flatnonzero(along >= 0.9)
+    rise: float | None = None
+    if len(reached):
+        rise = _crossing(t, along, int(reached[0]) - 1, 0.9) if reached[0] else 0.0
+    return StepResponse(step.height_m, rise, max(0.0, float(along.max()) - 1.0) * 100.0, settling)
+
+
+def _crossing(t: Floats, values: Floats, before: int, level: float) -> float:
+    """The time between `before` and the next sample at which the straight line between them is at `level`."""
+    fraction = (level - values[before]) / (values[before + 1] - values[before])
+    return float(t[before] + fraction * (t[before + 1] - t[before]))

@@ -1,0 +1,287 @@
+"""Tracks from what was received: messages in, columns out (`gcs.analysis.tracks`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.wire.codec import Received
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
+from gcs.analysis.tracks import (
+    AttitudeTrack,
+    CascadeTrack,
+    HeartbeatTrack,
+    Ints,
+    ItemTrack,
+    LoadTrack,
+    RotorTrack,
+    SetpointTrack,
+    SimulationTrack,
+    StatusText,
+    Telemetry,
+)
+
+Record = tuple[int, Received]  # microseconds since 1970 and the message, as in a .tlog
+
+VEHICLE_SYSTEM = 1
+AUTOPILOT_COMPONENT = 1
+_MICRO = 1e-6
+
+
+def load_telemetry(tlog: Path) -> Telemetry:
+    """The flight in a .tlog file; a torn tail is left out."""
+    from autopilot.wire.tlog import read_tlog
+
+    return telemetry_of(read_tlog(tlog))
+
+
+def telemetry_of(records: Iterable[Record], system: int = VEHICLE_SYSTEM) -> Telemetry:
+    """The flight of one vehicle; what other systems sent (ground stations, the load) is left out."""
+    rows: dict[int, list[Any]] = {message_id: [] for message_id in _READ}
+    heard: dict[int, list[int]] = {message_id: [] for message_id in _HEARD}
+    texts: list[tuple[int, Any]] = []
+    boot_us: int | None = None
+    for unix_us, received in records:
+        if received.system != system:
+            continue
+        message = received.message
+        message_id = type(message).id  # STATUSTEXT has a field of that name
+        read = _READ.get(message_id)
+        if read is None:
+            if message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+                texts.append((unix_us, message))
+            continue
+        if message_id in _HEARD:
+            if received.component != AUTOPILOT_COMPONENT:
+                continue
+            heard[message_id].append(unix_us)
+        elif message_id == mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
+            # the record that waited least tells best when the vehicle's clock was zero
+            waited = unix_us - message.time_usec
+            boot_us = waited if boot_us is None else min(boot_us, waited)
+        rows[message_id].append(read(message))
+    if boot_us is None:
+        boot_us = min((stamps[0] for stamps in heard.values() if stamps), default=0)
+    return _assemble(rows, heard, texts, boot_us)
+
+
+_FIELDS: dict[int, str] = {
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE: "time_usec x y z vx vy vz qx qy qz qx_dot qy_dot qz_dot distance"
+    " tension slack_events taut source",
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: "time_usec x y z vx vy vz ax ay az qx qy qz elapsed duration"
+    " seq phase control_mode",
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: "time_usec e_x e_v e_q e_q_dot e_r e_omega moment"
+    " psi_r psi_q thrust control_mode",
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: "time_usec force force_min force_max saturated source",
+    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: "time_usec attitude_quaternion rollspeed pitchspeed"
+    " yawspeed",
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed",
+    mavlink.MAVLINK_MSG_ID_SIM_STATUS: "time_usec speed_factor rate_hz late_p50_us late_p99_us late_max_us"
+    " missed vehicle_on_ground load_on_ground",
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: "base_mode custom_mode system_status",
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: "seq",
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: "seq",
+}
+_READ = {message_id: attrgetter(*names.split()) for message_id, names in _FIELDS.items()}
+# without a time stamp of their own, and sent by more components than the autopilot
+_HEARD = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+        mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    )
+)
+_ARRAYS = {
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: dict.fromkeys(
+        ("e_x", "e_v", "e_q", "e_q_dot", "e_r", "e_omega", "moment"), 3
+    ),
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: {"force": 4},
+    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: {"attitude_quaternion": 4},
+}
+
+
+class _Columns:
+    """The rows of one message type as float columns by field name; (n,) or (n, k)."""
+
+    def __init__(self, message_id: int, rows: list[Any]) -> None:
+        names = _FIELDS[message_id].split()
+        widths = _ARRAYS.get(message_id, {})
+        if len(names) == 1:
+            values: list[Any] = [rows]  # attrgetter of one name gives the value bare
+        else:
+            values = list(zip(*rows, strict=True)) if rows else [() for _ in names]
+        self._by_name = {
+            name: np.array(column, dtype=np.float64).reshape((-1, widths[name]) if name in widths else (-1,))
+            for name, column in zip(names, values, strict=True)
+        }
+
+    def __getitem__(self, names: str) -> Floats:
+        """A column, or several of them side by side."""
+        columns = [self._by_name[name] for name in names.split()]
+        return columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
+
+    def whole(self, name: str) -> Ints:
+        return self._by_name[name].astype(np.int64)
+
+
+TrackT = TypeVar("TrackT")
+
+
+def _in_order(track: TrackT, keep: NDArray[np.bool_] | None = None) -> TrackT:
+    """The samples to keep, sorted by time, the last received of those with one time stamp."""
+    columns = {field.name: getattr(track, field.name) for field in fields(track)}  # type: ignore[arg-type]
+    time_s = columns["time_s"]
+    index = np.arange(len(time_s)) if keep is None else np.flatnonzero(keep)
+    index = index[np.argsort(time_s[index], kind="stable")]
+    stamps = time_s[index]
+    index = index[np.append(stamps[1:] != stamps[:-1], True)] if len(stamps) else index
+    return type(track)(**{name: column[index] for name, column in columns.items()})
+
+
+def _load(c: _Columns, source: int) -> LoadTrack:
+    track = LoadTrack(
+        time_s=c["time_usec"] * _MICRO,
+        position_m=enu_from_ned(c["x y z"]),
+        velocity_m_s=enu_from_ned(c["vx vy vz"]),
+        q_cable=enu_from_ned(c["qx qy qz"]),
+        q_cable_dot=enu_from_ned(c["qx_dot qy_dot qz_dot"]),
+        distance_m=c["distance"],
+        tension_n=c["tension"],
+        slack_events=c.whole("slack_events"),
+        taut=c.whole("taut"),
+    )
+    return _in_order(track, c["source"] == source)
+
+
+def _setpoint(c: _Columns) -> SetpointTrack:
+    return _in_order(
+        SetpointTrack(
+            time_s=c["time_usec"] * _MICRO,
+            position_m=enu_from_ned(c["x y z"]),
+            velocity_m_s=enu_from_ned(c["vx vy vz"]),
+            acceleration_m_s2=enu_from_ned(c["ax ay az"]),
+            q_cable_c=enu_from_ned(c["qx qy qz"]),
+            elapsed_s=c["elapsed"],
+            duration_s=c["duration"],
+            item=c.whole("seq"),
+            phase=c.whole("phase"),
+            control_mode=c.whole("control_mode"),
+        )
+    )
+
+
+def _cascade(c: _Columns) -> CascadeTrack:
+    return _in_order(
+        CascadeTrack(
+            time_s=c["time_usec"] * _MICRO,
+            e_x=enu_from_ned(c["e_x"]),
+            e_v=enu_from_ned(c["e_v"]),
+            e_q=enu_from_ned(c["e_q"]),
+            e_q_dot=enu_from_ned(c["e_q_dot"]),
+            e_R=flu_from_frd(c["e_r"]),
+            e_Omega=flu_from_frd(c["e_omega"]),
+            psi_R=c["psi_r"],
+            psi_q=c["psi_q"],
+            thrust_n=c["thrust"],
+            moment_n_m=flu_from_frd(c["moment"]),
+            control_mode=c.whole("control_mode"),
+        )
+    )
+
+
+def _rotors(c: _Columns, source: int) -> RotorTrack:
+    track = RotorTrack(
+        time_s=c["time_usec"] * _MICRO,
+        force_n=c["force"],
+        force_min_n=c["force_min"],
+        force_max_n=c["force_max"],
+        saturated=c.whole("saturated"),
+    )
+    return _in_order(track, c["source"] == source)
+
+
+def _attitude(time_s: Floats, quat_ned_frd: Floats, rates_frd: Floats) -> AttitudeTrack:
+    return _in_order(AttitudeTrack(time_s, quat_enu_flu_from_ned_frd(quat_ned_frd), flu_from_frd(rates_frd)))
+
+
+def _simulation(c: _Columns) -> SimulationTrack:
+    return _in_order(
+        SimulationTrack(
+            time_s=c["time_usec"] * _MICRO,
+            speed_factor=c["speed_factor"],
+            rate_hz=c["rate_hz"],
+            late_p50_us=c.whole("late_p50_us"),
+            late_p99_us=c.whole("late_p99_us"),
+            late_max_us=c.whole("late_max_us"),
+            missed=c.whole("missed"),
+            vehicle_on_ground=c.whole("vehicle_on_ground"),
+            load_on_ground=c.whole("load_on_ground"),
+        )
+    )
+
+
+def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]:
+    """Chunks of one id joined in the order in which they came; id 0 stands alone."""
+    whole: list[StatusText] = []
+    open_id = 0
+    for unix_us, message in texts:
+        text = message.text
+        text = text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text)
+        text = text.rstrip("\0")
+        if message.id and message.id == open_id and message.chunk_seq:
+            whole[-1] = whole[-1]._replace(text=whole[-1].text + text)
+        else:
+            whole.append(StatusText((unix_us - boot_us) * _MICRO, message.severity, text))
+        open_id = message.id
+    return tuple(whole)
+
+
+def _assemble(
+    rows: dict[int, list[Any]], heard: dict[int, list[int]], texts: list[tuple[int, Any]], boot_us: int
+) -> Telemetry:
+    columns = {message_id: _Columns(message_id, found) for message_id, found in rows.items()}
+    load = columns[mavlink.MAVLINK_MSG_ID_LOAD_STATE]
+    rotors = columns[mavlink.MAVLINK_MSG_ID_ROTOR_STATE]
+    hil = columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION]
+    attitude = columns[mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION]
+    beat = columns[mavlink.MAVLINK_MSG_ID_HEARTBEAT]
+    times = {
+        message_id: (np.array(stamps, dtype=np.float64) - boot_us) * _MICRO
+        for message_id, stamps in heard.items()
+    }
+    current = mavlink.MAVLINK_MSG_ID_MISSION_CURRENT
+    reached = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED
+    return Telemetry(
+        load_truth=_load(load, mavlink.PLUMBLINE_SOURCE_TRUTH),
+        load_estimated=_load(load, mavlink.PLUMBLINE_SOURCE_ESTIMATED),
+        setpoint=_setpoint(columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]),
+        cascade=_cascade(columns[mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS]),
+        rotors_truth=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_TRUTH),
+        rotors_commanded=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_ESTIMATED),
+        attitude_truth=_attitude(
+            hil["time_usec"] * _MICRO, hil["attitude_quaternion"], hil["rollspeed pitchspeed yawspeed"]
+        ),
+        attitude_estimated=_attitude(
+            attitude["time_boot_ms"] * 1e-3,
+            attitude["q1 q2 q3 q4"],
+            attitude["rollspeed pitchspeed yawspeed"],
+        ),
+        heartbeat=HeartbeatTrack(
+            times[mavlink.MAVLINK_MSG_ID_HEARTBEAT],
+            beat.whole("base_mode"),
+            beat.whole("custom_mode"),
+            beat.whole("system_status"),
+        ),
+        mission_current=ItemTrack(times[current], columns[current].whole("seq")),
+        mission_reached=ItemTrack(times[reached], columns[reached].whole("seq")),
+        simulation=_simulation(columns[mavlink.MAVLINK_MSG_ID_SIM_STATUS]),
+        texts=_texts(texts, boot_us),
+    )

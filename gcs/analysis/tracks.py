@@ -1,0 +1,165 @@
+"""A flight as named columns: what was received, per message type and source, on one clock, in one set of axes.
+
+Times are seconds of the vehicle's clock since boot (`time_usec` / 1e6). Worlds are ENU relative to home,
+bodies FLU, units SI. Each track is sorted by time, one sample per time stamp. A track that was never
+received has length zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcs.analysis.axes import Floats
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class LoadTrack:
+    """LOAD_STATE of one source; n samples."""
+
+    time_s: Floats  # (n,)
+    position_m: Floats  # (n, 3) ENU
+    velocity_m_s: Floats  # (n, 3) ENU
+    q_cable: Floats  # (n, 3) unit vector from vehicle to load, ENU
+    q_cable_dot: Floats  # (n, 3) 1/s, ENU
+    distance_m: Floats  # (n,) from vehicle to load
+    tension_n: Floats  # (n,)
+    slack_events: Ints  # (n,) since start, wraps at 65536
+    taut: Ints  # (n,) 1 while taut
+
+
+@dataclass(frozen=True)
+class SetpointTrack:
+    """LOAD_SETPOINT."""
+
+    time_s: Floats  # (n,)
+    position_m: Floats  # (n, 3) ENU, desired
+    velocity_m_s: Floats  # (n, 3) ENU, desired
+    acceleration_m_s2: Floats  # (n, 3) ENU, desired
+    q_cable_c: Floats  # (n, 3) commanded cable direction, ENU
+    elapsed_s: Floats  # (n,) since the item or phase began
+    duration_s: Floats  # (n,) of the item or phase, NaN if open
+    item: Ints  # (n,) mission item
+    phase: Ints  # (n,) PLUMBLINE_PHASE
+    control_mode: Ints  # (n,) PLUMBLINE_CONTROL_MODE
+
+
+@dataclass(frozen=True)
+class CascadeTrack:
+    """CASCADE_ERRORS."""
+
+    time_s: Floats  # (n,)
+    e_x: Floats  # (n, 3) m, ENU
+    e_v: Floats  # (n, 3) m/s, ENU
+    e_q: Floats  # (n, 3) ENU
+    e_q_dot: Floats  # (n, 3) 1/s, ENU
+    e_R: Floats  # (n, 3) FLU
+    e_Omega: Floats  # (n, 3) rad/s, FLU
+    psi_R: Floats  # (n,) 0 ... 2
+    psi_q: Floats  # (n,) 0 ... 2
+    thrust_n: Floats  # (n,) asked of the mixer
+    moment_n_m: Floats  # (n, 3) asked of the mixer, FLU
+    control_mode: Ints  # (n,)
+
+
+@dataclass(frozen=True)
+class RotorTrack:
+    """ROTOR_STATE of one source: commanded forces (autopilot) or true forces (simulator)."""
+
+    time_s: Floats  # (n,)
+    force_n: Floats  # (n, 4)
+    force_min_n: Floats  # (n,)
+    force_max_n: Floats  # (n,) infinite if unlimited
+    saturated: Ints  # (n,) bit i: the demand on rotor i was cut at a limit
+
+
+@dataclass(frozen=True)
+class AttitudeTrack:
+    """HIL_STATE_QUATERNION (truth) or ATTITUDE_QUATERNION (estimate)."""
+
+    time_s: Floats  # (n,)
+    quat_wxyz: Floats  # (n, 4) FLU -> ENU
+    omega_body: Floats  # (n, 3) rad/s, FLU
+
+
+@dataclass(frozen=True)
+class HeartbeatTrack:
+    """HEARTBEAT of the autopilot; stamped by the capture, not by the vehicle."""
+
+    time_s: Floats  # (n,)
+    base_mode: Ints
+    custom_mode: Ints
+    system_status: Ints
+
+
+@dataclass(frozen=True)
+class ItemTrack:
+    """MISSION_CURRENT or MISSION_ITEM_REACHED; stamped by the capture."""
+
+    time_s: Floats  # (n,)
+    item: Ints  # (n,)
+
+
+@dataclass(frozen=True)
+class SimulationTrack:
+    """SIM_STATUS."""
+
+    time_s: Floats  # (n,)
+    speed_factor: Floats  # (n,) 0 in lockstep
+    rate_hz: Floats  # (n,) 0 in lockstep
+    late_p50_us: Ints
+    late_p99_us: Ints
+    late_max_us: Ints
+    missed: Ints
+    vehicle_on_ground: Ints
+    load_on_ground: Ints
+
+
+class StatusText(NamedTuple):
+    """One whole STATUSTEXT, its chunks joined; stamped by the capture."""
+
+    time_s: float
+    severity: int  # MAV_SEVERITY, 0 emergency ... 7 debug
+    text: str
+
+
+@dataclass(frozen=True)
+class Telemetry:
+    """Everything that analysis reads of one flight."""
+
+    load_truth: LoadTrack
+    load_estimated: LoadTrack
+    setpoint: SetpointTrack
+    cascade: CascadeTrack
+    rotors_truth: RotorTrack
+    rotors_commanded: RotorTrack
+    attitude_truth: AttitudeTrack
+    attitude_estimated: AttitudeTrack
+    heartbeat: HeartbeatTrack
+    mission_current: ItemTrack
+    mission_reached: ItemTrack
+    simulation: SimulationTrack
+    texts: tuple[StatusText, ...]
+
+    @property
+    def span_s(self) -> tuple[float, float] | None:
+        """First and last time of the vehicle's clock in the log, None if nothing stamped was received."""
+        stamps = [
+            track.time_s
+            for track in (
+                self.load_truth,
+                self.load_estimated,
+                self.setpoint,
+                self.cascade,
+                self.rotors_commanded,
+            )
+            if len(track.time_s)
+        ]
+        if not stamps:
+            return None
+        return float(min(t[0] for t in stamps)), float(max(t[-1] for t in stamps))

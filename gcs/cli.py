@@ -1,0 +1,102 @@
+"""The command line: which commands there are, and how their errors end.
+
+A command's module is loaded when the command is called, so that `gcs --help` needs nothing but click.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+import click
+
+from gcs.display import say
+from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, EXIT_USAGE, GcsError
+
+# name: (module in gcs.commands, summary)
+COMMANDS = {
+    "fly": ("fly", "Fly a mission from start to report."),
+    "missions": ("missions", "List the shipped missions."),
+    "check": ("missions", "Check whether a vehicle can fly a mission."),
+    "report": ("report", "Make the report of a captured flight again."),
+    "status": ("status", "Show what the vehicle says of itself."),
+    "capture": ("capture", "Capture telemetry until Ctrl-C."),
+    "upload": ("transfer", "Put a mission on the vehicle."),
+    "download": ("transfer", "Fetch the mission from the vehicle."),
+    "clear": ("transfer", "Take the mission off the vehicle."),
+    "arm": ("control", "Start the rotors."),
+    "disarm": ("control", "Stop the rotors."),
+    "start": ("control", "Fly the mission on the vehicle from its first item."),
+    "pause": ("control", "Hold the load where it is."),
+    "resume": ("control", "Go on with a paused mission."),
+    "takeoff": ("control", "Lift the load and hold it."),
+    "land": ("control", "Set the load down, and the vehicle beside it."),
+    "mode": ("control", "Change the flight mode."),
+    "param": ("param", "Read and write parameters."),
+}
+
+
+class Gcs(click.Group):
+    """Loads commands when they are called; a known error is one line on stderr and its exit code."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"gcs.commands.{COMMANDS[cmd_name][0]}")
+        command: click.Command = getattr(module, f"{cmd_name}_command")
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+
+    def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
+        extra.pop("standalone_mode", None)
+        try:
+            code = super().main(args, standalone_mode=False, **extra)
+        except GcsError as error:
+            say(str(error))
+            code = error.exit_code
+        except click.NoSuchOption as error:
+            say(_usage(error))
+            code = EXIT_USAGE
+        except click.UsageError as error:
+            if isinstance(error, click.exceptions.NoArgsIsHelpError):
+                click.echo(error.format_message(), err=True)
+            else:
+                say(_usage(error))
+            code = EXIT_USAGE
+        except click.ClickException as error:
+            say(error.format_message())
+            code = error.exit_code
+        except (click.Abort, KeyboardInterrupt):
+            say("stopped")
+            code = EXIT_INTERRUPTED
+        except BrokenPipeError:  # `gcs ... | head`
+            sys.stderr.close()
+            code = EXIT_DONE
+        sys.exit(code if isinstance(code, int) else EXIT_DONE)
+
+
+def _usage(error: click.UsageError) -> str:
+    path = error.ctx.command_path if error.ctx else "gcs"
+    text = " ".join(error.format_message().split()).rstrip(".")
+    return f"{text}; see {path} --help"
+
+
+@click.group(cls=Gcs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="plumbline", prog_name="gcs")
+def gcs() -> None:
+    """Plumbline's ground station: fly missions in which the load on the cable is what is commanded.
+
+    gcs fly case-b flies a shipped mission with a simulator and an autopilot of its own and ends in a report.
+    The other commands speak to a vehicle that is running already (sitl and autopilot, or gcs fly --speed 1).
+
+    Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong usage,
+    3 flown, but the mission was not completed, 130 stopped by Ctrl-C.
+    """

@@ -1,0 +1,57 @@
+"""Telemetry into a .tlog, in an order that depends on nothing but what was said.
+
+Within a sync window (what lies between two `flush`es) the truth comes first, then the vehicle, then what the
+ground sent; all records of a window carry its time. So a flight captured from byte queues in one process and
+one captured over UDP in lockstep are the same file. TIMESYNC, which only one of them has, is left out.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.datagrams import messages
+
+LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: lockstep has no wall clock of its own
+
+
+class FrameLog(Protocol):
+    """What the capture writes into: autopilot.wire.tlog.TlogWriter."""
+
+    def write(self, unix_us: int, frame: bytes) -> None:
+        """Append one record."""
+
+
+class Capture:
+    """Collects datagrams and writes their frames, window by window."""
+
+    def __init__(self, log: FrameLog, boot_unix_us: int = LOCKSTEP_BOOT_UNIX_US) -> None:
+        self.records = 0
+        self._log = log
+        self._boot_unix_us = boot_unix_us
+        self._truth: list[bytes] = []
+        self._vehicle: list[bytes] = []
+        self._sent: list[bytes] = []
+
+    def on_truth(self, datagram: bytes) -> None:
+        """A datagram of the simulated world."""
+        self._truth.append(datagram)
+
+    def on_vehicle(self, datagram: bytes) -> None:
+        """A datagram of the vehicle."""
+        self._vehicle.append(datagram)
+
+    def on_sent(self, datagram: bytes) -> None:
+        """A datagram of ours."""
+        self._sent.append(datagram)
+
+    def flush(self, now_us: int) -> None:
+        """Write the window that ends at `now_us`, time since boot."""
+        unix_us = self._boot_unix_us + now_us
+        for datagrams in (self._truth, self._vehicle, self._sent):
+            for datagram in datagrams:
+                for one in messages(datagram)[0]:
+                    if one.message.get_msgId() != mavlink.MAVLINK_MSG_ID_TIMESYNC:
+                        self._log.write(unix_us, one.frame)
+                        self.records += 1
+            datagrams.clear()

@@ -1,0 +1,137 @@
+"""The command protocol: COMMAND_LONG until a COMMAND_ACK says how it ended."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
+
+RETRY_US = 500_000
+SENDS = 5
+PATIENCE_US = 5_000_000  # after IN_PROGRESS
+FORCE = 21196.0  # the number that makes arming and disarming unconditional
+UNUSED = math.nan
+
+_RESULTS = {
+    value: str(entry.name).removeprefix("MAV_RESULT_").replace("_", " ").lower()
+    for value, entry in mavlink.enums["MAV_RESULT"].items()
+}
+
+
+class CommandOperation:
+    """One command. `name` is what a person calls it; `percent` what the vehicle says of its progress."""
+
+    def __init__(
+        self, target: Target, name: str, command: int, parameters: Sequence[float] = (), sends: int = SENDS
+    ) -> None:
+        self.result: Result | None = None
+        self.name = name
+        self.percent = 0
+        self._target = target
+        self._command = command
+        self._parameters = [float(p) for p in parameters] + [0.0] * (7 - len(parameters))
+        self._retry = Retry(RETRY_US, sends)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        return (self.percent, 100) if self.percent else (0, 0)
+
+    def receive(self, message: Any, now_us: int) -> None:
+        if (
+            self.result is not None
+            or message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_ACK
+            or message.command != self._command
+            or not addressed(message, GROUND)
+            or not self._retry.sent
+        ):
+            return
+        if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
+            self.percent = min(message.progress, 100) if message.progress != 255 else 0
+            self._retry.wait(now_us, PATIENCE_US)
+            return
+        text = f"{self.name}: {_RESULTS.get(message.result, f'result {message.result}')}"
+        accepted = message.result == mavlink.MAV_RESULT_ACCEPTED
+        self.result = Result(Status.DONE if accepted else Status.REFUSED, text)
+
+    def poll(self, now_us: int) -> list[Any]:
+        if self.result is not None or not self._retry.due(now_us):
+            return []
+        if self._retry.exhausted:
+            text = f"{self.name}: no answer after {self._retry.sends} tries"
+            self.result = Result(Status.UNANSWERED, text)
+            return []
+        confirmation = self._retry.sent
+        self._retry.asked(now_us)
+        return [
+            mavlink.MAVLink_command_long_message(
+                *self._target, self._command, confirmation, *self._parameters
+            )
+        ]
+
+
+def arm(target: Target, force: bool = False) -> CommandOperation:
+    """Start the rotors."""
+    parameters = (1.0, FORCE if force else 0.0)
+    return CommandOperation(target, "arm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, parameters)
+
+
+def disarm(target: Target, force: bool = False) -> CommandOperation:
+    """Stop the rotors; in the air only by force."""
+    parameters = (0.0, FORCE if force else 0.0)
+    return CommandOperation(target, "disarm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, parameters)
+
+
+def start_mission(target: Target) -> CommandOperation:
+    """Fly the mission from its first item."""
+    return CommandOperation(target, "start", mavlink.MAV_CMD_MISSION_START)
+
+
+def pause(target: Target) -> CommandOperation:
+    """Hold the load where it is."""
+    return CommandOperation(target, "pause", mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (0.0,))
+
+
+def resume(target: Target) -> CommandOperation:
+    """Go on with a paused mission."""
+    return CommandOperation(target, "resume", mavlink.MAV_CMD_DO_PAUSE_CONTINUE, (1.0,))
+
+
+def takeoff(target: Target, altitude_amsl_m: float = UNUSED) -> CommandOperation:
+    """Lift the load; NaN leaves the height to the vehicle's parameter."""
+    parameters = (UNUSED, UNUSED, UNUSED, UNUSED, UNUSED, UNUSED, altitude_amsl_m)
+    return CommandOperation(target, "takeoff", mavlink.MAV_CMD_NAV_TAKEOFF, parameters)
+
+
+def land(target: Target) -> CommandOperation:
+    """Set the load down where it hangs, and the vehicle beside it."""
+    return CommandOperation(target, "land", mavlink.MAV_CMD_NAV_LAND, (UNUSED,) * 7)
+
+
+def set_mode(target: Target, name: str, main: int, sub: int, armed: bool) -> CommandOperation:
+    """Change the PX4 mode."""
+    base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0)
+    return CommandOperation(
+        target, f"mode {name}", mavlink.MAV_CMD_DO_SET_MODE, (float(base), float(main), float(sub))
+    )
+
+
+def message_interval(target: Target, message_id: int, interval_us: int) -> CommandOperation:
+    """Ask for a message every `interval_us` of the vehicle's time."""
+    name = mavlink.mavlink_map[message_id].msgname
+    return CommandOperation(
+        target,
+        f"interval of {name}",
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+        (float(message_id), float(interval_us)),
+    )
+
+
+def request_message(target: Target, message_id: int) -> CommandOperation:
+    """Ask for a message once."""
+    name = mavlink.mavlink_map[message_id].msgname
+    return CommandOperation(
+        target, f"request of {name}", mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id),)
+    )

@@ -1,0 +1,68 @@
+"""The ground's end of one link: our frames and heartbeat, and which vehicle is at the other end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.wire.codec import FrameWriter, Received
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.datagrams import messages
+from gcs.clients.operation import GROUND, Target
+
+HEARTBEAT_US = 1_000_000
+LINK_TIMEOUT_US = 5_000_000
+_NOT_A_VEHICLE = {mavlink.MAV_TYPE_GCS, mavlink.MAV_TYPE_ONBOARD_CONTROLLER}
+
+
+class Connection:
+    """Learns the vehicle from its first heartbeat and hears no other system from then on."""
+
+    def __init__(self, link_timeout_us: int = LINK_TIMEOUT_US) -> None:
+        self.target: Target | None = None
+        self.junk_bytes = 0
+        self._link_timeout_us = link_timeout_us
+        self._writer = FrameWriter(*GROUND)
+        self._next_heartbeat_us: int | None = None
+        self._heard_us: int | None = None
+
+    def receive(self, datagram: bytes, now_us: int) -> list[Received]:
+        """The vehicle's messages in `datagram`; whatever else it holds is dropped."""
+        received, junk = messages(datagram)
+        self.junk_bytes += junk
+        ours = []
+        for one in received:
+            if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT and _is_vehicle(one.message):
+                if self.target is None:
+                    self.target = Target(one.system, one.component)
+                if self.target == (one.system, one.component):
+                    self._heard_us = now_us
+            if self.target is not None and one.system == self.target.system:
+                ours.append(one)
+        return ours
+
+    def poll(self, now_us: int) -> list[bytes]:
+        """Our heartbeat, once a second."""
+        if self._next_heartbeat_us is not None and now_us < self._next_heartbeat_us:
+            return []
+        self._next_heartbeat_us = now_us + HEARTBEAT_US
+        heartbeat = mavlink.MAVLink_heartbeat_message(
+            type=mavlink.MAV_TYPE_GCS,
+            autopilot=mavlink.MAV_AUTOPILOT_INVALID,
+            base_mode=0,
+            custom_mode=0,
+            system_status=mavlink.MAV_STATE_ACTIVE,
+            mavlink_version=3,
+        )
+        return [self.frame(heartbeat)]
+
+    def frame(self, message: Any) -> bytes:
+        """`message` as one datagram of ours."""
+        return self._writer.frame(message)
+
+    def lost(self, now_us: int) -> bool:
+        """True when the vehicle was there and has been silent for longer than the link may be."""
+        return self._heard_us is not None and now_us - self._heard_us > self._link_timeout_us
+
+
+def _is_vehicle(heartbeat: Any) -> bool:
+    return heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID and heartbeat.type not in _NOT_A_VEHICLE

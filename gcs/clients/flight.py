@@ -1,0 +1,387 @@
+"""One whole flight as a machine: find the vehicle, upload, arm, fly, and say how it ended.
+
+    stage     what happens                               then      if the vehicle refuses
+    FIND      its heartbeat is awaited                    STREAMS   -
+    STREAMS   the fast messages of the report are asked   UPLOAD    UPLOAD
+    UPLOAD    the mission                                 READY     OVER refused
+    READY     its pre-arm health bit is awaited           ARM       -
+    ARM       rotors on                                   START     OVER refused
+    START     the mission is started                      FLY       DISARM
+    FLY       until landed and disarmed, or lost          OVER      -
+    DISARM    rotors off again                            OVER      OVER
+
+Time limits run on the vehicle's clock once it flies, so that they hold at any speed of simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Literal
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
+from gcs.clients import command
+from gcs.clients.connection import LINK_TIMEOUT_US, Connection
+from gcs.clients.datagrams import messages
+from gcs.clients.missions import MissionUpload
+from gcs.clients.operation import Operation, Status
+from gcs.clients.vehicle_view import VehicleView
+
+REPORT_INTERVAL_US = 8_000
+REPORT_MESSAGES = (
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+)
+FIND_LIMIT_US = 30_000_000
+READY_LIMIT_US = 60_000_000
+AFTERMATH_US = 2_000_000  # captured after the autopilot has given up, for the pictures
+TIME_FACTOR = 1.5  # a flight may take this many times what was expected,
+TIME_MARGIN_S = 60.0  # and this much more
+
+Source = Literal["vehicle", "truth"]
+OutcomeName = Literal["completed", "diverged", "refused", "timeout", "lost", "interrupted"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the flight ended, and why if not well."""
+
+    name: OutcomeName
+    reason: str = ""
+
+
+class Stage(Enum):
+    FIND = "looking for the vehicle"
+    STREAMS = "asking for telemetry"
+    UPLOAD = "uploading the mission"
+    READY = "waiting for the vehicle to be ready"
+    ARM = "arming"
+    START = "starting the mission"
+    FLY = "flying"
+    DISARM = "disarming"
+    OVER = "over"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where the flight is. `phase` is the stage until the vehicle flies, then the phase it reports."""
+
+    stage: Stage
+    phase: str
+    item: int  # mission item being flown
+    items: int
+    fraction: float  # of the whole, 0 ... 1
+    load_error_m: float | None
+    rotor_use: float | None  # 1.0: a rotor at its limit
+    sim_time_s: float  # the vehicle's clock
+    text: str  # what the vehicle said last
+
+
+@dataclass(frozen=True)
+class _Row:
+    after: Stage
+    refused: Stage = Stage.OVER
+    operations: Callable[[FlightClient], Sequence[Operation]] | None = None
+    done: Callable[[FlightClient], bool] | None = None  # awaited when the operations have ended
+    barred: Callable[[FlightClient], str] | None = None  # why the flight cannot go on from here, or empty
+    limit_us: int | None = None
+    late: Callable[[FlightClient], Outcome] | None = None
+
+
+class FlightClient:
+    """Flies `items`, which begin with a take-off and end with a landing.
+
+    `expected_s` is how long the flight should take and `limit_s` how long it may, by the vehicle's clock;
+    `link_timeout_us` is how long the vehicle may be silent by ours.
+    """
+
+    def __init__(
+        self,
+        items: Sequence[WireItem],
+        expected_s: float,
+        limit_s: float | None = None,
+        link_timeout_us: int = LINK_TIMEOUT_US,
+    ) -> None:
+        self.outcome: Outcome | None = None
+        self.stage = Stage.FIND
+        self.view = VehicleView()
+        self.connection = Connection(link_timeout_us)
+        self.items = tuple(items)
+        self._expected_s = expected_s
+        self._limit_s = limit_s if limit_s is not None else expected_s * TIME_FACTOR + TIME_MARGIN_S
+        self._operations: list[Operation] = []
+        self._stage_began_us: int | None = None  # our clock
+        self._flight_began_us: int | None = None  # the vehicle's clock
+        self._texts_before = 0  # texts that came before this stage; while flying, before take-off
+        self._texts_armed = 0  # texts that came before arming
+        self._was_armed = False
+        self._was_airborne = False
+        self._mission_over = False
+        self._given_up_us: int | None = None  # the vehicle's clock at the failure
+        self._pending: Outcome | None = None  # the outcome, once the aftermath is captured
+
+    # ---- in and out
+
+    def receive(self, datagram: bytes, source: Source, now_us: int) -> None:
+        """Take a datagram in, of the vehicle or of the simulated world."""
+        if source == "truth":
+            for one in messages(datagram)[0]:
+                self.view.update_truth(one.message)
+            return
+        for one in self.connection.receive(datagram, now_us):
+            if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT and (
+                one.component != getattr(self.connection.target, "component", None)
+            ):
+                continue
+            self.view.update(one.message, now_us)
+            if self._operations:
+                self._operations[0].receive(one.message, now_us)
+            if self.stage is Stage.FLY and one.message.get_type() in _WATCHED:
+                self._watch()
+
+    def poll(self, now_us: int) -> list[bytes]:
+        """Let time pass; the datagrams to send now."""
+        if self.outcome is not None:
+            return []
+        datagrams = self.connection.poll(now_us)
+        if self._stage_began_us is None:
+            self._stage_began_us = now_us
+        if self.connection.lost(now_us):
+            self._end(Outcome("lost", f"the vehicle fell silent while {self.stage.value}"))
+        while self.outcome is None and self._advance(now_us):
+            pass
+        if self._operations:
+            datagrams += [self.connection.frame(message) for message in self._operations[0].poll(now_us)]
+        return datagrams
+
+    def interrupt(self, reason: str = "stopped by the user") -> None:
+        """End the flight from outside, if it is not over."""
+        if self.outcome is None:
+            self._end(self._pending or Outcome("interrupted", reason))
+
+    def lose(self, reason: str) -> None:
+        """End the flight because a process or the link is gone."""
+        if self.outcome is None:
+            self._end(self._pending or Outcome("lost", reason))
+
+    # ---- the table at work
+
+    def _advance(self, now_us: int) -> bool:
+        """Finish an operation or a stage if it is at its end; True if something changed."""
+        if self.stage is Stage.FLY:
+            return self._judge()
+        row = _TABLE[self.stage]
+        if self._operations:
+            result = self._operations[0].result
+            if result is None:
+                return False
+            if result.status is Status.REFUSED:
+                self._refused(row, result.text, now_us)
+                return True
+            if result.status is Status.UNANSWERED:
+                self._end(Outcome("lost", result.text))
+                return True
+            self._operations.pop(0)
+            return True
+        if row.done is None or row.done(self):
+            reason = row.barred(self) if row.barred else ""
+            if reason:
+                self._end(Outcome("refused", reason))
+            else:
+                self._enter(row.after, now_us)
+            return True
+        began = self._stage_began_us if self._stage_began_us is not None else now_us
+        if row.limit_us is not None and row.late is not None and now_us - began > row.limit_us:
+            self._end(row.late(self))
+            return True
+        return False
+
+    def _refused(self, row: _Row, text: str, now_us: int) -> None:
+        if row.refused is row.after:  # the flight goes on without it
+            self._operations.pop(0)
+            return
+        reasons = self.view.complaints_since(self._texts_before)
+        outcome = self._pending or Outcome("refused", "; ".join([text, *reasons]))
+        if row.refused is Stage.OVER:
+            self._end(outcome)
+        else:
+            self._pending = outcome
+            self._enter(row.refused, now_us)
+
+    def _enter(self, stage: Stage, now_us: int) -> None:
+        if stage is Stage.OVER:
+            self._end(self._pending or Outcome("completed"))
+            return
+        self.stage = stage
+        self._stage_began_us = now_us
+        self._texts_before = len(self.view.texts)
+        if stage is Stage.ARM:
+            self._texts_armed = len(self.view.texts)
+        if stage is Stage.FLY:
+            self._flight_began_us = self.view.time_us
+            self._operations = []
+            return
+        operations = _TABLE[stage].operations
+        self._operations = list(operations(self)) if operations else []
+
+    def _end(self, outcome: Outcome) -> None:
+        self.outcome = outcome
+        self.stage = Stage.OVER
+        self._operations = []
+
+    # ---- the flight itself
+
+    def _watch(self) -> None:
+        """Note what one message may have told and the next may hide."""
+        view = self.view
+        phase = view.phase
+        self._was_armed = self._was_armed or bool(view.armed)
+        if phase is not None and phase not in _GROUND_PHASES and not self._was_airborne:
+            self._was_airborne = True
+            self._texts_before = len(view.texts)
+        if view.mission_state == "complete":
+            self._mission_over = True
+        reached = view.latest.get("MISSION_ITEM_REACHED")
+        if reached is not None and self._was_airborne and reached.seq == len(self.items) - 1:
+            self._mission_over = True
+        setpoint = view.latest.get("LOAD_SETPOINT")
+        if setpoint is not None and setpoint.phase in _LANDING_PHASES:
+            self._mission_over = self._mission_over or setpoint.seq == len(self.items) - 1
+        if self._pending is None:
+            reason = self._trouble()
+            if reason:
+                self._pending = Outcome("diverged", reason)
+                self._given_up_us = view.time_us or 0
+
+    def _trouble(self) -> str:
+        """Why the autopilot has given up, empty while it has not."""
+        if self.view.phase == _FAILSAFE:
+            cries = self.view.complaints_since(self._texts_armed, mavlink.MAV_SEVERITY_CRITICAL)
+            return "; ".join(cries) or "the autopilot went into failsafe"
+        if self._was_airborne:
+            return "; ".join(self.view.complaints_since(self._texts_before, mavlink.MAV_SEVERITY_CRITICAL))
+        return ""
+
+    def _judge(self) -> bool:
+        """End the flight if it is over; True if it is."""
+        view = self.view
+        now_us = view.time_us
+        if now_us is None:
+            return False
+        if self._flight_began_us is None:
+            self._flight_began_us = now_us
+        if self._pending is not None and self._given_up_us is not None:
+            if now_us - self._given_up_us < AFTERMATH_US:
+                return False
+            self._end(self._pending)
+            return True
+        if self._was_armed and view.armed is False:
+            self._end(self._landed())
+            return True
+        if now_us - self._flight_began_us > self._limit_s * 1e6:
+            where = f"still in phase {view.phase_name or 'unknown'}, item {self._item()}"
+            self._end(Outcome("timeout", f"not landed after {self._limit_s:.0f} s of flight: {where}"))
+            return True
+        return False
+
+    def _landed(self) -> Outcome:
+        if self._mission_over:
+            return Outcome("completed")
+        if self._was_airborne:
+            where = f"item {self._item()} of {len(self.items)}"
+            return Outcome(
+                "interrupted", f"the vehicle was disarmed before the end of the mission, at {where}"
+            )
+        reasons = self.view.complaints_since(self._texts_armed)
+        return Outcome("refused", "; ".join(["the vehicle disarmed before take-off", *reasons]))
+
+    # ---- what a person sees
+
+    @property
+    def progress(self) -> Progress:
+        view = self.view
+        flying = self._flight_began_us is not None
+        time_us = view.time_us or 0
+        fraction = 0.0
+        if self.outcome is not None and self.outcome.name == "completed":
+            fraction = 1.0
+        elif self._flight_began_us is not None and self._expected_s > 0.0:
+            fraction = min(1.0, (time_us - self._flight_began_us) * 1e-6 / self._expected_s)
+        return Progress(
+            stage=self.stage,
+            phase=(view.phase_name or self.stage.value) if flying else self.stage.value,
+            item=self._item(),
+            items=len(self.items),
+            fraction=fraction,
+            load_error_m=view.load_error_m if flying else None,
+            rotor_use=view.rotor_use if flying else None,
+            sim_time_s=time_us * 1e-6,
+            text=view.texts[-1].text if view.texts else "",
+        )
+
+    def _item(self) -> int:
+        setpoint = self.view.latest.get("LOAD_SETPOINT")
+        return int(setpoint.seq) if setpoint is not None and self._flight_began_us is not None else 0
+
+
+_FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
+_GROUND_PHASES = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
+_WATCHED = {"HEARTBEAT", "LOAD_SETPOINT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "STATUSTEXT"}
+_LANDING_PHASES = {mavlink.PLUMBLINE_PHASE_LOWER, mavlink.PLUMBLINE_PHASE_SET_DOWN}
+
+
+def _streams(client: FlightClient) -> list[Operation]:
+    assert client.connection.target is not None
+    return [
+        command.message_interval(client.connection.target, message_id, REPORT_INTERVAL_US)
+        for message_id in REPORT_MESSAGES
+    ]
+
+
+def _upload(client: FlightClient) -> list[Operation]:
+    assert client.connection.target is not None
+    return [MissionUpload(client.connection.target, client.items)]
+
+
+def _single(make: Callable[..., Operation]) -> Callable[[FlightClient], list[Operation]]:
+    return lambda client: [make(client.connection.target)]
+
+
+def _found(client: FlightClient) -> bool:
+    return client.connection.target is not None and client.view.armed is not None
+
+
+def _already_armed(client: FlightClient) -> str:
+    return "the vehicle is armed already; land and disarm it first" if client.view.armed else ""
+
+
+def _ready(client: FlightClient) -> bool:
+    return client.view.ready_to_arm is True
+
+
+def _not_found(client: FlightClient) -> Outcome:
+    return Outcome("lost", f"no vehicle was heard within {FIND_LIMIT_US / 1e6:.0f} s")
+
+
+def _not_ready(client: FlightClient) -> Outcome:
+    reasons = client.view.complaints_since(0)
+    text = f"the vehicle was not ready to arm within {READY_LIMIT_US / 1e6:.0f} s"
+    return Outcome("refused", "; ".join([text, *reasons]))
+
+
+_TABLE = {
+    Stage.FIND: _Row(
+        Stage.STREAMS, done=_found, barred=_already_armed, limit_us=FIND_LIMIT_US, late=_not_found
+    ),
+    Stage.STREAMS: _Row(Stage.UPLOAD, refused=Stage.UPLOAD, operations=_streams),
+    Stage.UPLOAD: _Row(Stage.READY, operations=_upload),
+    Stage.READY: _Row(Stage.ARM, done=_ready, limit_us=READY_LIMIT_US, late=_not_ready),
+    Stage.ARM: _Row(Stage.START, operations=_single(command.arm)),
+    Stage.START: _Row(Stage.FLY, refused=Stage.DISARM, operations=_single(command.start_mission)),
+    Stage.DISARM: _Row(Stage.OVER, operations=_single(command.disarm)),
+}

@@ -1,0 +1,72 @@
+"""The ground's half of lockstep: the vehicle's TIMESYNC opens our turn, our answer ends it.
+
+The vehicle stands still between its question (tc1 = 0, ts1 = its time in ns) and our answer (tc1 = ts1 + 1),
+so whatever we send before the answer is handled at that very tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.datagrams import messages
+from gcs.clients.operation import GROUND
+
+
+class LockstepTurns:
+    """Finds the vehicle's questions and makes each answer once.
+
+    The answers have a sequence counter of their own: in one process there are none, and the numbers of the
+    other frames must not depend on that.
+    """
+
+    def __init__(self) -> None:
+        self._writer = FrameWriter(*GROUND)
+        self._answered_ns: int | None = None
+        self._answer = b""
+
+    def question(self, datagram: bytes) -> int | None:
+        """The vehicle's time in ns if `datagram` holds its question, else None."""
+        for one in messages(datagram)[0]:
+            message = one.message
+            if message.get_msgId() == mavlink.MAVLINK_MSG_ID_TIMESYNC and message.tc1 == 0:
+                return int(message.ts1)
+        return None
+
+    def repeated(self, question_ns: int) -> bytes | None:
+        """The answer given before, if this very question, or an older one, was answered."""
+        if self._answered_ns is None or question_ns > self._answered_ns:
+            return None
+        return self._answer if question_ns == self._answered_ns else b""
+
+    def answer(self, question_ns: int) -> bytes:
+        """The datagram that ends our turn."""
+        message = mavlink.MAVLink_timesync_message(tc1=question_ns + 1, ts1=question_ns)
+        self._answered_ns = question_ns
+        self._answer = self._writer.frame(message)
+        return self._answer
+
+
+class TruthQueue:
+    """Holds truth datagrams back until their own time has come.
+
+    The simulator may already be at a later tick when the ground reads what it sent: what belongs to a later
+    window must not land in this one.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[int, bytes]] = []
+
+    def put(self, datagrams: Iterable[bytes]) -> None:
+        """Take datagrams in, in the order of their arrival."""
+        for datagram in datagrams:
+            received, _ = messages(datagram)
+            times = [one.message.time_usec for one in received if hasattr(one.message, "time_usec")]
+            self._waiting.append((max(times, default=0), datagram))
+
+    def until(self, now_us: int) -> list[bytes]:
+        """The datagrams that tell of times up to `now_us`, taken out."""
+        ready = [datagram for time_us, datagram in self._waiting if time_us <= now_us]
+        self._waiting = [(time_us, datagram) for time_us, datagram in self._waiting if time_us > now_us]
+        return ready

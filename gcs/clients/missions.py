@@ -1,0 +1,222 @@
+"""The mission protocol: upload, download, clear, over a link that loses, doubles and reorders datagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
+from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
+
+RETRY_US = 300_000
+SENDS = 12  # of one message; with 20 % lost each way all twelve fail once in two hundred thousand
+RESTARTS = 3  # of a whole upload
+_MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+
+
+def _result_text(result: int) -> str:
+    entry = mavlink.enums["MAV_MISSION_RESULT"].get(result)
+    if entry is None:
+        return f"result {result}"
+    return str(entry.name).removeprefix("MAV_MISSION_").replace("_", " ").lower()
+
+
+def _ours(message: Any) -> bool:
+    return addressed(message, GROUND) and getattr(message, "mission_type", _MISSION) == _MISSION
+
+
+class MissionUpload:
+    """Put `items` on the vehicle: COUNT, one ITEM for each REQUEST, ACK.
+
+    The vehicle leads: it asks for what it lacks. We speak up only when it is silent: with the count while no
+    item was asked for, with the last item asked for later on, and from the start when that is of no use.
+    """
+
+    def __init__(self, target: Target, items: Sequence[WireItem]) -> None:
+        self.result: Result | None = None
+        self._target = target
+        self._items = tuple(items)
+        self._asked: list[tuple[int, bool]] = []  # requests not yet answered: (seq, with integers)
+        self._last: tuple[int, bool] | None = None
+        self._next = 0  # items 0 ... next-1 were asked for
+        self._restarts = 0
+        self._retry = Retry(RETRY_US, SENDS)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        return self._next, len(self._items)
+
+    def receive(self, message: Any, now_us: int) -> None:
+        if self.result is not None or not self._retry.sent or not _ours(message):
+            return
+        kind = message.get_msgId()
+        if kind in (mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST):
+            if message.seq < len(self._items):
+                request = (message.seq, kind == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT)
+                if request not in self._asked:
+                    self._asked.append(request)
+                self._last = request
+                self._next = max(self._next, message.seq + 1)
+        elif kind == mavlink.MAVLINK_MSG_ID_MISSION_ACK:
+            self._acknowledged(message.type)
+
+    def _acknowledged(self, result: int) -> None:
+        if result == mavlink.MAV_MISSION_ACCEPTED:
+            if self._next == len(self._items):  # else it belongs to an older transfer
+                self.result = Result(Status.DONE, f"upload: {len(self._items)} items accepted")
+        elif result == mavlink.MAV_MISSION_INVALID_SEQUENCE:
+            return  # an item that came twice or too late; the vehicle asks again for what it lacks
+        elif result == mavlink.MAV_MISSION_OPERATION_CANCELLED:
+            self._restart()
+        else:
+            where = f"item {self._next - 1}" if self._next else "the mission"
+            self.result = Result(Status.REFUSED, f"upload: {where} refused: {_result_text(result)}")
+
+    def _restart(self) -> None:
+        self._restarts += 1
+        self._next = 0
+        self._last = None
+        self._asked.clear()
+        self._retry.restart()
+
+    def poll(self, now_us: int) -> list[Any]:
+        if self.result is not None:
+            return []
+        if self._asked:
+            answers = [self._item(seq, integers) for seq, integers in self._asked]
+            self._asked.clear()
+            self._retry.restart()
+            self._retry.asked(now_us)
+            return answers
+        if not self._retry.due(now_us):
+            return []
+        if self._retry.exhausted:
+            if self._last is None or self._restarts >= RESTARTS:
+                text = f"upload: no answer at item {self._next} of {len(self._items)}"
+                self.result = Result(Status.UNANSWERED, text)
+                return []
+            self._restart()
+        self._retry.asked(now_us)
+        if self._last is None:
+            return [mavlink.MAVLink_mission_count_message(*self._target, len(self._items), _MISSION)]
+        return [self._item(*self._last)]
+
+    def _item(self, seq: int, integers: bool) -> Any:
+        item = self._items[seq]
+        shared = (*self._target, seq, item.frame, item.command, item.current, item.autocontinue)
+        parameters = (item.param1, item.param2, item.param3, item.param4)
+        if integers:
+            return mavlink.MAVLink_mission_item_int_message(
+                *shared, *parameters, item.x, item.y, item.z, _MISSION
+            )
+        scale = 1e-7 if item.frame in _GLOBAL_FRAMES else 1.0
+        return mavlink.MAVLink_mission_item_message(
+            *shared, *parameters, item.x * scale, item.y * scale, item.z, _MISSION
+        )
+
+
+_GLOBAL_FRAMES = {
+    mavlink.MAV_FRAME_GLOBAL,
+    mavlink.MAV_FRAME_GLOBAL_INT,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+}
+
+
+class MissionDownload:
+    """Fetch the mission: REQUEST_LIST, COUNT, one REQUEST_INT for each item, our ACK. `items` when done."""
+
+    def __init__(self, target: Target) -> None:
+        self.result: Result | None = None
+        self.items: list[WireItem] = []
+        self._target = target
+        self._count: int | None = None
+        self._retry = Retry(RETRY_US, SENDS)
+        self._acknowledge = False
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        return len(self.items), self._count or 0
+
+    def receive(self, message: Any, now_us: int) -> None:
+        if self.result is not None or not self._retry.sent or not _ours(message):
+            return
+        kind = message.get_msgId()
+        if kind == mavlink.MAVLINK_MSG_ID_MISSION_COUNT and self._count is None:
+            self._count = message.count
+            self._retry.restart()
+        elif kind == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT and message.seq == len(self.items):
+            if self._count is None:
+                return
+            self.items.append(
+                WireItem(
+                    message.frame,
+                    message.command,
+                    message.current,
+                    message.autocontinue,
+                    message.param1,
+                    message.param2,
+                    message.param3,
+                    message.param4,
+                    message.x,
+                    message.y,
+                    message.z,
+                )
+            )
+            self._retry.restart()
+        elif kind == mavlink.MAVLINK_MSG_ID_MISSION_ACK and message.type not in (
+            mavlink.MAV_MISSION_ACCEPTED,
+            mavlink.MAV_MISSION_INVALID_SEQUENCE,
+        ):
+            self.result = Result(Status.REFUSED, f"download: refused: {_result_text(message.type)}")
+        if self.result is None and self._count is not None and len(self.items) == self._count:
+            self.result = Result(Status.DONE, f"download: {self._count} items")
+            self._acknowledge = True
+
+    def poll(self, now_us: int) -> list[Any]:
+        if self._acknowledge:
+            self._acknowledge = False
+            return [
+                mavlink.MAVLink_mission_ack_message(*self._target, mavlink.MAV_MISSION_ACCEPTED, _MISSION)
+            ]
+        if self.result is not None or not self._retry.due(now_us):
+            return []
+        if self._retry.exhausted:
+            of = "?" if self._count is None else self._count
+            self.result = Result(Status.UNANSWERED, f"download: no answer at item {len(self.items)} of {of}")
+            return []
+        self._retry.asked(now_us)
+        if self._count is None:
+            return [mavlink.MAVLink_mission_request_list_message(*self._target, _MISSION)]
+        return [mavlink.MAVLink_mission_request_int_message(*self._target, len(self.items), _MISSION)]
+
+
+class MissionClear:
+    """Take the mission off the vehicle."""
+
+    def __init__(self, target: Target) -> None:
+        self.result: Result | None = None
+        self._target = target
+        self._retry = Retry(RETRY_US, SENDS)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        return 0, 0
+
+    def receive(self, message: Any, now_us: int) -> None:
+        if self.result is not None or not self._retry.sent or not _ours(message):
+            return
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ACK:
+            accepted = message.type == mavlink.MAV_MISSION_ACCEPTED
+            text = "clear: accepted" if accepted else f"clear: refused: {_result_text(message.type)}"
+            self.result = Result(Status.DONE if accepted else Status.REFUSED, text)
+
+    def poll(self, now_us: int) -> list[Any]:
+        if self.result is not None or not self._retry.due(now_us):
+            return []
+        if self._retry.exhausted:
+            self.result = Result(Status.UNANSWERED, f"clear: no answer after {self._retry.sends} tries")
+            return []
+        self._retry.asked(now_us)
+        return [mavlink.MAVLink_mission_clear_all_message(*self._target, _MISSION)]

@@ -1,0 +1,184 @@
+"""What the ground knows of the vehicle: the newest message of each kind, and what it means."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from autopilot.wire.dialect import plumbline as mavlink
+
+BOOT_CLOCK = "SYSTEM_TIME"
+_TEXT_LENGTH = 50  # of one STATUSTEXT; a longer text comes in chunks
+
+_AUTO = 4
+_MAIN_MODES = {
+    1: "manual",
+    2: "altitude",
+    3: "position",
+    _AUTO: "auto",
+    5: "acro",
+    6: "offboard",
+    7: "stabilized",
+    8: "rattitude",
+}
+_AUTO_MODES = {
+    1: "ready",
+    2: "takeoff",
+    3: "hold",
+    4: "mission",
+    5: "return",
+    6: "land",
+    7: "return-ground",
+    8: "follow",
+    9: "precision-land",
+}
+MODES: dict[str, tuple[int, int]] = {
+    **{name: (main, 0) for main, name in _MAIN_MODES.items() if main != _AUTO},
+    **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items()},
+}
+
+_PHASES = {
+    value: str(entry.name).removeprefix("PLUMBLINE_PHASE_").replace("_", " ").lower()
+    for value, entry in mavlink.enums["PLUMBLINE_PHASE"].items()
+    if "ENUM_END" not in entry.name
+}
+_LANDED = {
+    mavlink.MAV_LANDED_STATE_ON_GROUND: "on the ground",
+    mavlink.MAV_LANDED_STATE_IN_AIR: "in the air",
+    mavlink.MAV_LANDED_STATE_TAKEOFF: "taking off",
+    mavlink.MAV_LANDED_STATE_LANDING: "landing",
+}
+_MISSION_STATES = {
+    mavlink.MISSION_STATE_NO_MISSION: "none",
+    mavlink.MISSION_STATE_NOT_STARTED: "not started",
+    mavlink.MISSION_STATE_ACTIVE: "active",
+    mavlink.MISSION_STATE_PAUSED: "paused",
+    mavlink.MISSION_STATE_COMPLETE: "complete",
+}
+
+
+class Text(NamedTuple):
+    """A STATUSTEXT as it came."""
+
+    now_us: int
+    severity: int
+    text: str
+
+
+def mode_name(custom_mode: int) -> str:
+    """The name of a packed PX4 mode."""
+    main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
+    names, key = (_AUTO_MODES, sub) if main == _AUTO else (_MAIN_MODES, main)
+    return names.get(key, f"mode {main}.{sub}")
+
+
+class VehicleView:
+    """Kept up to date by `update`; every property is None until the vehicle has told it."""
+
+    def __init__(self) -> None:
+        self.latest: dict[str, Any] = {}  # of the vehicle, by message name
+        self.truth: dict[str, Any] = {}  # of the simulated world, by message name
+        self.texts: list[Text] = []
+        self._chunks: dict[int, list[str]] = {}
+
+    def update(self, message: Any, now_us: int) -> None:
+        """Take one message of the vehicle in."""
+        name = message.get_type()
+        if name == "STATUSTEXT":
+            self._text(message, now_us)
+        elif getattr(message, "source", None) == mavlink.PLUMBLINE_SOURCE_TRUTH:
+            self.truth[name] = message
+        else:
+            self.latest[name] = message
+
+    def update_truth(self, message: Any) -> None:
+        """Take one message of the simulated world in."""
+        self.truth[message.get_type()] = message
+
+    def _text(self, message: Any, now_us: int) -> None:
+        if not message.id:
+            self.texts.append(Text(now_us, message.severity, message.text))
+            return
+        chunks = self._chunks.setdefault(message.id, [])
+        if message.chunk_seq == len(chunks):
+            chunks.append(message.text)
+        if len(message.text.encode()) < _TEXT_LENGTH:
+            self.texts.append(Text(now_us, message.severity, "".join(chunks)))
+            del self._chunks[message.id]
+
+    def complaints_since(self, count: int, severity: int = mavlink.MAV_SEVERITY_WARNING) -> list[str]:
+        """Texts at least as severe as `severity`, without those there were when `len(texts)` was `count`."""
+        found = [text.text for text in self.texts[count:] if text.severity <= severity]
+        return list(dict.fromkeys(found))
+
+    @property
+    def armed(self) -> bool | None:
+        heartbeat = self.latest.get("HEARTBEAT")
+        return None if heartbeat is None else bool(heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+
+    @property
+    def mode(self) -> str | None:
+        heartbeat = self.latest.get("HEARTBEAT")
+        return None if heartbeat is None else mode_name(heartbeat.custom_mode)
+
+    @property
+    def ready_to_arm(self) -> bool | None:
+        status = self.latest.get("SYS_STATUS")
+        if status is None:
+            return None
+        return bool(status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
+
+    @property
+    def landed(self) -> str | None:
+        state = self.latest.get("EXTENDED_SYS_STATE")
+        return None if state is None else _LANDED.get(state.landed_state, "not known")
+
+    @property
+    def on_ground(self) -> bool | None:
+        state = self.latest.get("EXTENDED_SYS_STATE")
+        return None if state is None else bool(state.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+
+    @property
+    def phase(self) -> int | None:
+        setpoint = self.latest.get("LOAD_SETPOINT")
+        return None if setpoint is None else int(setpoint.phase)
+
+    @property
+    def phase_name(self) -> str | None:
+        phase = self.phase
+        return None if phase is None else _PHASES.get(phase, f"phase {phase}")
+
+    @property
+    def mission_state(self) -> str | None:
+        current = self.latest.get("MISSION_CURRENT")
+        return None if current is None else _MISSION_STATES.get(current.mission_state, "not known")
+
+    @property
+    def time_us(self) -> int | None:
+        """The vehicle's clock since boot, as its fastest messages tell it."""
+        times = [
+            message.time_usec
+            for name in ("LOAD_SETPOINT", "CASCADE_ERRORS")
+            if (message := self.latest.get(name)) is not None
+        ]
+        if times:
+            return int(max(times))
+        clock = self.latest.get(BOOT_CLOCK)
+        return None if clock is None else int(clock.time_boot_ms) * 1000
+
+    @property
+    def load_error_m(self) -> float | None:
+        """|e_x| as the autopilot computes it, while it tracks the position of the load."""
+        errors = self.latest.get("CASCADE_ERRORS")
+        if errors is None or errors.control_mode != mavlink.PLUMBLINE_CONTROL_LOAD_POSITION:
+            return None
+        error = math.sqrt(sum(component * component for component in errors.e_x))
+        return error if math.isfinite(error) else None
+
+    @property
+    def rotor_use(self) -> float | None:
+        """The greatest rotor force over its limit; None for a vehicle without limits."""
+        rotors = self.latest.get("ROTOR_STATE")
+        if rotors is None or not math.isfinite(rotors.force_max) or rotors.force_max <= 0.0:
+            return None
+        return float(max(rotors.force) / rotors.force_max)

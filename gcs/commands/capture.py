@@ -1,0 +1,36 @@
+"""gcs capture"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import click
+
+from gcs.commands.options import PositiveType, connect_option
+from gcs.link import Address
+
+
+@click.command("capture")
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The log to write.  [default: flights/capture-TIME/flight.tlog]",
+)
+@click.option(
+    "--duration",
+    "duration_s",
+    type=PositiveType(),
+    help="Stop after so many seconds.",
+)
+@connect_option
+def capture_command(out: Path | None, duration_s: float | None, address: Address) -> None:
+    """Capture telemetry until Ctrl-C.
+
+    The fast messages of the report are asked for, so that gcs report can be made of the log.
+    """
+    from gcs.capturing import capture_to
+
+    path = out or Path("flights") / f"capture-{datetime.now():%Y%m%d-%H%M%S}" / "flight.tlog"
+    records = capture_to(path, address, duration_s)
+    click.echo(f"{records} messages captured to {path}")

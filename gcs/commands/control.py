@@ -1,0 +1,114 @@
+"""gcs arm, disarm, start, pause, resume, takeoff, land, mode: one command to a running vehicle each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import click
+
+from gcs.clients import command
+from gcs.clients.operation import Operation
+from gcs.clients.vehicle_view import MODES
+from gcs.commands.options import PositiveType, connect_option
+from gcs.link import Address
+from gcs.session import Session
+
+
+def _send(address: Address, make: Callable[[Session], Operation]) -> None:
+    with Session(address) as session:
+        session.find()
+        click.echo(session.run(make(session)).text)
+
+
+@click.command("arm")
+@click.option("--force", is_flag=True, help="Without the vehicle's own checks.")
+@connect_option
+def arm_command(force: bool, address: Address) -> None:
+    """Start the rotors.
+
+    The vehicle refuses, and says why, while it is not ready.
+    """
+    _send(address, lambda session: command.arm(session.target, force))
+
+
+@click.command("disarm")
+@click.option("--force", is_flag=True, help="Even in the air: the vehicle falls.")
+@connect_option
+def disarm_command(force: bool, address: Address) -> None:
+    """Stop the rotors.
+
+    In the air the vehicle refuses.
+    """
+    _send(address, lambda session: command.disarm(session.target, force))
+
+
+@click.command("start")
+@connect_option
+def start_command(address: Address) -> None:
+    """Fly the mission on the vehicle from its first item.
+
+    The vehicle must be armed.
+    """
+    _send(address, lambda session: command.start_mission(session.target))
+
+
+@click.command("pause")
+@connect_option
+def pause_command(address: Address) -> None:
+    """Hold the load where it is.
+
+    gcs resume goes on with the mission.
+    """
+    _send(address, lambda session: command.pause(session.target))
+
+
+@click.command("resume")
+@connect_option
+def resume_command(address: Address) -> None:
+    """Go on with a paused mission."""
+    _send(address, lambda session: command.resume(session.target))
+
+
+@click.command("takeoff")
+@click.option(
+    "--altitude",
+    "altitude_m",
+    type=PositiveType(),
+    help="Height of the load above home in m.  [default: the vehicle's MIS_TAKEOFF_ALT]",
+)
+@connect_option
+def takeoff_command(altitude_m: float | None, address: Address) -> None:
+    """Lift the load and hold it.
+
+    The vehicle must be armed, or is armed next.
+    """
+    from gcs.flying import vehicle_home
+
+    def make(session: Session) -> Operation:
+        if altitude_m is None:
+            return command.takeoff(session.target)
+        return command.takeoff(session.target, vehicle_home(session).altitude_m + altitude_m)
+
+    _send(address, make)
+
+
+@click.command("land")
+@connect_option
+def land_command(address: Address) -> None:
+    """Set the load down, and the vehicle beside it."""
+    _send(address, lambda session: command.land(session.target))
+
+
+@click.command("mode")
+@click.argument("name", type=click.Choice(sorted(MODES)))
+@connect_option
+def mode_command(name: str, address: Address) -> None:
+    """Change the flight mode.
+
+    NAME is a PX4 mode in plain words; which of them the vehicle has is for it to say.
+    """
+    main, sub = MODES[name]
+    _send(
+        address,
+        lambda session: command.set_mode(session.target, name, main, sub, armed=bool(session.view.armed)),
+    )

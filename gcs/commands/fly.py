@@ -1,0 +1,141 @@
+"""gcs fly"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+
+from gcs.commands.options import AddressType, PositiveType, SettingType, json_option, print_json
+from gcs.display import say
+from gcs.link import DEFAULT_PORT, Address
+
+_OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to a vehicle that runs already
+
+
+@click.command("fly")
+@click.argument("mission")
+@click.option(
+    "--law",
+    type=click.Choice(["thesis"]),
+    default="thesis",
+    show_default=True,
+    help="Control law to fly with.",
+)
+@click.option(
+    "--sensors",
+    default="lab",
+    show_default=True,
+    help="What the vehicle senses with: ideal, lab, rtk, gps or a profile file.",
+)
+@click.option(
+    "--vehicle",
+    default="bebop",
+    show_default=True,
+    help="What really flies: bebop, thesis (no rotor limits, no lag, no drag) or a vehicle file.",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of all noise.")
+@click.option("--lockstep", is_flag=True, help="As fast as it goes, the same bytes each time (default).")
+@click.option(
+    "--speed",
+    type=PositiveType(most=100.0),
+    help="On the wall clock, so many times as fast; other ground stations may watch on 14550 and 14540.",
+)
+@click.option(
+    "--set",
+    "settings",
+    type=SettingType(),
+    multiple=True,
+    help="Set a parameter of the simulator (SIM_*) or of the autopilot; may be given again.",
+)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Where telemetry and report go.  [default: flights/MISSION-TIME]",
+)
+@click.option(
+    "--connect",
+    type=AddressType(),
+    is_flag=False,
+    flag_value=str(DEFAULT_PORT),
+    help="Fly a vehicle that is running already, met at PORT or HOST:PORT (14550 if none is named).",
+)
+@click.option(
+    "--timeout",
+    "limit_s",
+    type=PositiveType(),
+    help="Give up after so many seconds of the vehicle's clock.  [default: 1.5 x expected + 60]",
+)
+@click.option("--force", is_flag=True, help="Fly even what the vehicle cannot do.")
+@json_option
+@click.option("--quiet", is_flag=True, help="No progress and no table, only the outcome.")
+@click.pass_context
+def fly_command(
+    ctx: click.Context,
+    mission: str,
+    law: str,
+    sensors: str,
+    vehicle: str,
+    seed: int,
+    lockstep: bool,
+    speed: float | None,
+    settings: tuple[str, ...],
+    out: Path | None,
+    connect: Address | None,
+    limit_s: float | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Fly a mission from start to report.
+
+    MISSION is the name of a shipped mission (see gcs missions) or the path of a mission file. A simulator and
+    an autopilot are started for the flight and stopped after it; with --connect those that run already are
+    used. The mission is checked, uploaded and flown, all telemetry is captured, and a report is made.
+
+    \b
+    gcs fly case-b
+    gcs fly case-a --vehicle thesis --sensors ideal
+    gcs fly square --set SIM_WIND_E=3 --seed 7 --out windy
+    gcs fly hover --speed 1
+    """
+    if lockstep and speed is not None:
+        raise click.UsageError("--lockstep and --speed exclude each other", ctx)
+    if connect is not None:
+        given = [name for name in _OWN if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+        if given:
+            option = "--set" if given[0] == "settings" else f"--{given[0]}"
+            raise click.UsageError(
+                f"{option} is for processes that fly starts; with --connect give it to sitl and autopilot",
+                ctx,
+            )
+
+    from gcs.flying import FlightOptions, fly
+    from gcs.reporting import print_record
+
+    flight = fly(
+        FlightOptions(
+            mission=mission,
+            law=law,
+            sensors=sensors,
+            vehicle=vehicle,
+            seed=seed,
+            speed=speed,
+            out=out,
+            settings=settings,
+            connect=connect,
+            quiet=quiet or as_json,
+            force=force,
+            limit_s=limit_s,
+        )
+    )
+    if as_json:
+        print_json(flight.record)
+    elif not quiet:
+        print_record(flight.record)
+    reason = f": {flight.outcome.reason}" if flight.outcome.reason else ""
+    say(f"{mission}: {flight.outcome.name}{reason}")
+    if not as_json:
+        click.echo(f"report: {flight.out / 'report.html'}")
+    return flight.exit_code

@@ -1,0 +1,58 @@
+"""gcs missions, check: mission files, without a vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import click
+
+from gcs.commands.options import json_option, print_json, print_table
+from gcs.errors import EXIT_DONE, EXIT_ERROR
+
+
+@click.command("missions")
+@json_option
+def missions_command(as_json: bool) -> None:
+    """List the shipped missions."""
+    from gcs.missions_checked import load
+    from missions.fileformat import shipped
+
+    missions = [load(name) for name in shipped()]
+    if as_json:
+        print_json(
+            [
+                {
+                    "name": mission.name,
+                    "title": mission.title,
+                    "description": " ".join(mission.description.split()),
+                    "assumptions": mission.assumptions,
+                }
+                for mission in missions
+            ]
+        )
+        return
+    print_table([(mission.name, mission.title) for mission in missions])
+
+
+@click.command("check")
+@click.argument("mission")
+@click.option("--vehicle", default="bebop", show_default=True, help="Vehicle name or file with the limits.")
+@json_option
+def check_command(mission: str, vehicle: str, as_json: bool) -> int:
+    """Check whether a vehicle can fly a mission.
+
+    MISSION is a shipped name or the path of a mission file. Every limit that it breaks is named, with by how
+    much and when; the exit code is 1 if there is any.
+    """
+    from gcs.missions_checked import load, violations
+
+    loaded = load(mission)
+    found = violations(loaded, vehicle)
+    if as_json:
+        print_json({"mission": loaded.name, "vehicle": vehicle, "violations": [asdict(v) for v in found]})
+    elif found:
+        for violation in found:
+            click.echo(str(violation))
+    else:
+        click.echo(f"{loaded.name}: vehicle {vehicle} can fly it")
+    return EXIT_ERROR if found else EXIT_DONE

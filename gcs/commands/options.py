@@ -1,0 +1,109 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import click
+
+from gcs.link import DEFAULT_PORT, Address, AddressError, parse_address
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class AddressType(click.ParamType):  # type: ignore[type-arg]
+    """Where to meet a vehicle."""
+
+    name = "ADDRESS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Address:
+        if isinstance(value, Address):
+            return value
+        try:
+            return parse_address(value)
+        except AddressError as error:
+            self.fail(str(error), param, ctx)
+
+
+class PositiveType(click.ParamType):  # type: ignore[type-arg]
+    """A finite number > 0, and at most `most` if there is a bound."""
+
+    name = "NUMBER"
+
+    def __init__(self, most: float = math.inf) -> None:
+        self._most = most
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not (0.0 < number <= self._most and math.isfinite(number)):
+            bound = f" and <= {self._most:g}" if math.isfinite(self._most) else ""
+            self.fail(f"{value!r}; must be a number > 0{bound}", param, ctx)
+        return number
+
+
+class SettingType(click.ParamType):  # type: ignore[type-arg]
+    """NAME=VALUE with a finite number."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        name, equals, number = str(value).partition("=")
+        if not equals or not name.strip():
+            self.fail(f"{value!r}; must be NAME=VALUE, e.g. SIM_WIND_E=3", param, ctx)
+        try:
+            parsed = float(number)
+        except ValueError:
+            self.fail(f"{value!r}; the value must be a number", param, ctx)
+        if not math.isfinite(parsed):
+            self.fail(f"{value!r}; the value must be a finite number", param, ctx)
+        return f"{name.strip().upper()}={number.strip()}"
+
+
+def connect_option(function: F) -> F:
+    """--connect of every command that speaks to a running vehicle."""
+    return click.option(
+        "--connect",
+        "address",
+        type=AddressType(),
+        default=str(DEFAULT_PORT),
+        show_default=True,
+        help="Where the vehicle is met: PORT or HOST:PORT to wait there, udpout:HOST:PORT to speak first.",
+    )(function)
+
+
+def json_option(function: F) -> F:
+    """--json of every command with a result."""
+    return click.option("--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else.")(
+        function
+    )
+
+
+def print_json(record: Mapping[str, Any] | Sequence[Any]) -> None:
+    """`record` on stdout; what JSON has no number for becomes null."""
+    click.echo(json.dumps(_plain(record), indent=2, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def print_table(rows: Sequence[Sequence[str]], header: Sequence[str] = ()) -> None:
+    """Columns of text on stdout, each as wide as its widest cell."""
+    lines = [list(header), *map(list, rows)] if header else [list(row) for row in rows]
+    if not lines:
+        return
+    widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
+    for line in lines:
+        click.echo("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())

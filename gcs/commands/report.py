@@ -1,0 +1,40 @@
+"""gcs report"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gcs.commands.options import json_option, print_json
+from gcs.errors import GcsError
+
+
+@click.command("report")
+@click.argument("source", metavar="DIR|TLOG", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Where the report goes.  [default: beside the log]",
+)
+@json_option
+@click.option("--quiet", is_flag=True, help="No progress and no table.")
+def report_command(source: Path, out: Path | None, as_json: bool, quiet: bool) -> None:
+    """Make the report of a captured flight again.
+
+    DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. Made are
+    summary.json, flight.parquet, pictures and report.html, from the telemetry alone.
+    """
+    from gcs.reporting import make_report, print_record
+
+    tlog = source / "flight.tlog" if source.is_dir() else source
+    if not tlog.is_file():
+        raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds flight.tlog")
+    folder = out or (tlog.parent if tlog.name == "flight.tlog" else tlog.with_suffix(""))
+    record = make_report(tlog, folder, None, quiet or as_json)
+    if as_json:
+        print_json(record)
+        return
+    if not quiet:
+        print_record(record)
+    click.echo(f"report: {folder / 'report.html'}")

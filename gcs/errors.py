@@ -1,0 +1,23 @@
+"""What can go wrong at the ground station, and the exit code that says so."""
+
+from __future__ import annotations
+
+EXIT_DONE = 0
+EXIT_ERROR = 1  # a known error, told in one line
+EXIT_USAGE = 2  # the command line itself is wrong
+EXIT_NOT_MET = 3  # flown, but the mission was not completed
+EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, as shells count it
+
+
+class GcsError(Exception):
+    """A known error. Its text is the one line that a person reads."""
+
+    exit_code = EXIT_ERROR
+
+
+class NoVehicleError(GcsError):
+    """Nobody answered, or somebody stopped answering."""
+
+
+class RefusedError(GcsError):
+    """The vehicle answered no."""

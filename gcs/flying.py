@@ -1,0 +1,264 @@
+"""One `gcs fly` from the mission file to the report: starts what is needed, flies, and always cleans up."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.tlog import TlogWriter
+from gcs.analysis.record import FlightMeta, Record
+from gcs.clients import command
+from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture
+from gcs.clients.connection import LINK_TIMEOUT_US
+from gcs.clients.flight import FlightClient, Outcome
+from gcs.display import FlightDisplay, say
+from gcs.errors import (
+    EXIT_DONE,
+    EXIT_ERROR,
+    EXIT_INTERRUPTED,
+    EXIT_NOT_MET,
+    GcsError,
+)
+from gcs.expected import expected_duration_s
+from gcs.flight_loops import run_lockstep, run_wall_clock
+from gcs.link import LOOPBACK, Address, UdpSocket, free_port, open_address, unix_us
+from gcs.missions_checked import load_checked
+from gcs.processes import Processes
+from gcs.reporting import make_report
+from gcs.session import Session
+from gcs.stopping import StopRequest
+from missions.model import Mission
+
+LAWS = {"thesis": 0}  # the value of CTL_LAW
+TRUTH_PORT = 14560
+WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
+_EXIT = {
+    "completed": EXIT_DONE,
+    "diverged": EXIT_NOT_MET,
+    "timeout": EXIT_NOT_MET,
+    "interrupted": EXIT_NOT_MET,
+    "refused": EXIT_ERROR,
+    "lost": EXIT_ERROR,
+}
+
+
+@dataclass(frozen=True)
+class FlightOptions:
+    """What was typed."""
+
+    mission: str
+    law: str
+    sensors: str
+    vehicle: str
+    seed: int
+    speed: float | None  # None: lockstep
+    out: Path | None
+    settings: tuple[str, ...]  # NAME=VALUE
+    connect: Address | None
+    quiet: bool
+    force: bool
+    limit_s: float | None
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What came of it."""
+
+    outcome: Outcome
+    record: Record
+    out: Path
+    stopped: bool  # by Ctrl-C
+
+    @property
+    def exit_code(self) -> int:
+        return EXIT_INTERRUPTED if self.stopped else _EXIT[self.outcome.name]
+
+
+def fly(options: FlightOptions) -> Flight:
+    """The whole flight; GcsError if there was none."""
+    mission = load_checked(options.mission, options.vehicle, options.force)
+    out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
+    with _Folder(out) as folder, StopRequest("stopping; Ctrl-C again abandons the report") as stop:
+        began_s = time.monotonic()
+        tlog = out / "flight.tlog"
+        with tlog.open("wb") as file:
+            log = TlogWriter(file)
+            if options.connect is not None:
+                client = _fly_running(mission, options, options.connect, log, stop)
+            else:
+                client = _fly_own(mission, options, log, out, stop)
+        wall_s = time.monotonic() - began_s
+        outcome = client.outcome or Outcome("interrupted")
+        if tlog.stat().st_size == 0:
+            raise GcsError(outcome.reason or "stopped before the vehicle said anything")
+        folder.keep()
+        record = make_report(tlog, out, _meta(mission, options, outcome, wall_s), options.quiet)
+        return Flight(outcome, record, out, bool(stop))
+
+
+def _fly_own(
+    mission: Mission, options: FlightOptions, log: TlogWriter, out: Path, stop: StopRequest
+) -> FlightClient:
+    """With a simulator and an autopilot of our own, which are gone afterwards."""
+    client = _client(mission, options, Home())
+    display = FlightDisplay(mission.name, options.quiet)
+    vehicle, truth = UdpSocket(), UdpSocket()
+    lockstep = options.speed is None
+    with tempfile.TemporaryDirectory(prefix="plumbline-") as storage, Processes() as processes, display:
+        try:
+            _start(processes, options, out, Path(storage), vehicle.address, truth.address)
+            if lockstep:
+                capture = Capture(log, LOCKSTEP_BOOT_UNIX_US)
+                first_turn = processes.share_one_core
+                run_lockstep(client, capture, vehicle, truth, processes.ended, display, stop, first_turn)
+            else:
+                capture = Capture(log, unix_us())
+                run_wall_clock(client, capture, vehicle, truth, processes.ended, display, stop)
+        finally:
+            vehicle.close()
+            truth.close()
+    return client
+
+
+def _start(
+    processes: Processes, options: FlightOptions, out: Path, storage: Path, ground: str, truth: str
+) -> None:
+    simulator = f"{LOOPBACK}:{free_port()}"
+    pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
+    both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS[options.law]}"]
+    for setting in options.settings:
+        both += ["--set", setting]
+    world = [
+        "--sensors",
+        options.sensors,
+        "--seed",
+        str(options.seed),
+        "--listen",
+        simulator,
+        "--truth",
+        truth,
+    ]
+    processes.start("sitl", [*world, *pace, *both, "--quiet"], out / "sitl.log")
+    link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *WATCHERS]
+    home = ["--sim", simulator, "--storage", str(storage)]
+    processes.start("autopilot", [*home, *link, *both, "--quiet"], out / "autopilot.log")
+
+
+def _fly_running(
+    mission: Mission, options: FlightOptions, address: Address, log: TlogWriter, stop: StopRequest
+) -> FlightClient:
+    """With a vehicle that somebody else has started, and that goes on afterwards."""
+    with Session(address) as session:
+        session.find()
+        client = _client(mission, options, vehicle_home(session))
+    truth = _truth_of_a_running_world()
+    vehicle = open_address(address)
+    try:
+        with FlightDisplay(mission.name, options.quiet) as display:
+            run_wall_clock(client, Capture(log, unix_us()), vehicle, truth, lambda: "", display, stop)
+    finally:
+        vehicle.close()
+        if truth is not None:
+            truth.close()
+    if client.outcome is not None and client.outcome.name in ("interrupted", "timeout") and client.view.armed:
+        with Session(address) as session:
+            session.find()
+            session.run(command.pause(session.target))
+            say("the vehicle holds; gcs land brings it down")
+    return client
+
+
+def vehicle_home(session: Session) -> Home:
+    """Where the vehicle says its home is."""
+    message = session.request(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+    return Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
+
+
+def _truth_of_a_running_world() -> UdpSocket | None:
+    try:
+        return UdpSocket(LOOPBACK, TRUTH_PORT)
+    except GcsError:
+        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the report will have no truth of the simulator")
+        return None
+
+
+def _client(mission: Mission, options: FlightOptions, home: Home) -> FlightClient:
+    slow = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
+    return FlightClient(
+        encode_mission(mission, home),
+        expected_duration_s(mission),
+        options.limit_s,
+        round(LINK_TIMEOUT_US * slow),
+    )
+
+
+def _meta(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: float) -> FlightMeta:
+    own = options.connect is None
+    settings: dict[str, float | str] = {}
+    for setting in options.settings:
+        name, _, value = setting.partition("=")
+        settings[name] = float(value)
+    return FlightMeta(
+        mission=options.mission,
+        title=mission.title,
+        law=options.law if own else None,
+        sensors=options.sensors if own else None,
+        vehicle=options.vehicle if own else None,
+        seed=options.seed if own else None,
+        outcome=outcome.name,
+        reason=outcome.reason or None,
+        wall_s=wall_s,
+        command=_command_line(options),
+        version=version("plumbline"),
+        settings=settings,
+    )
+
+
+def _command_line(options: FlightOptions) -> str:
+    words = ["gcs fly", options.mission]
+    if options.connect is not None:
+        return " ".join([*words, "--connect", str(options.connect)])
+    words += ["--law", options.law, "--sensors", options.sensors, "--vehicle", options.vehicle]
+    words += ["--seed", str(options.seed)]
+    words += ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
+    for setting in options.settings:
+        words += ["--set", setting]
+    return " ".join(words)
+
+
+class _Folder:
+    """The output directory; if the flight came to nothing, what we put there is taken away again."""
+
+    _OURS = ("flight.tlog", "sitl.log", "autopilot.log")
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._kept = False
+
+    def keep(self) -> None:
+        self._kept = True
+
+    def __enter__(self) -> _Folder:
+        try:
+            self._path.mkdir(parents=True, exist_ok=True)
+            if not os.access(self._path, os.W_OK):
+                raise PermissionError(13, "Permission denied")
+        except OSError as error:
+            raise GcsError(f"--out {self._path}: {error.strerror}") from None
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._kept:
+            return
+        for name in self._OURS:
+            (self._path / name).unlink(missing_ok=True)
+        if not any(self._path.iterdir()):
+            self._path.rmdir()

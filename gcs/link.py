@@ -1,0 +1,137 @@
+"""UDP: the sockets of the ground station. Here bytes leave and enter; what they say is said elsewhere."""
+
+from __future__ import annotations
+
+import errno
+import select
+import socket
+import time
+from dataclasses import dataclass
+
+from gcs.errors import GcsError
+
+DEFAULT_PORT = 14550
+LOOPBACK = "127.0.0.1"
+_DATAGRAM = 65_535
+_BUFFER = 4 * 1024 * 1024  # the fast streams of a second, and a report being written meanwhile
+
+
+class AddressError(GcsError):
+    """An address that cannot be read."""
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where to meet a vehicle: `listen` waits for it to speak there, else we speak first."""
+
+    host: str
+    port: int
+    listen: bool = True
+
+    def __str__(self) -> str:
+        return f"{'' if self.listen else 'udpout:'}{self.host}:{self.port}"
+
+
+def parse_address(text: str) -> Address:
+    """`14550`, `HOST:PORT`, `udpin:HOST:PORT` (wait there) or `udpout:HOST:PORT` (speak first)."""
+    rest = text.removeprefix("udpin:").removeprefix("udpout:")
+    host, _, port = rest.rpartition(":")
+    if not port.isdigit() or not 0 < int(port) < 65536 or (":" in rest and not host) or ":" in host:
+        forms = "PORT, HOST:PORT, udpin:HOST:PORT or udpout:HOST:PORT, with a port of 1 ... 65535"
+        raise AddressError(f"address {text!r}; must be {forms}")
+    return Address(host or LOOPBACK, int(port), listen=not text.startswith("udpout:"))
+
+
+def free_port() -> int:
+    """A UDP port on the loopback that nobody uses now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+class UdpSocket:
+    """One socket; answers go to whoever spoke last."""
+
+    def __init__(self, host: str = LOOPBACK, port: int = 0, peer: tuple[str, int] | None = None) -> None:
+        self._peer = peer
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((host, port))
+        except (OSError, OverflowError) as error:
+            self._socket.close()
+            raise GcsError(_bind_problem(host, port, error)) from None
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        self._socket.setblocking(False)
+
+    @property
+    def address(self) -> str:
+        """HOST:PORT, as the option of another program takes it."""
+        host, port = self._socket.getsockname()[:2]
+        return f"{host}:{port}"
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def drain(self) -> list[bytes]:
+        """All datagrams that are there, without waiting."""
+        datagrams: list[bytes] = []
+        while True:
+            try:
+                datagram, self._peer = self._socket.recvfrom(_DATAGRAM)
+            except ConnectionError:  # the peer's port was closed when we last sent; it may come back
+                continue
+            except BlockingIOError:
+                return datagrams
+            datagrams.append(datagram)
+
+    def send(self, datagram: bytes) -> None:
+        """Send to the peer; nothing if there is none yet or it does not listen."""
+        if self._peer is None:
+            return
+        try:
+            self._socket.sendto(datagram, self._peer)
+        except (ConnectionError, BlockingIOError):
+            return  # UDP: the protocols above ask again
+        except OSError as error:
+            raise GcsError(f"UDP to {self._peer[0]}:{self._peer[1]}: {error.strerror}") from None
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def open_address(address: Address) -> UdpSocket:
+    """The socket at which the vehicle is met."""
+    if address.listen:
+        return UdpSocket(address.host, address.port)
+    try:
+        host = socket.gethostbyname(address.host)
+    except OSError as error:
+        raise GcsError(f"host {address.host!r}: {error.strerror or error}") from None
+    return UdpSocket("0.0.0.0" if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
+
+
+def wait(sockets: list[UdpSocket], timeout_s: float) -> None:
+    """Until one of them has a datagram, or the time is over."""
+    select.select(sockets, [], [], max(timeout_s, 0.0))
+
+
+def monotonic_us() -> int:
+    """The wall clock of everything that is not in lockstep."""
+    return time.monotonic_ns() // 1000
+
+
+def unix_us() -> int:
+    """Time since 1970, for log records."""
+    return time.time_ns() // 1000
+
+
+def _bind_problem(host: str, port: int, error: OSError | OverflowError) -> str:
+    where = f"UDP {host}:{port}"
+    if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+        other = 14540 if port != 14540 else DEFAULT_PORT
+        return (
+            f"{where} is in use by another program (a ground station?); "
+            f"close it or choose another port, e.g. --connect {other}"
+        )
+    reason = error.strerror if isinstance(error, OSError) else str(error)
+    return f"{where} cannot be opened: {reason}; choose another with --connect HOST:PORT"

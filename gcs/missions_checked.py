@@ -1,0 +1,36 @@
+"""Missions as the commands take them: loaded, and checked against the vehicle that is to fly them."""
+
+from __future__ import annotations
+
+from gcs.errors import GcsError
+from gcs.vehicle_limits import load_limits
+from missions.feasibility import Violation, check
+from missions.fileformat import MissionFileError, load_mission
+from missions.model import Mission
+
+
+def load(name_or_path: str) -> Mission:
+    """The mission; GcsError says what is wrong with it."""
+    try:
+        return load_mission(name_or_path)
+    except MissionFileError as error:
+        raise GcsError(str(error)) from None
+
+
+def violations(mission: Mission, vehicle: str) -> list[Violation]:
+    """What the vehicle cannot do of it."""
+    return list(check(mission, load_limits(vehicle)))
+
+
+def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
+    """The mission, which the vehicle can fly unless `force` says that it need not."""
+    mission = load(name_or_path)
+    if force:
+        return mission
+    found = violations(mission, vehicle)
+    if found:
+        more = f" (and {len(found) - 1} more, see gcs check)" if len(found) > 1 else ""
+        raise GcsError(
+            f"{mission.name} cannot be flown by vehicle {vehicle}: {found[0]}{more}; --force tries"
+        )
+    return mission

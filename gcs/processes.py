@@ -1,0 +1,164 @@
+"""The simulator and the autopilot as child processes that cannot outlive us.
+
+Each gets a process group of its own (Ctrl-C reaches us alone, we stop them in order), is killed by the kernel
+if we die (Linux), and writes its stderr to a file from which the reason of an early end is taken.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from gcs.errors import GcsError
+
+STOP_S = 3.0  # from SIGTERM to SIGKILL
+_PR_SET_PDEATHSIG = 1
+_LAST_LINE = 4096  # bytes of the log in which the last line is looked for
+
+
+class Child:
+    """One running program."""
+
+    def __init__(self, name: str, arguments: Sequence[str], log: Path) -> None:
+        self.name = name
+        self.log = log
+        self.exit_code: int | None = None
+        with log.open("wb") as stderr:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", name, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=stderr,
+                stderr=subprocess.STDOUT,
+                process_group=0,
+                preexec_fn=_die_with_parent(),  # noqa: PLW1509, there are no threads
+            )
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        self.exit_code = self._process.poll()
+        return self.exit_code is None
+
+    def last_line(self) -> str:
+        """The last line it wrote, empty if none."""
+        try:
+            text = self.log.read_bytes()[-_LAST_LINE:].decode("utf-8", "replace")
+        except OSError:
+            return ""
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        return lines[-1] if lines else ""
+
+    def obituary(self) -> str:
+        """One line on why it ended, once it has."""
+        line = self.last_line().removeprefix(f"{self.name}: ")
+        code = self.exit_code if self.exit_code is not None else 0
+        how = f"ended with exit code {code}"
+        if code < 0:
+            how = f"was killed by {signal.Signals(-code).name}"
+        return f"{self.name} {how}{': ' + line if line else ', without a word'}"
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        if self.running:
+            self._process.terminate()
+
+    def finish(self) -> None:
+        """Wait for its end, and force it after `STOP_S`."""
+        try:
+            self._process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+        self.exit_code = self._process.returncode
+
+
+class Processes:
+    """The children of one flight; leaving the `with` block ends them all."""
+
+    def __init__(self) -> None:
+        self._children: list[Child] = []
+        self._cpus_before: set[int] | None = None
+
+    def start(self, name: str, arguments: Sequence[str], log: Path) -> Child:
+        """Start `python -m NAME ARGUMENTS` with its output in `log`."""
+        try:
+            child = Child(name, arguments, log)
+        except OSError as error:
+            raise GcsError(f"{name} cannot be started: {error}") from None
+        self._children.append(child)
+        return child
+
+    def ended(self) -> str:
+        """Why a child has ended, empty while all run."""
+        for child in self._children:
+            if not child.running:
+                return child.obituary()
+        return ""
+
+    def share_one_core(self) -> None:
+        """Keep ourselves and the children on one core: in lockstep only one of us has work at a time.
+
+        Handing over on one core is a mere switch, between two it wakes a sleeping one. Nothing is done where
+        the system has no such call.
+        """
+        if not hasattr(os, "sched_setaffinity"):
+            return
+        self._cpus_before = os.sched_getaffinity(0)
+        core = _current_core(self._cpus_before)
+        for pid in (0, *(child.pid for child in self._children if child.running)):
+            try:
+                os.sched_setaffinity(pid, {core})
+            except OSError:  # it has just ended, or may not be moved
+                continue
+
+    def stop(self) -> None:
+        """End all, the last started first."""
+        if self._cpus_before is not None:
+            os.sched_setaffinity(0, self._cpus_before)
+            self._cpus_before = None
+        for child in reversed(self._children):
+            child.terminate()
+        for child in reversed(self._children):
+            child.finish()
+        self._children.clear()
+
+    def __enter__(self) -> Processes:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+def _current_core(allowed: set[int]) -> int:
+    """The core we run on, as the scheduler chose it: an idle one, if there was any."""
+    try:
+        core = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[36])
+    except (OSError, ValueError, IndexError):
+        return min(allowed)
+    return core if core in allowed else min(allowed)
+
+
+def _die_with_parent() -> Callable[[], None] | None:
+    """What the child runs before it becomes the program: ask the kernel to kill it when we die."""
+    if not sys.platform.startswith("linux"):
+        return None
+    libc = ctypes.CDLL(None)
+    parent = os.getpid()
+
+    def request() -> None:
+        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # we died before the call
+            os._exit(1)
+
+    return request

@@ -1,0 +1,92 @@
+"""A report from a captured flight: a .tlog goes in, a directory of files and the record come out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from gcs.analysis.record import FlightMeta, Record, flight_record
+from gcs.analysis.samples import samples_of
+from gcs.analysis.telemetry import load_telemetry
+
+META_FILE = "meta.json"
+SUMMARY_FILE = "summary.json"
+PARQUET_FILE = "flight.parquet"
+PAGE_FILE = "report.html"
+
+# steps done, steps in all, what is done next
+Progress = Callable[[int, int, str], None]
+
+
+class ReportError(ValueError):
+    """The user's files do not allow a report; one line says which, why, and what to do."""
+
+
+def load_meta(path: Path) -> FlightMeta:
+    """What a meta.json says; nothing known if there is no such file."""
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return FlightMeta()
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ReportError(
+            f"{path}: {error}; must be JSON: mend it, or delete it to report without"
+        ) from error
+    if not isinstance(values, dict):
+        raise ReportError(f"{path}: found a {type(values).__name__}; must be an object of named values")
+    return FlightMeta.from_json(values)
+
+
+def build_report(
+    tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None, progress: Progress | None = None
+) -> Record:
+    """Writes summary.json, meta.json, flight.parquet, the pictures and report.html; returns the record.
+
+    Without `meta`, meta.json beside the log is read. A log that is cut short, empty or of a lost flight
+    gives a record all the same, with None for what cannot be known.
+    """
+    from gcs.analysis.parquet import write_flight
+    from gcs.report.html import render_page
+    from gcs.report.plots import PICTURES, Picture, View, draw_pictures
+
+    tell = progress or (lambda done, total, text: None)
+    total = len(PICTURES) + 3
+    if not tlog_path.is_file():
+        raise ReportError(f"{tlog_path}: no such file; give a .tlog that `gcs fly` or `gcs capture` wrote")
+    meta = load_meta(tlog_path.parent / META_FILE) if meta is None else meta
+    out_dir.mkdir(parents=True, exist_ok=True)
+
+    tell(0, total, "reading telemetry")
+    telemetry = load_telemetry(tlog_path)
+    samples = samples_of(telemetry)
+    record = flight_record(telemetry, meta, samples)
+    record["report_dir"] = str(out_dir)
+    _write_json(out_dir / META_FILE, meta.to_json())
+    _write_json(out_dir / SUMMARY_FILE, record)
+
+    tell(1, total, PARQUET_FILE)
+    # where the directory lies is no property of the flight
+    about = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
+    write_flight(out_dir / PARQUET_FILE, telemetry, samples, about)
+
+    done = 2
+    tell(done, total, PICTURES[0].file)
+
+    def drawn(picture: Picture) -> None:
+        nonlocal done
+        done += 1
+        follows = PICTURES.index(picture) + 1
+        tell(done, total, PICTURES[follows].file if follows < len(PICTURES) else PAGE_FILE)
+
+    draw_pictures(View(telemetry, samples, record, meta), out_dir, drawn)
+    page = render_page(record, meta, telemetry.texts, out_dir)
+    (out_dir / PAGE_FILE).write_text(page, encoding="utf-8")
+    tell(total, total, "done")
+    return record
+
+
+def _write_json(path: Path, values: Record) -> None:
+    path.write_text(
+        json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
+    )

@@ -1,0 +1,397 @@
+"""The pictures of a report: what the thesis shows of a flight in 4-4, from telemetry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
+from gcs.analysis.record import KEY, FlightMeta, Record, shown
+from gcs.analysis.samples import CARRIED, Samples
+from gcs.analysis.tracks import Telemetry
+from gcs.report.style import (
+    AXES,
+    BLUE,
+    FAINT,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PURPLE,
+    RED,
+    ROTORS,
+    bands,
+    draw,
+    key,
+    length_scale,
+    new_figure,
+    note_if_empty,
+    phase_spans,
+    rows,
+    save,
+    style,
+    true_spans,
+)
+from gcs.report.track import draw_track
+
+_SEEN = 0.004  # of the width: a mark for one sample
+
+
+@dataclass(frozen=True)
+class View:
+    """What the pictures are drawn from."""
+
+    telemetry: Telemetry
+    samples: Samples
+    record: Record
+    meta: FlightMeta
+
+    @property
+    def whole(self) -> tuple[float, float]:
+        """The time axis of the whole flight."""
+        begin, end = self.telemetry.span_s or (0.0, 1.0)
+        return begin, max(end, begin + 1e-3)
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """The time axis around the mission window; the whole flight if it has none."""
+        inside = self.samples.time_s[self.samples.in_mission]
+        if len(inside) < 2:
+            return self.whole
+        # some of the hold on both sides, but nothing of lifting and lowering, which would set the scale
+        margin = max(0.5, 0.03 * float(inside[-1] - inside[0]))
+        time_s = self.samples.time_s
+        near = (time_s >= inside[0] - margin) & (time_s <= inside[-1] + margin)
+        calm = time_s[near & np.isin(self.samples.phase, CARRIED)]
+        return float(calm[0]), float(calm[-1])
+
+    def shade(self, axes: Any, limits: tuple[float, float] | None = None) -> None:
+        """Phases and limits of the time axis for axes that stand above each other."""
+        spans = phase_spans(self.telemetry.setpoint.time_s, self.telemetry.setpoint.phase)
+        bands(list(axes), spans, limits or self.window)
+
+    def visible(self, time_s: Floats) -> slice:
+        """The samples inside the window, so that axes scale to what is seen."""
+        begin, end = self.window
+        return slice(int(np.searchsorted(time_s, begin)), int(np.searchsorted(time_s, end, side="right")))
+
+
+def track(view: View, path: Path) -> None:
+    """Load track in three dimensions."""
+    figure = new_figure(9.0, 6.4)
+    draw_track(figure, view.samples, (0.0, 0.0, 0.91, 0.92), (0.915, 0.22, 0.014, 0.5))
+    figure.text(0.03, 0.945, "Load track", fontsize=12, weight="bold")
+    figure.text(
+        0.03,
+        0.908,
+        "dashed: desired · grey: cable, shadow, and the load before and after the mission",
+        fontsize=9,
+    )
+    save(figure, path)
+
+
+def position(view: View, path: Path) -> None:
+    """Desired and true position and velocity of the load per axis."""
+    figure, axes = rows(11.0, 6.2, 3, 2)
+    s = view.samples
+    seen = view.visible(s.time_s)
+    columns = (
+        ("position (m)", s.actual_m, s.desired_m),
+        ("velocity (m/s)", s.actual_m_s, s.desired_m_s),
+    )
+    for column, (what, actual, desired) in enumerate(columns):
+        for i, axis in enumerate(AXES):
+            ax = axes[i, column]
+            draw(ax, s.time_s[seen], actual[seen, i], color=BLUE, linewidth=1.8, label="true")
+            draw(
+                ax,
+                s.time_s[seen],
+                desired[seen, i],
+                color=INK,
+                linewidth=1.0,
+                linestyle=(0, (4, 3)),
+                label="desired",
+            )
+            ax.set_ylabel(f"{axis[0]} {what}" if column else f"{axis} (m)")
+            _least_range(ax, 0.1)
+            note_if_empty(ax)
+        axes[0, column].set_title("Load " + what.split(" ")[0])
+        view.shade(axes[:, column])
+        key(axes[0, column])
+    save(figure, path)
+
+
+def error(view: View, path: Path) -> None:
+    """Position and velocity error of the load per axis."""
+    figure, axes = rows(11.0, 6.2, 3, 2)
+    s = view.samples
+    seen = view.visible(s.time_s)
+    scale, unit = length_scale(s.error_m[seen])
+    believed = scale * (s.estimated_m - s.actual_m)
+    columns = (
+        ("position error", unit, scale * s.error_m),
+        ("velocity error", f"{unit}/s", scale * s.error_m_s),
+    )
+    for column, (what, shown_unit, values) in enumerate(columns):
+        for i, axis in enumerate(AXES):
+            ax = axes[i, column]
+            if column == 0:
+                draw(
+                    ax,
+                    s.time_s[seen],
+                    believed[seen, i],
+                    color=ORANGE,
+                    linewidth=0.8,
+                    alpha=0.8,
+                    label="estimate − true",
+                )
+            draw(ax, s.time_s[seen], values[seen, i], color=BLUE, label="true − desired")
+            note_if_empty(ax)
+            ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
+            ax.set_ylabel(f"{axis} ({shown_unit})")
+            _least_range(ax, 1e-3 * scale)
+        axes[0, column].set_title("Load " + what)
+        view.shade(axes[:, column])
+        key(axes[0, column])
+    save(figure, path)
+
+
+def angles(view: View, path: Path) -> None:
+    """Cable angles and attitude of the vehicle, both true."""
+    figure, axes = rows(10.0, 5.6, 2)
+    cable, vehicle = axes[:, 0]
+    load, attitude = view.telemetry.load_truth, view.telemetry.attitude_truth
+    seen = view.visible(load.time_s)
+    swung = np.degrees(cable_angles(load.q_cable[seen]))
+    for i, (name, colour) in enumerate((("φ_L (towards y)", BLUE), ("θ_L (towards −x)", RED))):
+        draw(cable, load.time_s[seen], swung[:, i], color=colour, label=_letters(name))
+    seen = view.visible(attitude.time_s)
+    turned = np.degrees(roll_pitch_yaw(attitude.quat_wxyz[seen]))
+    for i, (name, colour) in enumerate((("roll", BLUE), ("pitch", RED), ("yaw", GREEN))):
+        draw(vehicle, attitude.time_s[seen], turned[:, i], color=colour, label=name)
+    for ax, title in ((cable, "Cable from vertical"), (vehicle, "Vehicle attitude")):
+        ax.set_title(title)
+        ax.set_ylabel("angle (°)")
+        _least_range(ax, 1.0)
+        note_if_empty(ax)
+        key(ax)
+    figure.subplots_adjust(hspace=0.3)
+    view.shade((cable, vehicle))
+    save(figure, path)
+
+
+def psi(view: View, path: Path) -> None:
+    """Error functions of vehicle attitude and load attitude."""
+    figure, axes = rows(10.0, 5.0, 2)
+    cascade = view.telemetry.cascade
+    seen = view.visible(cascade.time_s)
+    for ax, values, name, title, colour in (
+        (axes[0, 0], cascade.psi_R, "Ψ_R", "Vehicle attitude error function", BLUE),
+        (axes[1, 0], cascade.psi_q, "Ψ_q", "Load attitude error function", RED),
+    ):
+        draw(ax, cascade.time_s[seen], values[seen], color=colour)
+        ax.set_title(title)
+        ax.set_ylabel(_letters(name))
+        ax.set_ylim(bottom=0.0)
+        note_if_empty(ax)
+    figure.subplots_adjust(hspace=0.34)
+    view.shade(axes[:, 0])
+    save(figure, path)
+
+
+def rotors(view: View, path: Path) -> None:
+    """Force of each rotor, command and truth, with its limits and where they cut a command."""
+    figure, axes = rows(11.0, 5.8, 2, 2, share_y=True)
+    for i, ax in enumerate(axes.flat):
+        _rotor(view, ax, i)
+        ax.set_title(f"Rotor {i + 1}")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("force (N)")
+    figure.subplots_adjust(hspace=0.26)
+    view.shade(axes[:, 0])
+    view.shade(axes[:, 1])
+    key(axes[0, 1])
+    save(figure, path)
+
+
+def _rotor(view: View, ax: Any, i: int) -> None:
+    true, commanded = view.telemetry.rotors_truth, view.telemetry.rotors_commanded
+    seen = view.visible(commanded.time_s)
+    t = commanded.time_s[seen]
+    draw(ax, t, commanded.force_n[seen, i], color=FAINT, linewidth=0.8, label="command")
+    of_truth = view.visible(true.time_s)
+    draw(ax, true.time_s[of_truth], true.force_n[of_truth, i], color=ROTORS[i], linewidth=1.2, label="true")
+    note_if_empty(ax)
+    _limits(view, ax)
+    cut = (commanded.saturated[seen] >> i & 1) == 1
+    least = _SEEN * (view.window[1] - view.window[0])
+    spans = true_spans(t, cut, least)
+    if spans:
+        ax.broken_barh(
+            spans,
+            (0.0, 1.0),
+            transform=ax.get_xaxis_transform(),
+            color=RED,
+            alpha=0.35,
+            linewidth=0.0,
+            zorder=1.5,
+            label="saturated",
+        )
+
+
+def _limits(view: View, ax: Any) -> None:
+    """The limits of a rotor, where there are any."""
+    track = view.telemetry.rotors_commanded
+    if not len(track.time_s):
+        track = view.telemetry.rotors_truth
+    for values in (track.force_min_n, track.force_max_n):
+        if len(values) and np.isfinite(values[-1]):
+            ax.axhline(float(values[-1]), color=RED, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
+
+
+def tension(view: View, path: Path) -> None:
+    """Cable tension over the whole flight, slack marked."""
+    figure, axes = rows(10.0, 3.6, 1)
+    ax = axes[0, 0]
+    load, s = view.telemetry.load_truth, view.samples
+    draw(ax, load.time_s, load.tension_n, color=PURPLE, label="tension")
+    begin, end = view.whole
+    slack = true_spans(load.time_s, load.taut == 0, _SEEN * (end - begin))
+    if slack:
+        ax.broken_barh(
+            slack,
+            (0.0, 0.035),
+            transform=ax.get_xaxis_transform(),
+            color=INK,
+            alpha=0.75,
+            linewidth=0.0,
+            label="slack",
+        )
+    went = np.append(False, np.diff(load.slack_events) != 0) & np.isin(s.phase, CARRIED)
+    if went.any():
+        ax.plot(
+            load.time_s[went],
+            np.full(int(went.sum()), 0.08),
+            transform=ax.get_xaxis_transform(),
+            linestyle="",
+            marker="v",
+            color=RED,
+            markersize=7,
+            label="went slack while carried",
+        )
+    ax.set_title("Cable tension")
+    ax.set_ylabel("tension (N)")
+    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
+    note_if_empty(ax)
+    key(ax)
+    view.shade((ax,), view.whole)
+    save(figure, path)
+
+
+def overview(view: View, path: Path) -> None:
+    """Track, error and rotors in one picture, for a reader in a hurry."""
+    figure = new_figure(13.0, 6.2)
+    draw_track(figure, view.samples, (0.0, 0.0, 0.475, 0.89), (0.503, 0.22, 0.009, 0.5))
+    s = view.samples
+    above = figure.add_axes((0.605, 0.51, 0.38, 0.32))
+    below = figure.add_axes((0.605, 0.095, 0.38, 0.32), sharex=above)
+    seen = view.visible(s.time_s)
+    scale, unit = length_scale(s.error_m[seen])
+    for i, colour in enumerate((RED, BLUE, GREEN)):
+        draw(above, s.time_s[seen], scale * s.error_m[seen, i], color=colour, label=AXES[i][0])
+    above.set_title("Load position error")
+    above.set_ylabel(f"true − desired ({unit})")
+    above.tick_params(labelbottom=False)
+    true = view.telemetry.rotors_truth
+    of_truth = view.visible(true.time_s)
+    for i, colour in enumerate(ROTORS):
+        draw(
+            below,
+            true.time_s[of_truth],
+            true.force_n[of_truth, i],
+            color=colour,
+            linewidth=0.9,
+            alpha=0.9,
+            label=str(i + 1),
+        )
+    for ax in (above, below):
+        note_if_empty(ax)
+        key(ax)
+    _limits(view, below)
+    below.set_title("Rotor forces and limits")
+    below.set_ylabel("force (N)")
+    below.set_xlabel("vehicle clock (s)")
+    view.shade((above, below))
+    figure.text(0.022, 0.93, headline(view.meta), fontsize=15, weight="bold")
+    figure.text(0.022, 0.887, summary_line(view.record), fontsize=10, color=GREY)
+    save(figure, path)
+
+
+def headline(meta: FlightMeta) -> str:
+    """The name of the flight."""
+    return meta.title or meta.mission or "Flight"
+
+
+def summary_line(record: Record) -> str:
+    """The flight in one line."""
+    parts = [str(record["outcome"])]
+    parts += [f"{name} {record[name]}" for name in ("law", "sensors", "seed") if record[name] is not None]
+    worst, rms = (shown(KEY[name], record) for name in ("load_error_max_m", "load_error_rms_m"))
+    if record["load_error_max_m"] is not None:
+        parts.append(f"load error max {worst}, RMS {rms}")
+    if record["saturated_fraction"] is not None:
+        parts.append(f"rotors saturated {100.0 * record['saturated_fraction']:.1f} %")
+    return "  ·  ".join(parts)
+
+
+def _letters(name: str) -> str:
+    """A letter with its subscript set as such: Ψ_R."""
+    letters = {"Ψ": r"\Psi", "φ": r"\varphi", "θ": r"\theta"}
+    symbol, _, rest = name.partition(" ")
+    letter, _, index = symbol.partition("_")
+    return f"${letters[letter]}_{index}$" + (f" {rest}" if rest else "")
+
+
+def _least_range(ax: Any, least: float) -> None:
+    """Keeps rounding noise from filling a picture: an axis spans at least `least`."""
+    low, high = ax.get_ylim()
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        ax.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+
+
+class Picture:
+    """A picture's file name, its caption, and what draws it."""
+
+    def __init__(self, name: str, caption: str, draw_it: Callable[[View, Path], None]) -> None:
+        self.file = f"{name}.png"
+        self.caption = caption
+        self.draw = draw_it
+
+
+PICTURES: tuple[Picture, ...] = (
+    Picture("overview", "Track, load position error and rotor forces.", overview),
+    Picture("track", "The load's path, coloured by its distance from the desired path.", track),
+    Picture("position", "Position and velocity of the load, desired and true.", position),
+    Picture("error", "Error of the load, and how far the autopilot's estimate is from the truth.", error),
+    Picture(
+        "angles",
+        "Cable angles and vehicle attitude (truth); roll, pitch and yaw turn FLU into ENU.",
+        angles,
+    ),
+    Picture("psi", "Error functions of the cascade, as the autopilot computes them; 0 to 2.", psi),
+    Picture("rotors", "Rotor forces with their limits; red where a limit cut the command.", rotors),
+    Picture("tension", "Cable tension over the whole flight; black where the cable is slack.", tension),
+)
+
+
+def draw_pictures(view: View, directory: Path, done: Callable[[Picture], None]) -> None:
+    """Writes every picture into `directory`; `done` is told after each."""
+    with style():
+        for picture in PICTURES:
+            picture.draw(view, directory / picture.file)
+            done(picture)

@@ -1,0 +1,33 @@
+"""The record as a table for the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from gcs.analysis.record import GROUPS, Record, shown
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_OUTCOME_STYLES = {"completed": "bold green", "diverged": "bold red", "failsafe": "bold red"}
+
+
+def record_table(record: Record) -> Table:
+    """What is known of a flight, a section per group; groups of which nothing is known are left out."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, show_header=False, pad_edge=False)
+    table.add_column(style="dim")
+    table.add_column()
+    table.add_column(justify="right")
+    for group in GROUPS:
+        known = [key for key in group.keys if record.get(key.name) is not None]
+        for i, key in enumerate(known):
+            # values are data, not markup: a mission path may hold brackets
+            value = Text(shown(key, record))
+            if key.name == "outcome":
+                value.stylize(_OUTCOME_STYLES.get(str(record[key.name]), "bold yellow"))
+            table.add_row(group.title if i == 0 else "", key.label, value, end_section=i == len(known) - 1)
+    return table

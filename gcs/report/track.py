@@ -1,0 +1,169 @@
+"""The load track in three dimensions, with what hangs on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcs.analysis.axes import Floats, body_axes
+from gcs.analysis.samples import Samples
+from gcs.report.style import GREY, INK, PALE, SHADOW, length_scale
+
+_SNAPSHOTS = 7
+_APART = 0.1  # of the diagonal of the box: least distance between two snapshots
+_ARM = 0.05  # of the longest side of the box: arms are drawn longer than they are
+_POINTS = 1500  # of a line in space: each segment is projected and coloured on its own
+_LONGEST = 3.5  # the longest side of the box over the shortest; beyond, the axes are not to scale
+_LEAST_M = 1.2  # of a side of the box
+_NEAR_GROUND = 0.25  # of the height of the box: nearer than that, the box stands on the ground
+_FAR_M = 1e3  # a flight that was lost may end anywhere; the picture keeps to what is near
+_LABELS = 0.14  # of a room: ticks and labels outside the box
+
+Indices = NDArray[np.intp]
+Room = tuple[float, float, float, float]  # left, bottom, width, height, as parts of the figure
+
+
+def snapshots(position: Floats, apart: float) -> list[int]:
+    """Indices of positions (n, 3) more than `apart` from each other: each the farthest from all before."""
+    if len(position) == 0:
+        return []
+    chosen = [0]
+    distance = np.linalg.norm(position - position[0], axis=1)
+    while len(chosen) < _SNAPSHOTS:
+        farthest = int(np.argmax(distance))
+        if distance[farthest] <= apart:
+            break
+        chosen.append(farthest)
+        distance = np.minimum(distance, np.linalg.norm(position - position[farthest], axis=1))
+    return chosen
+
+
+def draw_track(figure: Any, samples: Samples, room: Room, bar_room: Room) -> None:
+    """Desired and true path of the load, coloured by error in the mission; rooms are parts of the figure."""
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    ax = figure.add_axes(room, projection="3d")
+    known = np.asarray((np.abs(samples.actual_m) < _FAR_M).all(axis=1))  # false for NaN
+    mission = known & samples.in_mission
+    if not known.any():
+        ax.set_axis_off()
+        ax.text2D(0.5, 0.5, "not in the log", transform=ax.transAxes, ha="center", color=GREY)
+        return
+    low, high = _frame(ax, samples, np.flatnonzero(mission if mission.any() else known))
+    _fit(figure, ax, room, low, high)
+
+    whole = _thin(np.flatnonzero(known))
+    # lines in space are not cut at the box
+    quiet = samples.actual_m[whole]
+    beyond = np.any((quiet < low) | (quiet > high), axis=1, keepdims=True)
+    ax.plot(*np.where(beyond, np.nan, quiet).T, color=GREY, linewidth=0.9, alpha=0.7)
+    path = samples.actual_m[_thin(np.flatnonzero(mission))]
+    ax.plot(path[:, 0], path[:, 1], np.full(len(path), low[2]), color=SHADOW, linewidth=1.6, zorder=0)
+    tracked = _thin(np.flatnonzero(mission & np.isfinite(samples.desired_m).all(axis=1)))
+    if len(tracked) > 1:
+        error_m = np.linalg.norm(samples.error_m[tracked], axis=1)
+        scale, unit = length_scale(error_m)
+        error = scale * error_m
+        path = samples.actual_m[tracked]
+        ax.plot(*samples.desired_m[tracked].T, color=INK, linewidth=0.8, linestyle=(0, (4, 4)), zorder=4)
+        coloured = Line3DCollection(
+            np.stack((path[:-1], path[1:]), axis=1),
+            cmap="viridis_r",
+            norm=Normalize(0.0, max(float(error.max()), 1e-6)),
+            linewidths=2.6,
+            zorder=3,
+        )
+        coloured.set_array(0.5 * (error[:-1] + error[1:]))
+        ax.add_collection3d(coloured, autolim=False)
+        bar = figure.colorbar(coloured, cax=figure.add_axes(bar_room))
+        bar.set_label(f"load position error ({unit})", fontsize=9)
+        bar.outline.set_visible(False)
+        bar.ax.tick_params(labelsize=8, length=0)
+    _hang(ax, samples, np.flatnonzero(mission), low, high)
+
+
+def _thin(index: Indices) -> Indices:
+    return index[:: max(1, len(index) // _POINTS)]
+
+
+def _frame(ax: Any, samples: Samples, shown: Indices) -> tuple[Floats, Floats]:
+    """Limits around load and vehicle, to scale unless the scene is very long; least and greatest corner."""
+    points = np.concatenate((samples.actual_m[shown], samples.vehicle_m[shown]))
+    points = points[(np.abs(points) < _FAR_M).all(axis=1)]
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = np.maximum(1.1 * (high - low), _LEAST_M)
+    middle = 0.5 * (low + high)
+    low, high = middle - 0.5 * size, middle + 0.5 * size
+    if 0.0 < low[2] < _NEAR_GROUND * size[2]:
+        low[2] = 0.0
+    size = high - low
+    ax.set_xlim(low[0], high[0])
+    ax.set_ylim(low[1], high[1])
+    ax.set_zlim(low[2], high[2])
+    ax.set_box_aspect(_box(size))
+    ax.view_init(elev=17, azim=-38)
+    for axis, name in ((ax.xaxis, "x east (m)"), (ax.yaxis, "y north (m)"), (ax.zaxis, "z up (m)")):
+        axis.set_label_text(name, fontsize=9)
+        axis.set_pane_color((0.965, 0.97, 0.975, 1.0))
+        axis.line.set_color(PALE)
+        axis.set_major_locator(_ticks())
+        axis.labelpad = 1
+    ax.tick_params(pad=-1, labelsize=8)
+    return low, high
+
+
+def _ticks() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=5, steps=[1, 2, 5, 10])
+
+
+def _fit(figure: Any, ax: Any, room: Room, low: Floats, high: Floats) -> None:
+    """Zooms and moves the axes so that the box, of whatever shape, fills its room but for the labels."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)]).T
+
+    def extent() -> tuple[Floats, Floats]:
+        """Least and greatest corner of the box in the figure, as parts of it."""
+        ax.apply_aspect()
+        flat = np.stack(proj_transform(*corners, ax.get_proj())[:2], axis=-1)
+        placed = figure.transFigure.inverted().transform(ax.transData.transform(flat))
+        return placed.min(axis=0), placed.max(axis=0)
+
+    least, greatest = extent()
+    wanted = np.array(room[2:]) * (1.0 - _LABELS)
+    ax.set_box_aspect(ax._box_aspect, zoom=float((wanted / (greatest - least)).min()))
+    # set_box_aspect normalises again: the shape stays, the size is new
+    least, greatest = extent()
+    x, y = np.array(room[:2]) + 0.5 * np.array(room[2:]) - 0.5 * (least + greatest)
+    ax.set_position((room[0] + x, room[1] + y, room[2], room[3]))
+
+
+def _hang(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats) -> None:
+    """Vehicle, cable and load at some instants."""
+    box = _box(high - low)
+    stretch = (high - low) / box
+    mission = mission[np.isfinite(samples.vehicle_m[mission]).all(axis=1)]
+    apart = _APART * float(np.linalg.norm(box))
+    chosen = mission[snapshots(samples.actual_m[mission] / stretch, apart)]
+    # arms keep their shape in the picture where the axes are not to scale
+    reach = _ARM * float(box.max()) * stretch
+    forward, left = body_axes(samples.quat_wxyz[chosen])
+    for i, index in enumerate(chosen):
+        load, vehicle = samples.actual_m[index], samples.vehicle_m[index]
+        ax.plot(*np.stack((load, vehicle)).T, color=GREY, linewidth=0.9, zorder=5)
+        ax.plot(*load[:, None], marker="o", markersize=5, color=INK, zorder=6)
+        if not np.isfinite(forward[i]).all():
+            continue
+        for axis in (forward[i], left[i]):
+            ends = np.stack((vehicle - reach * axis, vehicle + reach * axis))
+            ax.plot(*ends.T, color=INK, linewidth=1.8, marker="o", markersize=2.8, zorder=6)
+
+
+def _box(size: Floats) -> Floats:
+    """(3,) sides of the box as drawn: those of the scene, the longest shortened."""
+    return np.asarray(np.minimum(size, _LONGEST * size.min()))

@@ -1,0 +1,117 @@
+"""What a mission is: a list of steps for the load, in world ENU (x east, y north, z up), SI units, from home.
+
+Plain data without behaviour: the file format (`missions.fileformat`), the mission items on the wire, the
+autopilot and the feasibility check all speak of these records. A step is flown when the one before is done.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Axis = Literal["x", "y", "z"]
+Controlled = Literal["vehicle", "load"]
+
+
+@dataclass(frozen=True, slots=True)
+class Takeoff:
+    """Pull the cable taut above the load and lift it straight up, to `altitude_m` above home."""
+
+    altitude_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """Carry the load to a point, from rest to rest, and hold it there for `hold_s` seconds."""
+
+    east_m: float
+    north_m: float
+    altitude_m: float
+    hold_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """Peak speed of the load on the transfers that follow."""
+
+    speed_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """Hold the load where it hangs."""
+
+    duration_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnHome:
+    """Carry the load over its home, at the height it has."""
+
+
+@dataclass(frozen=True, slots=True)
+class Land:
+    """Lower the load to the ground and land the vehicle beside it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sine:
+    """sin(2 pi (t - start_s) / period_s + phase_rad), t in seconds since the signals began."""
+
+    period_s: float
+    phase_rad: float = 0.0
+    start_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """amplitude_m * envelope(t) * product of factors, added to one axis of the load's path.
+
+    The envelope is 0 before `start_s`, rises to 1 along half a cosine in `rise_s`, stays for `hold_s` (None:
+    for ever), and falls back to 0 along half a cosine in `fall_s`. A rise or fall of 0 s is a jump.
+    """
+
+    axis: Axis
+    amplitude_m: float
+    start_s: float
+    rise_s: float
+    hold_s: float | None
+    fall_s: float
+    factors: tuple[Sine, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """Fly the sum of the terms for `duration_s`, from where the load's setpoint is when the step begins."""
+
+    duration_s: float
+    terms: tuple[Term, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeRun:
+    """Swing an attitude out and back: angle(t) = tilt * sin^2(pi t / duration_s), t from 0 to `duration_s`.
+
+    `controlled` is the vehicle (its thrust axis leans) or the load (the line from load to vehicle leans). A
+    positive tilt leans towards north or east, and so pulls the load that way; both together lean by the
+    root of the sum of their squares. `missions.swing` has the direction and its derivatives.
+    """
+
+    controlled: Controlled
+    tilt_north_rad: float
+    tilt_east_rad: float
+    duration_s: float
+
+
+Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Signals | AttitudeRun
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """A named list of steps. `assumptions` states each value that was chosen and not found in the source."""
+
+    name: str
+    title: str
+    description: str
+    assumptions: tuple[str, ...]
+    steps: tuple[Step, ...]

@@ -1,0 +1,154 @@
+"""The keys of a mission file, their units and bounds, and the steps they stand for.
+
+Every number is finite, every key known. A key ends in its unit. `Field.description` says in a few words what
+the value is; error messages and the documentation quote it.
+"""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from missions import model
+
+LONGEST_S = 3600.0
+FARTHEST_M = 1000.0
+
+Seconds = Annotated[float, Field(ge=0.0, le=LONGEST_S)]
+PositiveSeconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
+# The vehicle evaluates its path every few milliseconds: a faster wave or a steeper edge is a typing mistake.
+EdgeSeconds = Annotated[float, Field(ge=0.1, le=LONGEST_S)]
+Metres = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
+Height = Annotated[float, Field(gt=0.0, le=FARTHEST_M, description="height of the load above home")]
+Degrees = Annotated[float, Field(gt=-90.0, lt=90.0)]
+
+
+class Spec(BaseModel):
+    """Strict: no unknown keys, no silent conversion, no nan and no infinity."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    # keys that hold a list of tables, and what a table of it may say
+    nested: ClassVar[dict[str, type[Spec]]] = {}
+
+
+class Item(Spec):
+    """One [[items]] table; its `type` has been taken off."""
+
+    def step(self) -> model.Step:
+        """The step it stands for."""
+        raise NotImplementedError
+
+
+class TakeoffItem(Item):
+    altitude_m: Height
+
+    def step(self) -> model.Step:
+        return model.Takeoff(self.altitude_m)
+
+
+class WaypointItem(Item):
+    east_m: Metres = Field(description="east of home")
+    north_m: Metres = Field(description="north of home")
+    altitude_m: Height
+    hold_s: Seconds = Field(0.0, description="time to hold there")
+
+    def step(self) -> model.Step:
+        return model.Waypoint(self.east_m, self.north_m, self.altitude_m, self.hold_s)
+
+
+class SpeedItem(Item):
+    speed_m_s: float = Field(gt=0.0, le=20.0, description="peak speed on the transfers that follow")
+
+    def step(self) -> model.Step:
+        return model.Speed(self.speed_m_s)
+
+
+class DelayItem(Item):
+    duration_s: PositiveSeconds = Field(description="time to hold the load where it hangs")
+
+    def step(self) -> model.Step:
+        return model.Delay(self.duration_s)
+
+
+class ReturnItem(Item):
+    def step(self) -> model.Step:
+        return model.ReturnHome()
+
+
+class LandItem(Item):
+    def step(self) -> model.Step:
+        return model.Land()
+
+
+class SineSpec(Spec):
+    period_s: float = Field(ge=0.1, le=2000.0, description="period of the sine")
+    phase_deg: float = Field(0.0, ge=-360.0, le=360.0, description="phase at start_s")
+    start_s: Seconds = Field(0.0, description="time of the phase, from the beginning of the signals")
+
+    def sine(self) -> model.Sine:
+        return model.Sine(self.period_s, radians(self.phase_deg), self.start_s)
+
+
+class TermSpec(Spec):
+    nested: ClassVar[dict[str, type[Spec]]] = {"factors": SineSpec}
+    axis: Literal["x", "y", "z"] = Field(description="x east, y north, z up")
+    amplitude_m: Metres = Field(description="height of the envelope")
+    start_s: Seconds = Field(0.0, description="beginning of the rise, from the beginning of the signals")
+    rise_s: EdgeSeconds = Field(description="duration of the half-cosine rise")
+    hold_s: Seconds | None = Field(None, description="time at the top; leave out with fall_s to stay there")
+    fall_s: EdgeSeconds | None = Field(None, description="duration of the half-cosine fall")
+    factors: list[SineSpec] = Field(default_factory=list, max_length=3)
+
+    @model_validator(mode="after")
+    def _hold_and_fall_belong_together(self) -> TermSpec:
+        if (self.hold_s is None) != (self.fall_s is None):
+            raise ValueError("needs hold_s and fall_s, both or neither (neither: it stays at the top)")
+        return self
+
+    def term(self) -> model.Term:
+        factors = tuple(factor.sine() for factor in self.factors)
+        fall_s = 0.0 if self.fall_s is None else self.fall_s
+        return model.Term(
+            self.axis, self.amplitude_m, self.start_s, self.rise_s, self.hold_s, fall_s, factors
+        )
+
+
+class SignalsItem(Item):
+    nested: ClassVar[dict[str, type[Spec]]] = {"terms": TermSpec}
+    duration_s: PositiveSeconds = Field(description="duration of the whole trajectory")
+    terms: list[TermSpec] = Field(min_length=1, max_length=32)
+
+    def step(self) -> model.Step:
+        return model.Signals(self.duration_s, tuple(term.term() for term in self.terms))
+
+
+class AttitudeItem(Item):
+    controlled: Literal["vehicle", "load"] = Field(description="whose attitude is tracked")
+    tilt_north_deg: Degrees = Field(0.0, description="largest tilt towards north")
+    tilt_east_deg: Degrees = Field(0.0, description="largest tilt towards east")
+    duration_s: EdgeSeconds = Field(description="duration of the swing out and back")
+
+    def step(self) -> model.Step:
+        north, east = radians(self.tilt_north_deg), radians(self.tilt_east_deg)
+        return model.AttitudeRun(self.controlled, north, east, self.duration_s)
+
+
+ITEMS: dict[str, type[Item]] = {
+    "takeoff": TakeoffItem,
+    "waypoint": WaypointItem,
+    "speed": SpeedItem,
+    "delay": DelayItem,
+    "signals": SignalsItem,
+    "attitude": AttitudeItem,
+    "return": ReturnItem,
+    "land": LandItem,
+}
+
+
+class FileSpec(Spec):
+    title: str = Field(min_length=1, max_length=120, description="one line for lists and reports")
+    description: str = Field("", description="what the mission is for")
+    assumptions: list[str] = Field(default_factory=list, description="values chosen, one sentence each")
+    items: list[dict[str, Any]] = Field(min_length=1, max_length=1000, description="the [[items]] in order")

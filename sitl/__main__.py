@@ -1,0 +1,408 @@
+"""The `sitl` program: sockets, clock and signals around `sitl.hil`."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import gc
+import os
+import select
+import signal
+import socket
+import struct
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+import click
+
+from autopilot.wire.convert import Home, home_from_text
+from sitl.hil import HilSimulator
+from sitl.pacing import Pacing
+
+Address = tuple[str, int]
+
+_RESEND_FIRST_S = 0.05
+_RESEND_LAST_S = 1.0
+_LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
+_SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
+_STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
+_PR_SET_TIMERSLACK = 29
+_LARGEST_DATAGRAM = 65535
+
+
+class Stop(BaseException):
+    """SIGTERM or SIGINT."""
+
+
+class Link:
+    """The socket that autopilots speak to, the one that is served, and where truth goes."""
+
+    def __init__(self, listen: Address, truth: Address) -> None:
+        try:
+            self._socket = _datagram_socket(listen)
+            self._socket.bind(listen)
+        except OSError as error:
+            busy = "is another sitl running? " if error.errno == errno.EADDRINUSE else ""
+            raise ValueError(
+                f"cannot listen on {_shown(listen)}: {_reason(error)}; {busy}choose another with --listen"
+            ) from None
+        try:
+            self._truth_socket = _datagram_socket(truth)
+        except OSError as error:
+            raise ValueError(
+                f"cannot send truth to {_shown(truth)}: {_reason(error)}; choose another with --truth"
+            ) from None
+        self._truth = truth
+        self._timeout_s = 0.0
+        self.peer: Address | None = None
+
+    def close(self) -> None:
+        self._socket.close()
+        self._truth_socket.close()
+
+    def timeout(self, seconds: float) -> None:
+        """How long `receive` waits; 0: for ever. By SO_RCVTIMEO, which costs nothing per datagram."""
+        if seconds != self._timeout_s:
+            whole = int(seconds)
+            value = struct.pack("ll", whole, round((seconds - whole) * 1e6))
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
+            self._timeout_s = seconds
+
+    def wait(self, seconds: float) -> None:
+        """Until a datagram is there, or so long."""
+        select.select([self._socket], [], [], seconds)
+
+    def receive(self, flags: int = 0) -> tuple[bytes, Address] | None:
+        """The next datagram and its sender, None after the timeout."""
+        try:
+            return self._socket.recvfrom(_LARGEST_DATAGRAM, flags)
+        except OSError:  # nothing came, or a datagram of ours found no listener: the same to us
+            return None
+
+    def send(self, simulator: HilSimulator) -> None:
+        """The sensors of the present tick to the autopilot. What cannot be sent counts as lost on the way."""
+        if self.peer is not None:
+            with suppress(OSError):
+                self._socket.sendto(simulator.sensor_datagram(), self.peer)
+
+    def send_truth(self, simulator: HilSimulator) -> None:
+        """The truth of the present tick, if there is any."""
+        truth = simulator.truth_datagram()
+        if truth is not None:
+            with suppress(OSError):
+                self._truth_socket.sendto(truth, self._truth)
+
+    def take(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
+        """Hand a datagram on. True if it is a heartbeat: its sender is served from now on."""
+        if sender == self.peer and simulator.receive(datagram):
+            return False
+        if simulator.greets(datagram):
+            self.peer = sender
+            return True
+        return False
+
+
+class Watch:
+    """Says when the autopilot falls silent and when it is back, once each."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._heard = time.monotonic()
+        self._lost = False
+
+    def heard(self, link: Link) -> None:
+        """An answer came."""
+        self._heard = time.monotonic()
+        if self._lost:
+            self._lost = False
+            self._say(f"autopilot at {_shown(link.peer)} answers again")
+
+    def silence(self, link: Link, simulator: HilSimulator) -> None:
+        """No answer so far."""
+        if not self._lost and time.monotonic() - self._heard > _LOST_S:
+            self._lost = True
+            self._say(
+                f"no answer from the autopilot at {_shown(link.peer)} for {_LOST_S:g} s "
+                f"(t = {simulator.now_us / 1e6:.3f} s); waiting for it"
+            )
+
+
+def meet(link: Link, simulator: HilSimulator, say: Callable[[str], None]) -> None:
+    """Wait until an autopilot speaks."""
+    link.timeout(0.0)
+    while link.peer is None:
+        arrived = link.receive()
+        if arrived:
+            link.take(*arrived, simulator)
+    say(f"serving the autopilot at {_shown(link.peer)}")
+
+
+def run_lockstep(link: Link, simulator: HilSimulator, say: Callable[[str], None]) -> None:
+    """Tick for ever, each tick as soon as the one before is answered."""
+    watch = Watch(say)
+    lost = False
+    while True:
+        link.send_truth(simulator)
+        link.send(simulator)
+        sent = time.monotonic() if lost else 0.0
+        silence_s = _RESEND_FIRST_S
+        link.timeout(silence_s)
+        while not simulator.answered:
+            arrived = link.receive()
+            greeted = arrived is not None and link.take(*arrived, simulator)
+            if simulator.answered:
+                break
+            # from here on something is odd, and time may be spent on it
+            watch.silence(link, simulator)
+            lost = True
+            now = time.monotonic()
+            if arrived is None or greeted or now - sent > silence_s:
+                link.send(simulator)
+                sent = now
+                silence_s = min(2.0 * silence_s, _RESEND_LAST_S)
+                link.timeout(silence_s)
+        if lost:
+            watch.heard(link)
+            lost = False
+        simulator.advance()
+
+
+def run_real_time(
+    link: Link, simulator: HilSimulator, speed: float, pacing: Pacing, say: Callable[[str], None]
+) -> None:
+    """Tick for ever on an absolute schedule; a command that comes too late is missed, and counted."""
+    watch = Watch(say)
+    period_ns = simulator.tick_us * 1000 / speed
+    start = time.perf_counter_ns()
+    tick = 0
+    while True:
+        due = start + round(tick * period_ns)
+        now = _sleep_until(due)
+        link.send(simulator)
+        link.send_truth(simulator)
+        pacing.record(due, now)
+        simulator.pacing = pacing.figures
+        if now - due > _STALL_NS:
+            start += now - due
+        tick += 1
+        if _await_answer(link, simulator, start + round(tick * period_ns)):
+            watch.heard(link)
+        else:
+            watch.silence(link, simulator)
+        simulator.advance()
+
+
+def _await_answer(link: Link, simulator: HilSimulator, due_ns: int) -> bool:
+    """Until the present tick is answered (True) or the next one is due."""
+    while True:
+        arrived = link.receive(socket.MSG_DONTWAIT)
+        if arrived:
+            link.take(*arrived, simulator)
+            if simulator.answered:
+                return True
+            continue
+        left = due_ns - time.perf_counter_ns()
+        if left <= 0:
+            return False
+        if left > _SPIN_NS:
+            link.wait((left - _SPIN_NS) * 1e-9)
+
+
+def _sleep_until(due_ns: int) -> int:
+    """Sleep, then spin over the last part; returns the time it is."""
+    left = due_ns - time.perf_counter_ns()
+    if left > _SPIN_NS:
+        time.sleep((left - _SPIN_NS) * 1e-9)
+    while True:
+        now = time.perf_counter_ns()
+        if now >= due_ns:
+            return now
+
+
+def _datagram_socket(address: Address) -> socket.socket:
+    family = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0][0]
+    return socket.socket(family, socket.SOCK_DGRAM)
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror.lower() if error.strerror else str(error)
+
+
+def _shown(address: Address | None) -> str:
+    return f"{address[0]}:{address[1]}" if address else "nowhere"
+
+
+def _prepare_process(cpu: int | None) -> None:
+    """What the operating system may do for punctuality; none of it is needed."""
+    if cpu is not None:
+        try:
+            os.sched_setaffinity(0, {cpu})
+        except (AttributeError, OSError):
+            raise ValueError(f"cannot run on core {cpu}; leave --cpu out, or name another core") from None
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    gc.collect()
+    gc.freeze()
+
+
+def _address(text: str) -> Address:
+    """HOST:PORT."""
+    host, _, port = text.rpartition(":")
+    if not (host and port.isdecimal() and 0 < int(port) < 65536):
+        raise click.BadParameter(f"{text!r}; must be HOST:PORT with a port of 1 ... 65535")
+    return host.strip("[]"), int(port)
+
+
+def _home(text: str) -> Home:
+    """LAT,LON,ALT."""
+    try:
+        return home_from_text(text)
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
+def _setting(text: str) -> tuple[str, float]:
+    """NAME=VALUE."""
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
+
+
+@click.command()
+@click.option("--sensors", default="lab", show_default=True, metavar="NAME|FILE", help="Sensor profile.")
+@click.option("--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help="What really flies.")
+@click.option(
+    "--seed", default=1, show_default=True, type=click.IntRange(0, 2**63 - 1), help="Seed of all noise."
+)
+@click.option("--lockstep", is_flag=True, help="As fast as it goes: wait for the answer to every tick.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(0.0, 1000.0, min_open=True),
+    help="Simulated seconds per second.  [default: 1]",
+)
+@click.option(
+    "--listen",
+    type=_address,
+    metavar="HOST:PORT",
+    default="127.0.0.1:4560",
+    show_default=True,
+    help="Where autopilots find us.",
+)
+@click.option(
+    "--truth",
+    type=_address,
+    metavar="HOST:PORT",
+    default="127.0.0.1:14560",
+    show_default=True,
+    help="Where the truth goes, for logs and reports.",
+)
+@click.option(
+    "--truth-every",
+    type=click.IntRange(1, 1000),
+    default=2,
+    show_default=True,
+    metavar="N",
+    help="Truth on every Nth tick.",
+)
+@click.option(
+    "--set",
+    "settings",
+    type=_setting,
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are passed over.",
+)
+@click.option("--home", type=_home, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@click.option("--cpu", type=click.IntRange(0), metavar="N", help="Run on this processor core only.")
+@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+@click.version_option(package_name="plumbline", message="sitl (Plumbline) %(version)s")
+def main(
+    sensors: str,
+    vehicle: str,
+    seed: int,
+    lockstep: bool,
+    speed: float | None,
+    listen: Address,
+    truth: Address,
+    truth_every: int,
+    settings: tuple[tuple[str, float], ...],
+    home: Home | None,
+    cpu: int | None,
+    quiet: bool,
+) -> None:
+    """Simulate a quadrotor with a load on a cable, and its sensors.
+
+    Waits for an autopilot, sends it sensor readings and takes rotor commands back, by MAVLink over UDP.
+    """
+    if lockstep and speed is not None:
+        raise click.UsageError("--lockstep goes as fast as it can; leave --speed out")
+
+    def say(text: str) -> None:
+        if not quiet:
+            print(f"sitl: {text}", flush=True)
+
+    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGINT, _stop)
+    link: Link | None = None
+    factor = 1.0 if speed is None else speed
+    pacing = Pacing(factor)
+    simulator: HilSimulator | None = None
+    began = time.monotonic()
+    try:
+        link = Link(listen, truth)  # first, so that nothing is said into the void while kernels are compiled
+
+        def build() -> HilSimulator:
+            return HilSimulator.build(vehicle, sensors, seed, dict(settings), home, lockstep, truth_every)
+
+        build().advance()  # compiles, or loads, every kernel
+        simulator = build()
+        _prepare_process(cpu)
+        mode = "in lockstep" if lockstep else f"at {factor:g} x real time"
+        say(
+            f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
+            f"waiting for an autopilot on {_shown(listen)}"
+        )
+        meet(link, simulator, say)
+        began = time.monotonic()
+        if lockstep:
+            run_lockstep(link, simulator, say)
+        else:
+            run_real_time(link, simulator, factor, pacing, say)
+    except ValueError as error:
+        print(f"sitl: {error}", file=sys.stderr)
+        sys.exit(1)
+    except Stop:
+        pass
+    finally:
+        if link is not None:
+            link.close()
+    if simulator is not None:
+        say(_summary(simulator, lockstep, pacing, time.monotonic() - began))
+
+
+def _stop(_signal: int, _frame: object) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise Stop
+
+
+def _summary(simulator: HilSimulator, lockstep: bool, pacing: Pacing, wall_s: float) -> str:
+    simulated_s = simulator.now_us / 1e6
+    text = f"stopped at t = {simulated_s:.3f} s; "
+    if lockstep:
+        text += f"{simulated_s / max(wall_s, 1e-9):.1f} x real time"
+    else:
+        text += pacing.summary(simulator.missed)
+    if simulator.rejected:
+        text += f"; {simulator.rejected} commands were not numbers"
+    if simulator.diverged:
+        text += "; the vehicle left the domain of the model"
+    return text
+
+
+if __name__ == "__main__":
+    main()

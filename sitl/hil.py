@@ -1,0 +1,304 @@
+"""The simulator's end of the simulator link: datagrams in, datagrams out, no socket and no clock.
+
+A tick: `sensor_datagram()` goes to the autopilot, `receive()` takes its answer, `advance()` moves the world.
+docs/sensors.md describes the link for those who connect an autopilot of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite, nan
+from typing import NamedTuple
+
+from autopilot.geometry.linear import Vec3, apply_transposed, norm, sub
+from autopilot.geometry.so3 import rotation_from_quat
+from autopilot.wire import convert
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from sitl.plant.records import Rotors
+from sitl.sensors.files import load_profile
+from sitl.sensors.imu import ImuReading
+from sitl.sensors.profile import Profile, stated_of
+from sitl.sim_core import STOPPED, Readings, SimCore, settings_of
+from sitl.truth.files import load_truth
+from sitl.truth.parameters import apply as apply_parameters
+from sitl.truth.parameters import sim_parameters
+
+VEHICLE_SYSTEM = 1
+SIMULATOR_COMPONENT = 26
+STATUS_PERIOD_US = 200_000
+# in real time the rotors stop when no command came for this long, as a speed controller without signal does
+COMMAND_TIMEOUT_US = 500_000
+
+_ZERO: Vec3 = (0.0, 0.0, 0.0)
+_TRACKER, _CAMERA, _ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
+_FIX = {"3d": mavlink.GPS_FIX_TYPE_3D_FIX, "rtk": mavlink.GPS_FIX_TYPE_RTK_FIXED}
+
+
+class PacingFigures(NamedTuple):
+    """What the shell measured of its own timeliness, for SIM_STATUS; all 0 in lockstep."""
+
+    speed_factor: float = 0.0
+    rate_hz: float = 0.0
+    late_p50_us: int = 0
+    late_p99_us: int = 0
+    late_max_us: int = 0
+
+
+def _measured(v: Vec3) -> Vec3 | None:
+    """A vector, or None if the sensor does not measure it (nan)."""
+    return v if v[0] == v[0] else None
+
+
+def pressure_pa(altitude_m: float) -> float:
+    """International standard atmosphere below 11 km; altitude above mean sea level."""
+    return float(101_325.0 * max(1.0 - 2.25577e-5 * altitude_m, 0.0) ** 5.25588)
+
+
+class HilSimulator:
+    """The simulated vehicle on the simulator link. Same arguments and datagrams in: same datagrams out."""
+
+    def __init__(
+        self, core: SimCore, profile: Profile, home: Home, lockstep: bool, truth_every: int = 2
+    ) -> None:
+        self.pacing = PacingFigures()
+        self.missed = 0  # ticks without an answer in time
+        self.rejected = 0  # controls that were not numbers
+        self.answered = False  # the present tick was
+        self._core = core
+        self._home = home
+        self._lockstep = lockstep
+        self._truth_every = truth_every
+        self._stated = stated_of(profile, core.settings.noise_scale)
+        self._fix = _FIX[profile.gnss.fix] if profile.gnss else 0
+        self._satellites = profile.gnss.satellites if profile.gnss else 0
+        encoder = profile.cable_sensor is not None and profile.cable_sensor.kind == "encoder"
+        self._cable_id = _ENCODER if encoder else _CAMERA
+        self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
+        self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
+        self._command: Rotors = STOPPED
+        self._command_us = -1  # the tick that the last command answers
+        self._inertial = ImuReading(_ZERO, _ZERO)
+        self._field = _ZERO
+        self._height = core.state.x_quad[2]
+        self._sensors = self._sensor_frames(core.readings)
+        self._truth = self._truth_frames()
+
+    @classmethod
+    def build(
+        cls,
+        vehicle: str = "bebop",
+        sensors: str = "lab",
+        seed: int = 1,
+        settings: Mapping[str, float] | None = None,
+        home: Home | None = None,
+        lockstep: bool = True,
+        truth_every: int = 2,
+    ) -> HilSimulator:
+        """From the command line's options.
+
+        Of `settings` the SIM_* are taken, but for SIM_LOSS_PCT, which belongs to the autopilot's ground link.
+        Raises ValueError with one line on what is wrong.
+        """
+        truth = load_truth(vehicle)
+        table = sim_parameters(truth)
+        for name, value in (settings or {}).items():
+            if name.startswith("SIM_") and name != "SIM_LOSS_PCT":
+                table.set(name, value)
+        profile = load_profile(sensors)
+        core = SimCore(apply_parameters(truth, table), profile, settings_of(table), seed)
+        return cls(core, profile, home or Home(), lockstep, truth_every)
+
+    @property
+    def now_us(self) -> int:
+        """Simulated time of the present tick."""
+        return self._core.now_us
+
+    @property
+    def tick_us(self) -> int:
+        """Time from tick to tick."""
+        return self._core.settings.tick_us
+
+    @property
+    def diverged(self) -> bool:
+        """The plant left the domain of its model and stands still."""
+        return self._core.state.diverged > 0.0
+
+    def sensor_datagram(self) -> bytes:
+        """What the sensors give at this tick, HIL_SENSOR last; the same bytes until `advance`."""
+        return self._sensors
+
+    def truth_datagram(self) -> bytes | None:
+        """Truth telemetry of this tick; None on the ticks between."""
+        return self._truth
+
+    def greets(self, datagram: bytes) -> bool:
+        """Is this a HEARTBEAT of the vehicle's autopilot? It asks to be served, from wherever it came."""
+        return any(
+            one.system == VEHICLE_SYSTEM and one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
+            for one in decode(datagram)[0]
+        )
+
+    def receive(self, datagram: bytes) -> bool:
+        """Take the command out of a datagram; True if the present tick has its answer now.
+
+        Whatever else a datagram may hold is ignored: other messages, systems and ticks, rubbish.
+        In real time a late command is still the newest one, and is used.
+        """
+        for one in decode(datagram)[0]:
+            if (
+                one.system != VEHICLE_SYSTEM
+                or one.message.get_msgId() != mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+            ):
+                continue
+            answer = convert.read_hil_actuator_controls(one.message)
+            current = answer.time_us == self._core.now_us
+            if not current and (self._lockstep or not self._command_us < answer.time_us < self._core.now_us):
+                continue
+            if current and self.answered:
+                continue
+            if all(map(isfinite, answer.forces)):
+                self._command = answer.forces if answer.armed else STOPPED
+            else:
+                self.rejected += 1
+            self._command_us = answer.time_us
+            self.answered = self.answered or current
+        return self.answered
+
+    def advance(self) -> None:
+        """Move the world to the next tick under the last command."""
+        if not self._lockstep:
+            if not self.answered:
+                self.missed += 1
+            if self._core.now_us - self._command_us > COMMAND_TIMEOUT_US:
+                self._command = STOPPED
+        self.answered = False
+        self._sensors = self._sensor_frames(self._core.tick(self._command))
+        self._truth = self._truth_frames()
+
+    def _sensor_frames(self, readings: Readings) -> bytes:
+        frame = self._sensor_writer.frame
+        stated = self._stated
+        frames = []
+        for time_us, pose in readings.mocap:
+            message = convert.odometry_message(
+                time_us,
+                pose.position,
+                pose.quat_wxyz,
+                _measured(pose.velocity),
+                _measured(pose.omega_body),
+                stated.mocap_position,
+                stated.mocap_attitude,
+                stated.mocap_velocity,
+            )
+            frames.append(frame(message))
+        for time_us, load in readings.load_tracker:
+            velocity = _measured(load.velocity)
+            velocity_std = nan if velocity is None else stated.load_velocity
+            message = convert.load_sensor_message(
+                time_us, load.position, velocity, None, stated.load_position, velocity_std, nan, _TRACKER
+            )
+            frames.append(frame(message))
+        for time_us, cable in readings.cable_sensor:
+            if cable.seen > 0.0:
+                message = convert.load_sensor_message(
+                    time_us, None, None, cable.direction_body, nan, nan, stated.direction, self._cable_id
+                )
+                frames.append(frame(message))
+        for time_us, fix in readings.gnss:
+            message = convert.hil_gps_message(
+                time_us,
+                self._fix,
+                fix.position,
+                fix.velocity,
+                stated.gnss_horizontal,
+                stated.gnss_vertical,
+                self._satellites,
+                home=self._home,
+            )
+            frames.append(frame(message))
+        frames.append(frame(self._hil_sensor(readings)))
+        return b"".join(frames)
+
+    def _hil_sensor(self, readings: Readings) -> object:
+        """HIL_SENSOR: what is not new keeps its last value, without its bits in fields_updated."""
+        fields = 0
+        if readings.imu:
+            self._inertial = readings.imu[-1].reading
+            fields |= convert.ACCEL | convert.GYRO
+        if readings.magnetometer:
+            self._field = readings.magnetometer[-1].reading.field_body
+            fields |= convert.MAG
+        if readings.barometer:
+            self._height = readings.barometer[-1].reading.height
+            fields |= convert.PRESSURE | convert.TEMPERATURE
+        altitude = self._home.altitude_m + self._height
+        return convert.hil_sensor_message(
+            self._core.now_us,
+            self._inertial.accel_body,
+            self._inertial.gyro_body,
+            self._field,
+            pressure_pa(altitude),
+            altitude,
+            15.0 - 0.0065 * altitude,
+            fields,
+        )
+
+    def _truth_frames(self) -> bytes | None:
+        core = self._core
+        due = core.tick_count % self._truth_every == 0
+        status_due = core.now_us % STATUS_PERIOD_US == 0
+        if not (due or status_due):
+            return None
+        frame = self._truth_writer.frame
+        frames = []
+        now_us, state, truth = core.now_us, core.state, core.truth
+        if due:
+            a = state.accel_quad
+            force = apply_transposed(rotation_from_quat(state.quat_wxyz), (a[0], a[1], a[2] + truth.gravity))
+            vehicle = convert.hil_state_quaternion_message(
+                now_us,
+                state.quat_wxyz,
+                state.omega_body,
+                state.x_quad,
+                state.v_quad,
+                norm(sub(state.v_quad, core.wind)),
+                force,
+                home=self._home,
+            )
+            load = convert.load_state_message(
+                now_us,
+                mavlink.PLUMBLINE_SOURCE_TRUTH,
+                state.x_load,
+                state.v_load,
+                state.q_cable,
+                state.q_cable_dot,
+                norm(sub(state.x_load, state.x_quad)),
+                state.tension,
+                state.taut > 0.0,
+                int(state.slack_events),
+            )
+            low, high = truth.rotor_min, truth.rotor_max
+            cut = sum(1 << i for i, f in enumerate(core.command) if not low <= f <= high)
+            rotors = convert.rotor_state_message(
+                now_us, mavlink.PLUMBLINE_SOURCE_TRUTH, state.rotor_force, low, high, cut
+            )
+            frames = [frame(vehicle), frame(load), frame(rotors)]
+        if status_due:
+            frames.append(frame(self._status()))
+        return b"".join(frames)
+
+    def _status(self) -> object:
+        pacing, state = self.pacing, self._core.state
+        return mavlink.MAVLink_sim_status_message(
+            self._core.now_us,
+            pacing.speed_factor,
+            pacing.rate_hz,
+            pacing.late_p50_us,
+            pacing.late_p99_us,
+            pacing.late_max_us,
+            self.missed,
+            int(state.vehicle_on_ground),
+            int(state.load_on_ground),
+        )

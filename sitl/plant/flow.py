@@ -1,0 +1,106 @@
+"""One Runge-Kutta step in one mode of the cable, and the projection onto the taut cable."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, axpy, dot, norm, scale, sub
+from autopilot.geometry.so3 import quat_normalise
+from sitl.plant.rates import rates
+from sitl.plant.records import Motion, Rotors, Truth
+from sitl.plant.rotors import approach, decay
+
+# classical Runge-Kutta, and a fifth evaluation at the end of the step with weight zero
+_STAGE_SHIFT = (0.0, 0.5, 0.5, 1.0)
+_STAGE_WEIGHT = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0, 0.0)
+
+
+class Flow(NamedTuple):
+    """Where a Runge-Kutta step leads."""
+
+    motion: Motion
+    rotor_force: Rotors
+    tension_before: float  # N, at the start of the step, negative if the cable would have to push
+    tension: float  # N, at its end
+    accel_quad: Vec3
+    quad_normal: float
+    load_normal: float
+
+
+@kernel
+def _shift(motion: Motion, s: float, rate: Motion) -> Motion:
+    """motion + s rate."""
+    p, d = motion.quat, rate.quat
+    return Motion(
+        axpy(s, rate.x_load, motion.x_load),
+        axpy(s, rate.v_load, motion.v_load),
+        axpy(s, rate.cable, motion.cable),
+        axpy(s, rate.cable_dot, motion.cable_dot),
+        (p[0] + s * d[0], p[1] + s * d[1], p[2] + s * d[2], p[3] + s * d[3]),
+        axpy(s, rate.omega, motion.omega),
+    )
+
+
+@kernel
+def stretched(motion: Motion, truth: Truth) -> Motion:
+    """The pair with its distance set to the cable length and no velocity along the cable.
+
+    Centre of mass and linear momentum stay. After a taut step this takes back the integrator's drift; at the
+    instant a slack cable comes taut it is the perfectly inelastic impact.
+    """
+    length = norm(motion.cable)
+    q_cable = scale(1.0 / length, motion.cable)
+    share = truth.quad_mass / (truth.quad_mass + truth.load_mass)
+    excess = length - truth.cable_length
+    speed = dot(q_cable, motion.cable_dot)
+    return Motion(
+        axpy(-share * excess, q_cable, motion.x_load),
+        axpy(-share * speed, q_cable, motion.v_load),
+        scale(truth.cable_length, q_cable),
+        axpy(-speed, q_cable, motion.cable_dot),
+        motion.quat,
+        motion.omega,
+    )
+
+
+@kernel
+def flow(
+    motion: Motion, rotor_force: Rotors, command: Rotors, truth: Truth, wind: Vec3, taut: float, h: float
+) -> Flow:
+    """One Runge-Kutta step of length h in one mode; the rotor lag is exact at every stage."""
+    half_decay = 0.0
+    if truth.rotor_tau > 0.0:
+        half_decay = decay(0.5 * h / truth.rotor_tau)
+    else:
+        rotor_force = command
+    nothing = Motion(ZERO, ZERO, ZERO, ZERO, (0.0, 0.0, 0.0, 0.0), ZERO)
+    rate, total = nothing, nothing
+    force, remainder, tension_before = rotor_force, 1.0, 0.0
+    # a loop, so that the equations are compiled once and not five times
+    for stage in range(5):
+        if stage < 4:
+            at = _shift(motion, _STAGE_SHIFT[stage] * h, rate)
+        else:
+            at = _shift(motion, h, total)
+            at = Motion(at.x_load, at.v_load, at.cable, at.cable_dot, quat_normalise(at.quat), at.omega)
+            if taut > 0.0:
+                at = stretched(at, truth)
+        # the stages lie at 0, 1/2, 1/2, 1 and 1 of the step
+        if stage % 2 == 1:
+            remainder *= half_decay
+            force = approach(rotor_force, command, remainder)
+        found = rates(at, force, truth, wind, taut)
+        if stage == 0:
+            tension_before = found.tension
+        rate = found.motion
+        total = _shift(total, _STAGE_WEIGHT[stage], rate)
+    return Flow(
+        at,
+        force,
+        tension_before,
+        found.tension,
+        sub(rate.v_load, rate.cable_dot),
+        found.quad_normal,
+        found.load_normal,
+    )

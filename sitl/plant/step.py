@@ -1,0 +1,237 @@
+"""One fixed step of the plant, with the switch between taut and slack located in time.
+
+`advance` cuts its step into segments of fourth-order Runge-Kutta. A segment ends at the end of the step, at a
+sub-step near the ground, or where the cable changes its mode: taut to slack when the tension passes zero,
+slack to taut when the distance reaches the cable length. The instant is found by a bracketed secant search
+(Illinois) over the length of the Runge-Kutta step itself, so that no interpolant enters. Coming taut is
+perfectly inelastic along the cable: the velocities along it become equal, linear momentum stays.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, dot, norm, scale, sub
+from autopilot.geometry.s2 import tangent
+from autopilot.geometry.so3 import IDENTITY_QUAT
+from sitl.plant.contact import quad_reach
+from sitl.plant.flow import Flow, flow, stretched
+from sitl.plant.records import Motion, PlantState, Rotors, Truth
+from sitl.plant.rotors import limited
+
+# Longest steps, from benchmarks/plant_convergence.py: docs/plant.md has the table.
+MAX_STEP = 4e-3  # s, in the air
+CONTACT_STEP = 5e-4  # s, where a contact is possible
+# a contact is possible within this height plus the way of one step, m
+_CONTACT_MARGIN = 0.02
+
+# The cable is longer or pushes only beyond these: a thousand times the rounding of the two quantities.
+_LENGTH_TOLERANCE = 1e-12  # m
+_TENSION_TOLERANCE = 1e-12  # N
+_TIME_TOLERANCE = 1e-13  # s
+_MAX_IMPACTS = 4  # in one step; what is left over is taken up at the start of the next
+_MAX_SEARCH = 60  # trials of the search; bisection alone would need 35
+
+# Outside these the model means nothing and the step no longer resolves it.
+_MAX_RATE = 200.0  # rad/s
+_MAX_SPEED = 200.0  # m/s
+_MAX_DISTANCE = 1e5  # m
+_LEAST_DISTANCE = 1e-6  # m
+
+
+@kernel
+def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
+    """Longest step that resolves what may happen next; divides `remaining` evenly."""
+    v_quad_z = motion.v_load[2] - motion.cable_dot[2]
+    quad_clearance = motion.x_load[2] - motion.cable[2] - quad_reach(truth)
+    load_clearance = motion.x_load[2] - truth.load_radius
+    longest = MAX_STEP
+    if (
+        quad_clearance + MAX_STEP * v_quad_z < _CONTACT_MARGIN
+        or load_clearance + MAX_STEP * motion.v_load[2] < _CONTACT_MARGIN
+    ):
+        longest = CONTACT_STEP
+    # a remainder that rounding left a bit above the limit is still one step
+    if not remaining > longest * (1.0 + 1e-9):
+        return remaining
+    return remaining / ceil(remaining / longest - 1e-9)
+
+
+@kernel
+def _excess(motion: Motion, tension: float, truth: Truth, taut: float) -> float:
+    """Positive when the mode must change: N the cable would push, or m it is longer than it is."""
+    if taut > 0.0:
+        return -tension - _TENSION_TOLERANCE
+    return norm(motion.cable) - truth.cable_length - _LENGTH_TOLERANCE
+
+
+@kernel
+def _sound(motion: Motion) -> bool:
+    """Whether the motion is finite and within the domain of the model; a comparison with nan is false."""
+    v_quad = sub(motion.v_load, motion.cable_dot)
+    return (
+        norm(motion.omega) < _MAX_RATE
+        and norm(motion.v_load) < _MAX_SPEED
+        and norm(v_quad) < _MAX_SPEED
+        and norm(motion.x_load) < _MAX_DISTANCE
+        and norm(motion.cable) < _MAX_DISTANCE
+        and abs(motion.quat[0]) <= 1.0 + 1e-9
+    )
+
+
+@kernel
+def _held(state: PlantState) -> PlantState:
+    """`state`, marked as the last one before the motion left the domain of the model."""
+    return PlantState(
+        state.x_load,
+        state.v_load,
+        state.q_cable,
+        state.q_cable_dot,
+        state.x_quad,
+        state.v_quad,
+        state.quat_wxyz,
+        state.omega_body,
+        state.rotor_force,
+        state.taut,
+        state.slack_events,
+        state.vehicle_on_ground,
+        state.load_on_ground,
+        state.accel_quad,
+        state.tension,
+        1.0,
+    )
+
+
+@kernel
+def _state_of(end: Flow, q_before: Vec3, taut: float, slack_events: float) -> PlantState:
+    """The record of where a step led."""
+    motion = end.motion
+    q_cable, q_cable_dot = q_before, ZERO
+    distance = norm(motion.cable)
+    # where the load passes through the vehicle the direction is undefined: keep the last one
+    if distance > _LEAST_DISTANCE:
+        q_cable = scale(1.0 / distance, motion.cable)
+        q_cable_dot = scale(1.0 / distance, tangent(q_cable, motion.cable_dot))
+    return PlantState(
+        motion.x_load,
+        motion.v_load,
+        q_cable,
+        q_cable_dot,
+        sub(motion.x_load, motion.cable),
+        sub(motion.v_load, motion.cable_dot),
+        motion.quat,
+        motion.omega,
+        end.rotor_force,
+        taut,
+        slack_events,
+        1.0 if end.quad_normal > 0.0 else 0.0,
+        1.0 if end.load_normal > 0.0 else 0.0,
+        end.accel_quad,
+        end.tension,
+        0.0,
+    )
+
+
+@kernel
+def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, h: float) -> PlantState:
+    """The state h seconds later under constant rotor commands (N) and wind (world, m/s).
+
+    Meant for h up to MAX_STEP; a longer one is divided. A state that leaves the domain of the model (see the
+    limits above) is not returned: the one before it is, marked `diverged`, and stays.
+    """
+    if state.diverged > 0.0:
+        return state
+    command = limited(rotor_command, truth)
+    taut, slack_events, rotor_force = state.taut, state.slack_events, state.rotor_force
+    if taut > 0.0:
+        cable = scale(truth.cable_length, state.q_cable)
+        cable_dot = scale(truth.cable_length, state.q_cable_dot)
+    else:
+        cable = sub(state.x_load, state.x_quad)
+        cable_dot = sub(state.v_load, state.v_quad)
+    motion = Motion(state.x_load, state.v_load, cable, cable_dot, state.quat_wxyz, state.omega_body)
+
+    remaining, impacts = h, 0
+    while True:
+        t = segment_length(motion, truth, remaining)
+        low, high, low_excess, high_excess, side = 0.0, t, 0.0, 0.0, 0
+        switched = False
+        for trial in range(_MAX_SEARCH):
+            end = flow(motion, rotor_force, command, truth, wind, taut, t)
+            excess = _excess(end.motion, end.tension, truth, taut)
+            if trial == 0:
+                low_excess, high_excess = _excess(motion, end.tension_before, truth, taut), excess
+                if taut <= 0.0 and impacts >= _MAX_IMPACTS:
+                    break
+                if low_excess > 0.0:
+                    # overdue: the forces jumped, or the last step had used up its impacts
+                    switched = taut > 0.0 or dot(motion.cable, motion.cable_dot) > 0.0
+                    break
+                if not excess > 0.0:
+                    break
+                switched = True
+            elif excess > 0.0:
+                high, high_excess = t, excess
+                low_excess *= 0.5 if side > 0 else 1.0
+                side = 1
+            else:
+                low, low_excess = t, excess
+                high_excess *= 0.5 if side < 0 else 1.0
+                side = -1
+            if high - low < _TIME_TOLERANCE or (trial > 0 and abs(excess) < _LENGTH_TOLERANCE):
+                break
+            t = (low * high_excess - high * low_excess) / (high_excess - low_excess)
+        if switched and low_excess > 0.0:
+            t = 0.0
+        else:
+            motion, rotor_force = end.motion, end.rotor_force
+        remaining -= t
+        if switched:
+            if taut > 0.0:
+                taut = 0.0
+                slack_events += 1.0
+            else:
+                taut = 1.0
+                impacts += 1
+                motion = stretched(motion, truth)
+        elif not remaining > 0.0:
+            break
+    if not _sound(end.motion):
+        return _held(state)
+    return _state_of(end, state.q_cable, taut, slack_events)
+
+
+@kernel
+def advance_many(
+    state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, h: float, n: int
+) -> PlantState:
+    """n steps of length h under the same commands and wind."""
+    for _ in range(n):
+        state = advance(state, truth, rotor_command, wind, h)
+    return state
+
+
+def initial_state(truth: Truth) -> PlantState:
+    """Vehicle and load at rest on the ground, heading east, the load at home, the cable slack."""
+    offset = 0.5 * truth.cable_length
+    cable = (offset, 0.0, truth.load_radius - truth.gear_height)
+    length = norm(cable)
+    return PlantState(
+        x_load=(0.0, 0.0, truth.load_radius),
+        v_load=ZERO,
+        q_cable=scale(1.0 / length, cable),
+        q_cable_dot=ZERO,
+        x_quad=(-offset, 0.0, truth.gear_height),
+        v_quad=ZERO,
+        quat_wxyz=IDENTITY_QUAT,
+        omega_body=ZERO,
+        rotor_force=(0.0, 0.0, 0.0, 0.0),
+        taut=0.0,
+        slack_events=0.0,
+        vehicle_on_ground=1.0,
+        load_on_ground=1.0,
+        accel_quad=ZERO,
+        tension=0.0,
+        diverged=0.0,
+    )

@@ -1,0 +1,51 @@
+"""Motion capture of the load: position, and velocity where the profile says so."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, add, add3, scale
+from sitl.plant.records import PlantState
+from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian
+
+
+class LoadConfig(NamedTuple):
+    """Deviations per sample, per axis; velocity_noise is nan where velocity is not measured."""
+
+    position_noise: float
+    velocity_noise: float
+    position_drift: Drift
+
+
+class LoadTrackerState(NamedTuple):
+    """Offset of the tracked point from the centre of the load, ENU, m."""
+
+    offset: Vec3
+
+
+class LoadReading(NamedTuple):
+    """Position and velocity of the load, ENU (m, m/s); nan = not measured."""
+
+    position: Vec3
+    velocity: Vec3
+
+
+@kernel
+def start(config: LoadConfig, noise: Noise) -> LoadTrackerState:
+    """The calibration error at switch-on."""
+    return LoadTrackerState(drift_start(config.position_drift, noise, 3))
+
+
+@kernel
+def sample(
+    truth_state: PlantState, sensor_state: LoadTrackerState, config: LoadConfig, noise: Noise
+) -> tuple[LoadReading, LoadTrackerState]:
+    """Position and velocity with white noise."""
+    x = truth_state.x_load
+    position = add3(x, sensor_state.offset, scale(config.position_noise, gaussian(noise, 0)))
+    velocity = add(truth_state.v_load, scale(config.velocity_noise, gaussian(noise, 1)))
+    return (
+        LoadReading(position, velocity),
+        LoadTrackerState(drift_step(sensor_state.offset, config.position_drift, noise, 2)),
+    )

@@ -1,0 +1,272 @@
+"""Sensor profiles: which sensors are fitted and how good they are. The units are in the key names.
+
+Every deviation is one sigma per axis. A `bias` is drawn once at switch-on; a `walk` is the growth of that
+bias over a second (its deviation rises with the square root of time). A table that is absent is a sensor that
+is not fitted; only the IMU must be there.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, hypot, inf, nan, radians, sin, sqrt
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator
+from pydantic_core import PydanticCustomError
+
+from sitl.sensors.barometer import BarometerConfig
+from sitl.sensors.cable_sensor import CableConfig
+from sitl.sensors.gnss import GnssConfig
+from sitl.sensors.imu import ImuConfig
+from sitl.sensors.load_tracker import LoadConfig
+from sitl.sensors.magnetometer import MagnetometerConfig
+from sitl.sensors.noise import Drift
+from sitl.sensors.pose_tracker import PoseConfig
+
+_HIGHEST_RATE_HZ = 20_000.0
+
+# a sensor states at least these deviations, so that nobody divides by the zero of a perfect one
+_LEAST_POSITION_STD = 1e-4  # m
+_LEAST_VELOCITY_STD = 1e-3  # m/s
+_LEAST_ANGLE_STD = 1e-4  # rad
+
+
+def _rate(value: object) -> float:
+    """A rate in Hz; 0.0 stands for the word "tick"."""
+    if value == "tick":
+        return 0.0
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise PydanticCustomError("rate", 'must be a number > 0, or "tick" (a reading at every tick)')
+    if not 0.0 < value <= _HIGHEST_RATE_HZ:
+        raise PydanticCustomError("rate", f"must be > 0 and at most {_HIGHEST_RATE_HZ:g}")
+    return float(value)
+
+
+Rate = Annotated[float, PlainValidator(_rate)]
+Deviation = Annotated[float, Field(ge=0.0, le=1e6)]
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Delivery(_Table):
+    """When readings come, and which do not. Outages begin by chance; their lengths are exponential."""
+
+    latency_ms: Annotated[float, Field(ge=0.0, le=10_000.0)] = 0.0
+    loss: Share = 0.0
+    outages_per_min: Annotated[float, Field(ge=0.0, le=6000.0)] = 0.0
+    outage_s: Positive = 1.0
+
+
+class Sampled(Delivery):
+    """A sensor with a rate of its own."""
+
+    rate_hz: Rate
+
+    def period_s(self, tick_s: float) -> float:
+        """Time from reading to reading."""
+        return 1.0 / self.rate_hz if self.rate_hz > 0.0 else tick_s
+
+
+def _walk(bias: float, walk: float, period_s: float) -> Drift:
+    return Drift(initial=bias, decay=1.0, drive=walk * sqrt(period_s))
+
+
+class Imu(Delivery):
+    """Accelerometer and gyroscope, one reading at every tick."""
+
+    accel_noise_m_s2: Deviation
+    accel_bias_m_s2: Deviation = 0.0
+    accel_walk_m_s2: Deviation = 0.0
+    accel_range_m_s2: Positive | None = None
+    gyro_noise_rad_s: Deviation
+    gyro_bias_rad_s: Deviation = 0.0
+    gyro_walk_rad_s: Deviation = 0.0
+    gyro_range_rad_s: Positive | None = None
+
+    def config(self, tick_s: float, gravity: float) -> ImuConfig:
+        """For the kernel; gravity of the world in m/s^2."""
+        return ImuConfig(
+            accel_noise=self.accel_noise_m_s2,
+            accel_drift=_walk(self.accel_bias_m_s2, self.accel_walk_m_s2, tick_s),
+            accel_range=inf if self.accel_range_m_s2 is None else self.accel_range_m_s2,
+            gyro_noise=self.gyro_noise_rad_s,
+            gyro_drift=_walk(self.gyro_bias_rad_s, self.gyro_walk_rad_s, tick_s),
+            gyro_range=inf if self.gyro_range_rad_s is None else self.gyro_range_rad_s,
+            gravity=gravity,
+        )
+
+
+class Mocap(Sampled):
+    """Motion capture of the vehicle. A velocity noise that is not given means: velocity is not measured."""
+
+    position_noise_m: Deviation
+    position_bias_m: Deviation = 0.0
+    position_walk_m: Deviation = 0.0
+    attitude_noise_rad: Deviation
+    velocity_noise_m_s: Deviation | None = None
+    rate_noise_rad_s: Deviation | None = None
+
+    def config(self, tick_s: float) -> PoseConfig:
+        """For the kernel."""
+        return PoseConfig(
+            position_noise=self.position_noise_m,
+            attitude_noise=self.attitude_noise_rad,
+            velocity_noise=nan if self.velocity_noise_m_s is None else self.velocity_noise_m_s,
+            rate_noise=nan if self.rate_noise_rad_s is None else self.rate_noise_rad_s,
+            position_drift=_walk(self.position_bias_m, self.position_walk_m, self.period_s(tick_s)),
+        )
+
+
+class LoadTracker(Sampled):
+    """Motion capture of the load."""
+
+    position_noise_m: Deviation
+    position_bias_m: Deviation = 0.0
+    position_walk_m: Deviation = 0.0
+    velocity_noise_m_s: Deviation | None = None
+
+    def config(self, tick_s: float) -> LoadConfig:
+        """For the kernel."""
+        return LoadConfig(
+            position_noise=self.position_noise_m,
+            velocity_noise=nan if self.velocity_noise_m_s is None else self.velocity_noise_m_s,
+            position_drift=_walk(self.position_bias_m, self.position_walk_m, self.period_s(tick_s)),
+        )
+
+
+class CableSensor(Sampled):
+    """A camera that sees the load within a cone about the body's down axis, or encoders on a taut cable."""
+
+    kind: Literal["camera", "encoder"]
+    direction_noise_rad: Deviation
+    mounting_bias_rad: Deviation = 0.0
+    mounting_walk_rad: Deviation = 0.0
+    half_angle_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 180.0
+
+    def config(self, tick_s: float) -> CableConfig:
+        """For the kernel."""
+        return CableConfig(
+            direction_noise=self.direction_noise_rad,
+            mounting_drift=_walk(self.mounting_bias_rad, self.mounting_walk_rad, self.period_s(tick_s)),
+            cone_cosine=cos(radians(self.half_angle_deg)),
+            taut_only=1.0 if self.kind == "encoder" else 0.0,
+        )
+
+
+class Gnss(Sampled):
+    """Satellite navigation. The correlated error has the given deviation and forgets itself over its time."""
+
+    fix: Literal["3d", "rtk"]
+    horizontal_noise_m: Deviation
+    vertical_noise_m: Deviation
+    horizontal_correlated_m: Deviation = 0.0
+    vertical_correlated_m: Deviation = 0.0
+    correlation_s: Positive = 60.0
+    horizontal_velocity_noise_m_s: Deviation
+    vertical_velocity_noise_m_s: Deviation
+    satellites: Annotated[int, Field(ge=4, le=60)] = 12
+
+    def config(self, tick_s: float) -> GnssConfig:
+        """For the kernel."""
+        decay = exp(-self.period_s(tick_s) / self.correlation_s)
+        horizontal, vertical = self.horizontal_noise_m, self.vertical_noise_m
+        speed, climb = self.horizontal_velocity_noise_m_s, self.vertical_velocity_noise_m_s
+        return GnssConfig(
+            position_noise=(horizontal, horizontal, vertical),
+            position_error=(
+                self.horizontal_correlated_m,
+                self.horizontal_correlated_m,
+                self.vertical_correlated_m,
+            ),
+            velocity_noise=(speed, speed, climb),
+            correlation=Drift(initial=1.0, decay=decay, drive=sqrt(1.0 - decay * decay)),
+        )
+
+
+class Barometer(Sampled):
+    """Static pressure, as height; the drift forgets itself over the correlation time."""
+
+    height_noise_m: Deviation
+    height_drift_m: Deviation = 0.0
+    correlation_s: Positive = 300.0
+
+    def config(self, tick_s: float) -> BarometerConfig:
+        """For the kernel."""
+        decay = exp(-self.period_s(tick_s) / self.correlation_s)
+        drive = self.height_drift_m * sqrt(1.0 - decay * decay)
+        return BarometerConfig(self.height_noise_m, Drift(self.height_drift_m, decay, drive))
+
+
+class Magnetometer(Sampled):
+    """The earth's field at home and the error of its measurement."""
+
+    strength_gauss: Positive
+    inclination_deg: Annotated[float, Field(ge=-90.0, le=90.0)]
+    declination_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
+    noise_gauss: Deviation
+    hard_iron_gauss: Deviation = 0.0
+    hard_iron_walk_gauss: Deviation = 0.0
+
+    def config(self, tick_s: float) -> MagnetometerConfig:
+        """For the kernel: inclination is counted down from the horizon, declination east from north."""
+        dip, turn = radians(self.inclination_deg), radians(self.declination_deg)
+        level = self.strength_gauss * cos(dip)
+        return MagnetometerConfig(
+            field=(level * sin(turn), level * cos(turn), -self.strength_gauss * sin(dip)),
+            field_noise=self.noise_gauss,
+            hard_iron=_walk(self.hard_iron_gauss, self.hard_iron_walk_gauss, self.period_s(tick_s)),
+        )
+
+
+class Profile(_Table):
+    """All sensors of a vehicle and of the place it flies in."""
+
+    description: str
+    imu: Imu
+    mocap: Mocap | None = None
+    load_tracker: LoadTracker | None = None
+    cable_sensor: CableSensor | None = None
+    gnss: Gnss | None = None
+    barometer: Barometer | None = None
+    magnetometer: Magnetometer | None = None
+
+
+class Stated(NamedTuple):
+    """The deviations that readings state of themselves, per axis; nan where a sensor is not fitted."""
+
+    mocap_position: float
+    mocap_attitude: float
+    mocap_velocity: float
+    load_position: float
+    load_velocity: float
+    direction: float
+    gnss_horizontal: float
+    gnss_vertical: float
+
+
+def stated_of(profile: Profile, scale: float) -> Stated:
+    """What the sensors of a profile truthfully state when all noise is multiplied by `scale`."""
+    mocap, load, cable, gnss = profile.mocap, profile.load_tracker, profile.cable_sensor, profile.gnss
+
+    def std(least: float, *parts: float | None) -> float:
+        return max(least, scale * hypot(*(part or 0.0 for part in parts)))
+
+    return Stated(
+        mocap_position=std(_LEAST_POSITION_STD, mocap.position_noise_m, mocap.position_bias_m)
+        if mocap
+        else nan,
+        mocap_attitude=std(_LEAST_ANGLE_STD, mocap.attitude_noise_rad) if mocap else nan,
+        mocap_velocity=std(_LEAST_VELOCITY_STD, mocap.velocity_noise_m_s) if mocap else nan,
+        load_position=std(_LEAST_POSITION_STD, load.position_noise_m, load.position_bias_m) if load else nan,
+        load_velocity=std(_LEAST_VELOCITY_STD, load.velocity_noise_m_s) if load else nan,
+        direction=std(_LEAST_ANGLE_STD, cable.direction_noise_rad, cable.mounting_bias_rad) if cable else nan,
+        gnss_horizontal=std(_LEAST_POSITION_STD, gnss.horizontal_noise_m, gnss.horizontal_correlated_m)
+        if gnss
+        else nan,
+        gnss_vertical=std(_LEAST_POSITION_STD, gnss.vertical_noise_m, gnss.vertical_correlated_m)
+        if gnss
+        else nan,
+    )

@@ -1,0 +1,205 @@
+"""The world as a function of its commands: plant, sensors and all delays between them, on a clock of ticks.
+
+Between two ticks the plant is integrated from event to event: a command that takes effect, a sensor that
+measures. Both are exact to the microsecond, whatever the tick rate.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, NamedTuple
+
+from autopilot.geometry.linear import Vec3, add
+from autopilot.wire.parameters import ParameterError, ParameterTable
+from sitl.plant.records import PlantState, Rotors, Truth
+from sitl.plant.step import advance, initial_state
+from sitl.plant.wind import gust
+from sitl.sensors import (
+    barometer,
+    cable_sensor,
+    gnss,
+    imu,
+    load_tracker,
+    magnetometer,
+    pose_tracker,
+)
+from sitl.sensors.barometer import BarometerReading
+from sitl.sensors.cable_sensor import CableReading
+from sitl.sensors.channel import Channel, Fate, Measurement, Timing
+from sitl.sensors.gnss import GnssReading
+from sitl.sensors.imu import ImuReading
+from sitl.sensors.load_tracker import LoadReading
+from sitl.sensors.magnetometer import MagnetometerReading
+from sitl.sensors.noise import Noise, gaussian
+from sitl.sensors.pose_tracker import PoseReading
+from sitl.sensors.profile import Delivery, Profile, Sampled
+
+SECOND_US = 1_000_000
+STOPPED: Rotors = (0.0, 0.0, 0.0, 0.0)
+
+
+class Streams(NamedTuple):
+    """Noise stream of each sensor: fixed, so that fitting one sensor leaves the others as they were."""
+
+    imu: int = 1
+    mocap: int = 2
+    load_tracker: int = 3
+    cable_sensor: int = 4
+    gnss: int = 5
+    barometer: int = 6
+    magnetometer: int = 7
+    gusts: int = 8
+
+
+class Settings(NamedTuple):
+    """What the SIM_* parameters mean to the core."""
+
+    tick_us: int
+    actuator_delay_us: int
+    noise_scale: float
+    sensor_latency_us: int  # added to that of each sensor
+    sensor_loss: float  # 0 ... 1, added to that of each sensor but the IMU
+    wind: Vec3  # mean, ENU, m/s
+    gust_std: float  # m/s, each axis
+    gust_tau_s: float
+
+
+class Readings(NamedTuple):
+    """What leaves the sensors at one tick; a sensor that has nothing new gives an empty tuple."""
+
+    imu: tuple[Measurement[ImuReading], ...]
+    mocap: tuple[Measurement[PoseReading], ...]
+    load_tracker: tuple[Measurement[LoadReading], ...]
+    cable_sensor: tuple[Measurement[CableReading], ...]
+    gnss: tuple[Measurement[GnssReading], ...]
+    barometer: tuple[Measurement[BarometerReading], ...]
+    magnetometer: tuple[Measurement[MagnetometerReading], ...]
+
+
+def settings_of(table: ParameterTable) -> Settings:
+    """The settings of a table of SIM_* parameters, or ParameterError."""
+    rate = table["SIM_RATE_HZ"]
+    tick_us = round(SECOND_US / rate)
+    if tick_us * rate != SECOND_US:
+        divisors = (hz for hz in range(100, 1001) if SECOND_US % hz == 0)
+        allowed = ", ".join(str(hz) for hz in divisors)
+        raise ParameterError(
+            f"SIM_RATE_HZ = {rate:g} Hz; a tick must be a whole number of microseconds, and "
+            f"{SECOND_US} us / {rate:g} is not: take one of {allowed}"
+        )
+    return Settings(
+        tick_us=tick_us,
+        actuator_delay_us=round(table["SIM_ACT_DELAY_MS"] * 1000.0),
+        noise_scale=table["SIM_NOISE_SCALE"],
+        sensor_latency_us=round(table["SIM_SENS_LAT_MS"] * 1000.0),
+        sensor_loss=table["SIM_DROP_PCT"] / 100.0,
+        wind=(table["SIM_WIND_E"], table["SIM_WIND_N"], table["SIM_WIND_U"]),
+        gust_std=table["SIM_GUST_STD"],
+        gust_tau_s=table["SIM_GUST_TAU_S"],
+    )
+
+
+class SimCore:
+    """The true vehicle at time `now_us`. Same arguments and commands: same readings, to the bit."""
+
+    def __init__(self, truth: Truth, profile: Profile, settings: Settings, seed: int) -> None:
+        self.truth = truth
+        self.settings = settings
+        self.state: PlantState = initial_state(truth)
+        self.tick_count = 0
+        self.now_us = 0
+        self.command = STOPPED  # in force, N
+        self.wind = settings.wind  # ENU, m/s
+        self._commands: deque[tuple[int, Rotors]] = deque()  # (takes effect at, forces)
+        self._seed = seed
+        self._gust = gaussian(Noise(seed, Streams().gusts, 0, settings.gust_std), 1)
+        self._channels = self._fit(profile)
+        self._fitted = tuple(channel for channel in self._channels if channel is not None)
+        self._measure(0)
+        self.readings = self._collect()
+
+    def tick(self, command: Rotors) -> Readings:
+        """Integrate to the next tick; `command` (N) is the one that answers the present tick.
+
+        It takes effect after the actuator delay; before the first one the rotors stand still.
+        """
+        now_us = self.now_us
+        end_us = now_us + self.settings.tick_us
+        commands = self._commands
+        commands.append((now_us + self.settings.actuator_delay_us, command))
+        wind = self.wind = self._next_wind()
+        while now_us < end_us:
+            while commands and commands[0][0] <= now_us:
+                self.command = commands.popleft()[1]
+            stop_us = end_us
+            if commands and commands[0][0] < stop_us:
+                stop_us = commands[0][0]
+            for channel in self._fitted:
+                stop_us = min(stop_us, channel.due_us)
+            self.state = advance(self.state, self.truth, self.command, wind, (stop_us - now_us) / SECOND_US)
+            now_us = stop_us
+            self._measure(now_us)
+        self.now_us = end_us
+        self.tick_count += 1
+        self.readings = self._collect()
+        return self.readings
+
+    def _next_wind(self) -> Vec3:
+        """Wind of this tick: the mean and a gust."""
+        settings = self.settings
+        if settings.gust_std == 0.0:
+            return settings.wind
+        normals = gaussian(Noise(self._seed, Streams().gusts, self.tick_count, 1.0), 0)
+        tick_s = settings.tick_us / SECOND_US
+        self._gust = gust(self._gust, settings.gust_std, settings.gust_tau_s, tick_s, normals)
+        return add(settings.wind, self._gust)
+
+    def _measure(self, now_us: int) -> None:
+        for channel in self._fitted:
+            while channel.due_us <= now_us:
+                channel.measure(self.state)
+
+    def _collect(self) -> Readings:
+        return Readings(
+            *(() if channel is None else channel.collect(self.now_us) for channel in self._channels)
+        )
+
+    def _fit(self, profile: Profile) -> tuple[Channel[Any] | None, ...]:
+        """The channels in the order of `Readings`."""
+        tick_s = self.settings.tick_us / SECOND_US
+        streams = Streams()
+
+        def fitted(sensor: Any, table: Any, stream: int) -> Channel[Any] | None:
+            if table is None:
+                return None
+            return self._channel(sensor, table.config(tick_s), table, stream, self.settings.sensor_loss)
+
+        inertial = profile.imu.config(tick_s, self.truth.gravity)
+        return (
+            self._channel(imu, inertial, profile.imu, streams.imu, extra_loss=0.0),
+            fitted(pose_tracker, profile.mocap, streams.mocap),
+            fitted(load_tracker, profile.load_tracker, streams.load_tracker),
+            fitted(cable_sensor, profile.cable_sensor, streams.cable_sensor),
+            fitted(gnss, profile.gnss, streams.gnss),
+            fitted(barometer, profile.barometer, streams.barometer),
+            fitted(magnetometer, profile.magnetometer, streams.magnetometer),
+        )
+
+    def _channel(
+        self, sensor: Any, config: Any, delivery: Delivery, stream: int, extra_loss: float
+    ) -> Channel[Any]:
+        settings = self.settings
+        latency_us = round(delivery.latency_ms * 1000.0) + settings.sensor_latency_us
+        if isinstance(delivery, Sampled):
+            timing = Timing(delivery.rate_hz, settings.tick_us, latency_us, lead_us=0)
+        else:
+            # the link carries no time of measurement for the IMU: it is read one latency before its tick
+            timing = Timing(0.0, settings.tick_us, latency_us, lead_us=latency_us)
+        return Channel(
+            sensor.sample,
+            sensor.start,
+            config,
+            timing,
+            Fate.of(delivery, extra_loss),
+            Noise(self._seed, stream, 0, settings.noise_scale),
+        )

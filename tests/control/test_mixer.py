@@ -1,0 +1,107 @@
+"""Properties of the mixer, for any demand; linear programmes tell what four rotors could have done at
+best."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from autopilot.control.records import Vehicle
+from autopilot.mixer import ALL_ROTORS, MixerResult, mix, thrust_and_moment
+
+BEBOP = Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
+INF = float("inf")
+ROUNDING = 1e-12  # N, N m: sums of four numbers of order one
+PROGRAMME = 1e-6  # N: feasibility tolerance of the linear programmes
+
+moments = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-0.2, 0.2))
+thrusts = st.floats(-5.0, 20.0)
+
+
+def rotor_rows(vehicle: Vehicle) -> np.ndarray:
+    arm, ratio = vehicle.arm, vehicle.torque_ratio
+    return np.array([[1, 1, 1, 1], [0, -arm, 0, arm], [arm, 0, -arm, 0], [-ratio, ratio, -ratio, ratio]])
+
+
+@given(thrusts, moments)
+def test_forces_are_always_within_limits(thrust: float, moment: tuple[float, float, float]) -> None:
+    result = mix(thrust, moment, BEBOP, 1.0)
+    assert all(BEBOP.rotor_min <= F <= BEBOP.rotor_max for F in result.forces)
+    done = rotor_rows(BEBOP) @ np.array(result.forces)
+    np.testing.assert_allclose((result.thrust_done, *result.moment_done), done, atol=ROUNDING)
+
+
+@given(st.tuples(*[st.floats(0.01, 1.95)] * 4))
+def test_demand_within_limits_is_done_exactly(forces: tuple[float, float, float, float]) -> None:
+    thrust, moment = thrust_and_moment(forces, BEBOP)
+    result = mix(thrust, moment, BEBOP, 1.0)
+    np.testing.assert_allclose(result.forces, forces, atol=ROUNDING)
+    assert result.saturated == 0
+
+
+@settings(max_examples=60, deadline=None)
+@given(thrusts, moments)
+def test_roll_and_pitch_are_kept_whenever_possible(thrust: float, moment: tuple[float, float, float]) -> None:
+    """A programme looks for any four forces with that roll and pitch; what is impossible is cut to the
+    limit."""
+    result = mix(thrust, moment, BEBOP, 1.0)
+    rows = rotor_rows(BEBOP)[1:3]
+    found = linprog(np.zeros(4), A_eq=rows, b_eq=moment[:2], bounds=[(BEBOP.rotor_min, BEBOP.rotor_max)] * 4)
+    wanted = np.array(moment[:2])
+    if found.status == 0:
+        np.testing.assert_allclose(result.moment_done[:2], wanted, atol=PROGRAMME)
+    greatest = BEBOP.arm * (BEBOP.rotor_max - BEBOP.rotor_min)
+    np.testing.assert_allclose(result.moment_done[:2], np.clip(wanted, -greatest, greatest), atol=ROUNDING)
+
+
+@settings(max_examples=60, deadline=None)
+@given(thrusts, moments)
+def test_thrust_comes_before_yaw(thrust: float, moment: tuple[float, float, float]) -> None:
+    """Beside the roll and pitch that are done, no four forces come nearer to the thrust; beside these, to
+    the yaw."""
+    result = mix(thrust, moment, BEBOP, 1.0)
+    rows, bounds = rotor_rows(BEBOP), [(BEBOP.rotor_min, BEBOP.rotor_max)] * 4
+    kept = np.array(result.moment_done[:2])
+
+    def reach(row: np.ndarray, A_eq: np.ndarray, b_eq: np.ndarray) -> tuple[float, float]:
+        ends = [linprog(sign * row, A_eq=A_eq, b_eq=b_eq, bounds=bounds) for sign in (1.0, -1.0)]
+        assert all(end.status == 0 for end in ends)
+        return float(ends[0].fun), float(-ends[1].fun)
+
+    low, high = reach(rows[0], rows[1:3], kept)
+    assert result.thrust_done == pytest.approx(min(high, max(low, thrust)), abs=PROGRAMME)
+    # a programme without room left may be called infeasible by a rounding: stay that much inside
+    done = min(high, max(low, result.thrust_done))
+    low, high = reach(rows[3], rows[:3], np.array([done, *kept]))
+    assert result.moment_done[2] == pytest.approx(min(high, max(low, moment[2])), abs=PROGRAMME)
+
+
+@given(thrusts, moments)
+def test_unlimited_passes_through(thrust: float, moment: tuple[float, float, float]) -> None:
+    free = BEBOP._replace(rotor_min=-INF, rotor_max=INF)
+    for vehicle, limited in ((BEBOP, 0.0), (free, 1.0), (free, 0.0)):
+        result = mix(thrust, moment, vehicle, limited)
+        assert result.saturated == 0
+        np.testing.assert_allclose(
+            (result.thrust_done, *result.moment_done), (thrust, *moment), atol=ROUNDING
+        )
+
+
+@pytest.mark.parametrize("high", [1.96, INF])
+@pytest.mark.parametrize("limited", [0.0, 1.0])
+@given(
+    st.floats(allow_nan=True, allow_infinity=True, width=32),
+    st.tuples(*[st.floats(allow_nan=True, allow_infinity=True, width=32)] * 3),
+)
+def test_no_demand_makes_nan(
+    high: float, limited: float, thrust: float, moment: tuple[float, float, float]
+) -> None:
+    result = mix(thrust, moment, BEBOP._replace(rotor_max=high), limited)
+    assert isinstance(result, MixerResult)
+    numbers = (*result.forces, result.thrust_done, *result.moment_done)
+    assert not np.isnan(numbers).any()
+    if not np.isfinite([thrust, *moment]).all():
+        assert result.saturated == ALL_ROTORS

@@ -1,0 +1,356 @@
+"""The command line: help and documentation of every command, one line and the right code for any error."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.tlog import read_tlog
+from gcs import session as session_module
+from gcs.cli import COMMANDS, gcs
+from gcs.clients import command as command_module
+from gcs.commands import status as status_module
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
+from gcs.link import UdpSocket, free_port
+
+ROOT = Path(__file__).resolve().parents[2]
+HELP_LIMIT_S = 0.3  # of `gcs --help`, on an idle machine; the test takes the best of several
+HELP_TRIES = 8
+
+
+def run(*arguments):
+    return CliRunner().invoke(gcs, list(arguments), prog_name="gcs")
+
+
+def commands():
+    """Every command by its words, groups included."""
+    context = click.Context(gcs, info_name="gcs")
+    for name in gcs.list_commands(context):
+        command = gcs.get_command(context, name)
+        assert command is not None
+        yield (name,), command
+        if isinstance(command, click.Group):
+            for sub, subcommand in command.commands.items():
+                yield (name, sub), subcommand
+
+
+def one_line(result, code):
+    """The error's line; it is all there is."""
+    assert result.exit_code == code, result.output
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    assert len(lines) == 1, result.stderr
+    assert lines[0].startswith("gcs: ")
+    return lines[0]
+
+
+# ---- help and documentation
+
+
+@pytest.mark.parametrize(("words", "command"), list(commands()), ids=lambda value: str(value)[:40])
+def test_every_command_has_help_and_stands_in_the_documentation(words, command):
+    result = run(*words, "--help")
+    assert result.exit_code == EXIT_DONE
+    assert command.help and command.help.strip()
+    assert all(option.help for option in command.params if isinstance(option, click.Option))
+    text = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+    if not isinstance(command, click.Group):
+        assert f"    gcs {' '.join(words)}" in text, "an example of it in docs/cli.md"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_summary_is_the_first_line_of_the_help(name):
+    command = gcs.get_command(click.Context(gcs), name)
+    assert command is not None and command.help is not None
+    assert command.help.splitlines()[0] == COMMANDS[name][1]
+
+
+def test_all_commands_are_listed():
+    output = run("--help").stdout
+    assert all(f"  {name} " in output for name in COMMANDS)
+
+
+def test_help_is_quick():
+    best = float("inf")
+    for _ in range(HELP_TRIES):
+        began = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "gcs", "--help"], check=True, capture_output=True, cwd=ROOT)
+        best = min(best, time.perf_counter() - began)
+        if best < HELP_LIMIT_S:
+            break
+    assert best < HELP_LIMIT_S
+
+
+def test_version():
+    assert run("--version").stdout.startswith("gcs, version ")
+
+
+# ---- wrong usage
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["fly"], "MISSION"),
+        (["flyy"], "flyy"),
+        (["fly", "hover", "--sped", "1"], "--sped"),
+        (["fly", "hover", "--law", "magic"], "thesis"),
+        (["fly", "hover", "--seed", "-1"], "--seed"),
+        (["fly", "hover", "--seed", "one"], "--seed"),
+        (["fly", "hover", "--speed", "0"], "--speed"),
+        (["fly", "hover", "--speed", "nan"], "--speed"),
+        (["fly", "hover", "--lockstep", "--speed", "1"], "exclude each other"),
+        (["fly", "hover", "--set", "SIM_WIND_E"], "NAME=VALUE"),
+        (["fly", "hover", "--set", "SIM_WIND_E=much"], "must be a number"),
+        (["fly", "hover", "--set", "SIM_WIND_E=nan"], "finite"),
+        (["fly", "hover", "--set", "=3"], "NAME=VALUE"),
+        (["fly", "hover", "--connect", "14550", "--seed", "3"], "--seed is for processes"),
+        (["fly", "hover", "--connect", "14550", "--set", "SIM_WIND_E=3"], "--set is for processes"),
+        (["fly", "--connect", "hover"], "must be PORT, HOST:PORT"),
+        (["fly", "hover", "--timeout", "0"], "--timeout"),
+        (["mode", "backflip"], "hold"),
+        (["takeoff", "--altitude", "-2"], "--altitude"),
+        (["param", "set", "NGC_KX", "nan"], "finite"),
+        (["param", "set", "NGC_KX", "x"], "float"),
+        (["param", "get"], "NAMES"),
+        (["status", "--connect", "99999"], "1 ... 65535"),
+        (["capture", "--duration", "0"], "--duration"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_code_2(arguments, part):
+    line = one_line(run(*arguments), EXIT_USAGE)
+    assert part in line
+    assert "--help" in line
+
+
+# ---- known errors
+
+
+@pytest.mark.parametrize("command", ["fly", "check", "upload"])
+@pytest.mark.parametrize(
+    ("mission", "part"),
+    [
+        ("case-z", "case-b"),
+        ("nowhere/x.toml", "nowhere/x.toml"),
+        ("bad.toml", "items[0].altitude_m"),
+        ("torn.toml", "not TOML"),
+        ("nan.toml", "finite"),
+    ],
+)
+def test_a_bad_mission_is_one_line_and_code_1(tmp_path, monkeypatch, command, mission, part):
+    monkeypatch.chdir(tmp_path)
+    text = (
+        'title = "t"\ndescription = "d"\n'
+        '[[items]]\ntype = "takeoff"\naltitude_m = {}\n[[items]]\ntype = "land"\n'
+    )
+    Path("bad.toml").write_text(text.format(-2.0))
+    Path("nan.toml").write_text(text.format("nan"))
+    Path("torn.toml").write_text("[[items")
+    before = sorted(tmp_path.iterdir())
+    assert part in one_line(run(command, mission), EXIT_ERROR)
+    assert sorted(tmp_path.iterdir()) == before, "nothing is left behind"
+
+
+def test_what_four_rotors_cannot_fly_is_refused_with_limit_and_excess(tmp_path):
+    mission = tmp_path / "wild.toml"
+    mission.write_text(
+        'title = "t"\ndescription = "d"\nassumptions = []\n'
+        '[[items]]\ntype = "takeoff"\naltitude_m = 8.0\n'
+        '[[items]]\ntype = "signals"\nduration_s = 20.0\n'
+        '[[items.terms]]\naxis = "z"\namplitude_m = 3.0\nrise_s = 5.0\nhold_s = 10.0\nfall_s = 5.0\n'
+        "[[items.terms.factors]]\nperiod_s = 1.5\n"
+        '[[items]]\ntype = "land"\n'
+    )
+    line = one_line(run("fly", str(mission), "--out", str(tmp_path / "out")), EXIT_ERROR)
+    assert "wild cannot be flown by vehicle bebop" in line
+    assert "--force" in line
+    assert not (tmp_path / "out").exists()
+    checked = run("check", str(mission))
+    assert checked.exit_code == EXIT_ERROR
+    assert checked.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        (None, "no-such.toml"),
+        ("quad_mass_kg = [", "not TOML"),
+        ('quad_mass_kg = "heavy"', "must be a number"),
+    ],
+)
+def test_a_bad_vehicle_file_is_one_line(tmp_path, text, part):
+    path = tmp_path / "no-such.toml"
+    if text is not None:
+        path.write_text(text)
+    assert part in one_line(run("check", "hover", "--vehicle", str(path)), EXIT_ERROR)
+
+
+def test_no_vehicle_is_one_line_after_the_stated_time(monkeypatch):
+    monkeypatch.setattr(session_module, "FIND_S", 0.1)
+    port = free_port()
+    line = one_line(run("arm", "--connect", str(port)), EXIT_ERROR)
+    assert f"127.0.0.1:{port} within 0.1 s" in line
+
+
+def test_a_busy_port_is_one_line():
+    taken = UdpSocket()
+    port = taken.address.rpartition(":")[2]
+    line = one_line(run("arm", "--connect", port), EXIT_ERROR)
+    taken.close()
+    assert f"127.0.0.1:{port} is in use" in line
+
+
+def test_a_report_of_nothing_is_one_line(tmp_path):
+    assert "flight.tlog" in one_line(run("report", str(tmp_path)), EXIT_ERROR)
+
+
+def test_an_output_that_cannot_be_is_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    line = one_line(run("fly", "hover", "--out", str(tmp_path / "file" / "x")), EXIT_ERROR)
+    assert "--out" in line
+
+
+# ---- missions without a vehicle
+
+
+def test_shipped_missions_are_listed():
+    names = {"case-a", "case-b", "case-b-extended", "case-c", "hover", "square"}
+    assert names <= {line.split()[0] for line in run("missions").stdout.splitlines()}
+    listed = json.loads(run("missions", "--json").stdout)
+    assert names <= {mission["name"] for mission in listed}
+    assert all(mission["title"] and mission["description"] for mission in listed)
+
+
+def test_check_says_that_it_can_be_flown():
+    result = run("check", "square", "--json")
+    assert result.exit_code == EXIT_DONE
+    assert json.loads(result.stdout) == {"mission": "square", "vehicle": "bebop", "violations": []}
+
+
+# ---- a running vehicle
+
+
+def test_single_commands(live):
+    vehicle, port = live
+    assert run("arm", "--connect", port).stdout == "arm: accepted\n"
+    assert vehicle.armed
+    for words in (["takeoff", "--altitude", "2"], ["pause"], ["resume"], ["land"], ["mode", "hold"]):
+        result = run(*words, "--connect", port)
+        assert (result.exit_code, result.stderr) == (EXIT_DONE, ""), result.output
+    by_command = {message.command: message for message in vehicle.commands}
+    assert by_command[mavlink.MAV_CMD_NAV_TAKEOFF].param7 == 2.0
+    mode = by_command[mavlink.MAV_CMD_DO_SET_MODE]
+    assert (mode.param1, mode.param2, mode.param3) == (129.0, 4.0, 3.0)
+    assert run("disarm", "--connect", port).exit_code == EXIT_DONE
+    assert not vehicle.armed
+
+
+def test_a_refusal_is_one_line_with_the_reason(live):
+    vehicle, port = live
+    original = vehicle._on_command_long
+
+    def refuse(message):
+        vehicle.command_results[message.command] = [mavlink.MAV_RESULT_DENIED]
+        original(message)
+        vehicle.say("Disarming denied: in the air")
+
+    vehicle._on_command_long = refuse
+    line = one_line(run("disarm", "--connect", port), EXIT_ERROR)
+    assert line == "gcs: disarm: denied; Disarming denied: in the air"
+
+
+def test_a_vehicle_that_stops_answering_is_one_line(live, monkeypatch):
+    vehicle, port = live
+    monkeypatch.setattr(command_module, "RETRY_US", 20_000)
+    vehicle.silent_commands = {mavlink.MAV_CMD_NAV_LAND}
+    assert "no answer after 5 tries" in one_line(run("land", "--connect", port), EXIT_ERROR)
+
+
+def test_a_mission_goes_up_comes_down_and_is_cleared(live):
+    vehicle, port = live
+    result = run("upload", "square", "--connect", port)
+    assert result.exit_code == EXIT_DONE, result.output
+    assert f"{len(vehicle.mission)} items accepted" in result.stdout
+    listed = json.loads(run("download", "--json", "--connect", port).stdout)
+    assert [item["command"] for item in listed] == [item.command for item in vehicle.mission]
+    assert listed[0]["name"] == "NAV_TAKEOFF"
+    assert "NAV_LAND" in run("download", "--connect", port).stdout
+    assert run("clear", "--connect", port).exit_code == EXIT_DONE
+    assert vehicle.mission == []
+
+
+def test_parameters(live, tmp_path):
+    vehicle, port = live
+    assert run("param", "set", "p001", "0.1", "--connect", port).stdout == "P001 = 0.1\n"
+    assert json.loads(run("param", "get", "P001", "p002", "--json", "--connect", port).stdout) == {
+        "P001": 0.1,
+        "P002": 2.0,
+    }
+    listed = json.loads(run("param", "list", "P01*", "--json", "--connect", port).stdout)
+    assert list(listed) == [f"P01{digit}" for digit in range(10)]
+    assert "no such parameter" in one_line(run("param", "get", "NOPE", "--connect", port), EXIT_ERROR)
+    assert "matches" in one_line(run("param", "list", "X*", "--connect", port), EXIT_ERROR)
+
+    file = tmp_path / "all.params"
+    assert run("param", "save", str(file), "--connect", port).exit_code == EXIT_DONE
+    before = dict(vehicle.parameters)
+    vehicle.parameters.update(P001=5.0, P100=7.0)
+    assert run("param", "load", str(file), "--connect", port).stdout.startswith("120 of 120 parameters set")
+    assert vehicle.parameters == before
+    file.write_text("P001 one\n")
+    assert "must be NAME value" in one_line(run("param", "load", str(file), "--connect", port), EXIT_ERROR)
+
+
+def test_status(live, monkeypatch):
+    vehicle, port = live
+    monkeypatch.setattr(status_module, "_LISTEN_S", 0.3)
+    vehicle.started_us = 0
+    record = json.loads(run("status", "--json", "--connect", port).stdout)
+    assert record["mode"] == "hold"
+    assert record["armed"] is False
+    assert record["load_error_m"] == pytest.approx(0.005)
+    assert "mode" in run("status", "--connect", port).stdout
+
+
+def test_capture(live, tmp_path):
+    _, port = live
+    path = tmp_path / "new" / "flight.tlog"
+    result = run("capture", "--duration", "0.3", "--out", str(path), "--connect", port)
+    assert result.exit_code == EXIT_DONE, result.output
+    records = list(read_tlog(path))
+    assert f"{len(records)} messages" in result.stdout
+    assert {one.system for _, one in records} == {1, 2, 255}
+    stamps = [stamp for stamp, _ in records]
+    assert stamps == sorted(stamps)
+
+
+def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):
+    vehicle, port = live
+
+    def flight(scripted, t):
+        last = len(scripted.mission) - 1
+        scripted.phase, scripted.item = (
+            (mavlink.PLUMBLINE_PHASE_LIFT, 0) if t < 0.3 else (mavlink.PLUMBLINE_PHASE_LOWER, last)
+        )
+        if t > 0.6 and scripted.armed:
+            scripted.arm(False)
+
+    vehicle.script = flight
+    out = tmp_path / "out"
+    result = run("fly", "hover", "--connect", port, "--out", str(out), "--json")
+    assert result.exit_code == EXIT_DONE, result.output
+    record = json.loads(result.stdout)
+    assert record["outcome"] == "completed"
+    assert record == json.loads((out / "summary.json").read_text())
+    assert {"flight.tlog", "flight.parquet", "summary.json", "report.html"} <= {p.name for p in out.iterdir()}
+    again = run("report", str(out), "--json")
+    assert again.exit_code == EXIT_DONE, again.output
+    assert json.loads(again.stdout) == record

@@ -1,0 +1,317 @@
+"""Sockets and processes: loopback only, every wait bounded, nothing left behind."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.tlog import TlogWriter
+from gcs import processes as processes_module
+from gcs.clients.capture import Capture
+from gcs.clients.flight import FlightClient
+from gcs.display import FlightDisplay
+from gcs.errors import GcsError, NoVehicleError
+from gcs.flight_loops import run_lockstep, run_wall_clock
+from gcs.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
+from gcs.processes import Processes
+from gcs.stopping import StopRequest
+
+WAIT_S = 10.0  # for what takes milliseconds on an idle machine
+TICK_US = 20_000
+GOODBYE = b"the test is over"
+# a program of the standard library that lasts as long as the statement it is given
+LASTING = ["-n", "1", "-r", "1", "import signal; signal.pause()"]
+DEAF = [*LASTING[:-1], "import signal; signal.signal(15, signal.SIG_IGN); print(flush=True); signal.pause()"]
+
+
+# ---- addresses and sockets
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [
+        ("14540", Address("127.0.0.1", 14540)),
+        ("0.0.0.0:14550", Address("0.0.0.0", 14550)),
+        ("udpin:localhost:5", Address("localhost", 5)),
+        ("udpout:10.0.0.2:18570", Address("10.0.0.2", 18570, listen=False)),
+    ],
+)
+def test_addresses(text, address):
+    assert parse_address(text) == address
+
+
+@pytest.mark.parametrize("text", ["", "x", "1:2:x", "0", "65536", "127.0.0.1:", ":14550", "tcp:1:2", "-1"])
+def test_bad_addresses_name_what_is_allowed(text):
+    with pytest.raises(AddressError, match="must be PORT, HOST:PORT") as error:
+        parse_address(text)
+    assert "\n" not in str(error.value)
+
+
+def test_a_busy_port_is_named_with_the_way_out():
+    with UdpContext() as taken:
+        with pytest.raises(GcsError) as error:
+            UdpSocket(port=_where(taken)[1])
+        assert taken.address in str(error.value)
+    assert "--connect 14540" in str(error.value)
+
+
+def test_answers_go_to_whoever_spoke():
+    with UdpContext() as ours:
+        theirs = open_address(parse_address(f"udpout:{ours.address}"))
+        ours.send(b"to nobody yet")
+        theirs.send(b"hello")
+        wait([ours], WAIT_S)
+        assert ours.drain() == [b"hello"]
+        ours.send(b"hello yourself")
+        wait([theirs], WAIT_S)
+        assert theirs.drain() == [b"hello yourself"]
+        theirs.close()
+        for _ in range(3):  # the kernel reports the closed port; that must not stop us
+            ours.send(b"gone?")
+            ours.drain()
+
+
+class UdpContext(UdpSocket):
+    """A socket that is closed at the end of its block."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+
+# ---- the loops
+
+
+class LockstepVehicle(threading.Thread):
+    """The scripted vehicle behind a socket: a turn each 20 ms of its time, no wall clock.
+
+    Every `repeat`-th question is asked twice, as after a silence, and the truth runs ahead of it by a tick.
+    """
+
+    def __init__(self, scripted, ground: UdpSocket, truth: UdpSocket, repeat: int, turns: int) -> None:
+        super().__init__(daemon=True)
+        self.scripted = scripted
+        self.repeat = repeat
+        self.turns = turns
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.settimeout(WAIT_S)
+        self.ground = _where(ground)
+        self.truth = _where(truth)
+        self.writer = FrameWriter(1, 1)
+        self.world = FrameWriter(1, 26)
+
+    def run(self) -> None:
+        try:
+            for turn in range(1, self.turns + 1):
+                self._turn(turn)
+        except OSError:  # the ground is done
+            return
+        finally:
+            self.socket.close()
+
+    def _turn(self, turn: int) -> None:
+        now_us = turn * TICK_US
+        # truth every 8 ms; every third turn the world is a tick ahead of the question already
+        first = -(-(now_us - TICK_US + 1) // 8_000) * 8_000
+        ahead = 8_000 if turn % 3 == 0 else 0
+        sent_before = 8_000 if turn % 3 == 1 and turn > 1 else 0
+        for time_us in range(first + sent_before, now_us + ahead + 1, 8_000):
+            status = mavlink.MAVLink_sim_status_message(time_us, 0.0, 0.0, 0, 0, 0, 0, 1, 1)
+            self.socket.sendto(self.world.frame(status), self.truth)
+        for datagram in self.scripted.tick(now_us):
+            self.socket.sendto(datagram, self.ground)
+        questions = 2 if self.repeat and turn % self.repeat == 0 else 1
+        for _ in range(questions):
+            self.socket.sendto(
+                self.writer.frame(mavlink.MAVLink_timesync_message(0, now_us * 1000)), self.ground
+            )
+        answers = 0
+        while answers < questions:
+            datagram = self.socket.recv(65535)
+            if datagram == GOODBYE:
+                raise ConnectionAbortedError
+            if datagram[7:10] == bytes((mavlink.MAVLINK_MSG_ID_TIMESYNC, 0, 0)):
+                answers += 1
+            else:
+                self.scripted.receive(datagram)
+
+
+def _where(udp: UdpSocket) -> tuple[str, int]:
+    host, port = udp.address.split(":")
+    return host, int(port)
+
+
+def short_flight(vehicle, t):
+    for end, phase, item in (
+        (1.0, mavlink.PLUMBLINE_PHASE_LIFT, 0),
+        (2.0, mavlink.PLUMBLINE_PHASE_MISSION, 1),
+        (3.0, mavlink.PLUMBLINE_PHASE_LOWER, len(vehicle.mission) - 1),
+    ):
+        if t < end:
+            vehicle.phase, vehicle.item = phase, item
+            return
+    if vehicle.armed:
+        vehicle.arm(False)
+
+
+def fly_lockstep(new_world, items, path: Path, repeat: int, turns: int = 1_000) -> FlightClient:
+    scripted = new_world().vehicle
+    scripted.script = short_flight
+    client = FlightClient(items[:2] + items[-1:], 10.0)
+    with UdpContext() as ground, UdpContext() as truth, StopRequest("") as stop, path.open("wb") as file:
+        vehicle = LockstepVehicle(scripted, ground, truth, repeat, turns)
+        vehicle.start()
+        display = FlightDisplay("test", quiet=True)
+        ended = lambda: "" if vehicle.is_alive() else "autopilot was killed by SIGKILL"  # noqa: E731
+        run_lockstep(client, Capture(TlogWriter(file)), ground, truth, ended, display, stop, lambda: None)
+        ground.send(GOODBYE)
+    vehicle.join(WAIT_S)
+    return client
+
+
+def test_lockstep_writes_the_same_bytes_whatever_is_repeated(new_world, items, tmp_path):
+    logs = []
+    for repeat in (0, 5):
+        path = tmp_path / f"{repeat}.tlog"
+        client = fly_lockstep(new_world, items, path, repeat)
+        assert client.outcome is not None
+        assert client.outcome.name == "completed"
+        logs.append(path.read_bytes())
+    assert logs[0] == logs[1]
+    assert len(logs[0]) > 10_000
+
+
+def test_an_autopilot_that_dies_in_flight_is_an_outcome(new_world, items, tmp_path):
+    client = fly_lockstep(new_world, items, tmp_path / "x.tlog", 0, turns=100)
+    assert client.outcome is not None
+    assert client.outcome.name == "lost"
+    assert client.outcome.reason == "autopilot was killed by SIGKILL"
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_process_that_ends_before_the_flight_is_an_error(items, tmp_path, lockstep):
+    client = FlightClient(items, 10.0)
+    display = FlightDisplay("test", quiet=True)
+    with UdpContext() as ground, UdpContext() as truth, StopRequest("") as stop:
+        capture = Capture(TlogWriter((tmp_path / "x.tlog").open("wb")))
+        arguments = (client, capture, ground, truth, lambda: "sitl ended with exit code 1: no", display, stop)
+        with pytest.raises(NoVehicleError, match="sitl ended with exit code 1: no"):
+            if lockstep:
+                run_lockstep(*arguments, lambda: None)
+            else:
+                run_wall_clock(*arguments)
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_ctrl_c_stops_the_flight_once_and_in_order(items, tmp_path, lockstep, capsys):
+    client = FlightClient(items, 10.0)
+    display = FlightDisplay("test", quiet=True)
+    with UdpContext() as ground, UdpContext() as truth, StopRequest("stopping") as stop:
+        signal.raise_signal(signal.SIGINT)
+        capture = Capture(TlogWriter((tmp_path / "x.tlog").open("wb")))
+        arguments = (client, capture, ground, truth, lambda: "", display, stop)
+        if lockstep:
+            run_lockstep(*arguments, lambda: None)
+        else:
+            run_wall_clock(*arguments)
+        assert client.outcome is not None
+        assert client.outcome.name == "interrupted"
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert capsys.readouterr().err == "gcs: stopping\n"
+
+
+# ---- processes
+
+
+def test_a_child_is_stopped_and_reaped(tmp_path):
+    with Processes() as processes:
+        child = processes.start("timeit", LASTING, tmp_path / "log")
+        assert processes.ended() == ""
+        assert os.getpgid(child.pid) == child.pid, "Ctrl-C of the terminal must not reach it"
+    assert child.exit_code == -signal.SIGTERM
+
+
+def test_a_deaf_child_is_killed(tmp_path, monkeypatch):
+    monkeypatch.setattr(processes_module, "STOP_S", 0.3)
+    log = tmp_path / "log"
+    with Processes() as processes:
+        child = processes.start("timeit", DEAF, log)
+        poll_until(lambda: log.stat().st_size > 0, child)
+    assert child.exit_code == -signal.SIGKILL
+
+
+def test_an_early_end_is_one_line_with_the_last_words(tmp_path):
+    with Processes() as processes:
+        child = processes.start("timeit", ["--no-such-option"], tmp_path / "log")
+        child._process.wait(WAIT_S)
+        line = processes.ended()
+    assert line.startswith("timeit ended with exit code 2: ")
+    assert "\n" not in line
+
+
+def test_the_prefix_of_the_program_is_said_once(tmp_path):
+    with Processes() as processes:
+        child = processes.start("timeit", LASTING, tmp_path / "log")
+        child.log.write_text("warning\ntimeit: cannot listen on 127.0.0.1:1\n\n")
+        child.exit_code = 1
+        assert child.obituary() == "timeit ended with exit code 1: cannot listen on 127.0.0.1:1"
+        child.exit_code = -9
+        assert child.obituary().startswith("timeit was killed by SIGKILL: ")
+
+
+def test_children_share_our_core_and_we_get_ours_back(tmp_path):
+    before = os.sched_getaffinity(0)
+    with Processes() as processes:
+        child = processes.start("timeit", LASTING, tmp_path / "log")
+        processes.share_one_core()
+        assert os.sched_getaffinity(child.pid) == os.sched_getaffinity(0)
+        assert len(os.sched_getaffinity(0)) == 1
+    assert os.sched_getaffinity(0) == before
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="PR_SET_PDEATHSIG is Linux's")
+def test_nothing_outlives_a_killed_gcs(tmp_path):
+    program = (
+        "import sys; from pathlib import Path; from gcs.processes import Processes\n"
+        f"child = Processes().start('timeit', {LASTING!r}, Path(sys.argv[1]))\n"
+        "print(child.pid, flush=True); sys.stdin.read()"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path / "log")], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert parent.stdout is not None and parent.stdin is not None
+    pid = int(parent.stdout.readline())
+    watch = os.pidfd_open(pid)
+    parent.kill()
+    parent.wait(WAIT_S)
+    assert select.select([watch], [], [], WAIT_S)[0], "the child still runs"
+    os.close(watch)
+    parent.stdout.close()
+    parent.stdin.close()
+
+
+def poll_until(condition, child) -> None:
+    """Wait for a condition on a living child, by waiting on the child with a bound."""
+    for _ in range(int(WAIT_S / 0.05)):
+        if condition():
+            return
+        with pytest.raises(subprocess.TimeoutExpired):
+            child._process.wait(0.05)
+    pytest.fail("never came")
+
+
+def test_free_ports_are_free():
+    UdpSocket(port=free_port()).close()

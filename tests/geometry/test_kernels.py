@@ -1,0 +1,68 @@
+"""A kernel gives the same bits compiled and interpreted."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from autopilot.geometry import frames, linear, s2, so3
+
+SAMPLES = 50
+
+
+def kernels(module: ModuleType) -> Iterator[tuple[str, Any]]:
+    for name, function in vars(module).items():
+        if hasattr(function, "py_func") and function.__module__ == module.__name__:
+            yield f"{module.__name__.rpartition('.')[2]}.{name}", function
+
+
+ALL = dict(pair for module in (frames, linear, s2, so3) for pair in kernels(module))
+
+
+def argument(annotation: str, name: str, rng: np.random.Generator) -> Any:
+    def vector() -> tuple[float, ...]:
+        return tuple(float(x) for x in rng.normal(size=3))
+
+    rotation = Rotation.random(rng=rng)
+    match annotation:
+        case "float":
+            return float(rng.normal())
+        case "int":
+            return int(rng.integers(3))
+        case "Vec3":
+            return vector()
+        case "Quat":
+            return tuple(float(x) for x in rotation.as_quat(scalar_first=True))
+        case "Mat3":
+            turned = name.startswith("R")
+            rows = rotation.as_matrix() if turned else rng.normal(size=(3, 3))
+            return tuple(tuple(float(x) for x in row) for row in rows)
+    raise TypeError(annotation)
+
+
+def flat(value: Any) -> list[float]:
+    return [x for one in value for x in flat(one)] if isinstance(value, tuple) else [value]
+
+
+@pytest.mark.skipif(not ALL, reason="numba is switched off: there is nothing compiled to compare with")
+@pytest.mark.parametrize("name", ALL)
+def test_compiled_and_interpreted_agree_to_the_bit(name: str) -> None:
+    compiled = ALL[name]
+    parameters = inspect.signature(compiled.py_func).parameters
+    rng = np.random.default_rng(sum(name.encode()))
+    for _ in range(SAMPLES):
+        arguments = [argument(str(p.annotation), p.name, rng) for p in parameters.values()]
+        machine, python = flat(compiled(*arguments)), flat(compiled.py_func(*arguments))
+        assert np.array(machine).tobytes() == np.array(python).tobytes()
+
+
+def test_kernels_are_found() -> None:
+    assert not ALL or {"linear.cross", "so3.quat_exp", "s2.unit_derivatives", "frames.ned_from_enu"} <= set(
+        ALL
+    )

@@ -1,0 +1,170 @@
+"""What four rotors cannot fly is said so, with limit, excess, time and remedy; what they can fly passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import cos, inf, pi, radians, sqrt
+
+import pytest
+
+from missions.feasibility import VehicleLimits, check, durations, peaks
+from missions.fileformat import load_mission, shipped
+from missions.legs import SET_DOWN_S, TAUTEN_S, legs
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    Mission,
+    ReturnHome,
+    Signals,
+    Sine,
+    Speed,
+    Step,
+    Takeoff,
+    Term,
+    Waypoint,
+)
+from missions.transfer import transfer_duration
+
+LIMITS = VehicleLimits()
+WithAmplitude = Callable[[str, str, float], Mission]
+
+
+def mission(*steps: Step) -> Mission:
+    return Mission("m", "M", "", (), (Takeoff(2.0), *steps, Land()))
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_shipped_missions_can_be_flown(name: str) -> None:
+    assert [str(violation) for violation in check(load_mission(name), LIMITS)] == []
+
+
+def test_more_height_than_gravity_gives(with_amplitude: WithAmplitude) -> None:
+    (violation,) = check(with_amplitude("case-c", "z", 0.6), LIMITS)
+    assert violation.quantity == "tension"
+    # 0.6 m at 2 pi / 1.5 rad/s
+    assert violation.value == pytest.approx(0.6 * (2.0 * pi / 1.5) ** 2, rel=1e-3)
+    assert violation.text == (
+        "items[2] (signals): at 22.9 s the load would have to fall at 10.5 m/s^2 with the cable taut; "
+        "gravity gives 9.81 m/s^2 (7 % over); lower amplitude_m of z or lengthen its period_s"
+    )
+
+
+def test_more_than_the_rotors_give(with_amplitude: WithAmplitude) -> None:
+    found = check(with_amplitude("case-c", "z", 0.3), LIMITS)
+    assert [violation.quantity for violation in found] == ["thrust", "rotor force", "rotor force"]
+    thrust = found[0]
+    assert thrust.limit == pytest.approx(0.9 * 4.0 * 1.96)
+    assert thrust.value > thrust.limit
+    assert thrust.text == (
+        "items[2] (signals): at 22.1 s the flight needs 7.65 N of thrust; four rotors give 7.84 N, 7.06 N "
+        "with the reserve of 10 % (8 % over); lower amplitude_m of z or lengthen its period_s"
+    )
+
+
+def test_a_tilt_beyond_the_limit(with_amplitude: WithAmplitude) -> None:
+    found = check(with_amplitude("case-b", "y", 1.0), replace(LIMITS, tilt_max_rad=radians(15.0)))
+    assert [violation.text for violation in found] == [
+        f"items[2] (signals): at {found[0].time_s:.1f} s the vehicle leans 19 deg; the limit is 15 deg "
+        "(4 deg over); lower amplitude_m of y or lengthen its period_s"
+    ]
+
+
+def test_without_rotor_limits_only_gravity_and_tilt_bind(with_amplitude: WithAmplitude) -> None:
+    unlimited = replace(LIMITS, rotor_max_n=inf, rotor_min_n=-inf, tilt_max_rad=pi)
+    assert check(with_amplitude("case-c", "z", 0.3), unlimited) == []
+
+
+def test_under_the_ground() -> None:
+    slow = Term("z", -3.0, 0.0, 10.0, None, 0.0)
+    (violation,) = check(mission(Signals(12.0, (slow,))), LIMITS)
+    assert violation.text == (
+        "items[1] (signals): at 10.0 s the load would be 1.00 m under the ground; begin higher (altitude_m) "
+        "or lower amplitude_m of z"
+    )
+
+
+def test_a_jump_of_position_and_of_velocity() -> None:
+    jump = Term("x", 0.5, 1.0, 0.0, None, 0.0)
+    kick = Term("y", 0.5, 2.0, 0.0, 6.0, 0.0, (Sine(3.0, 0.0, 2.0),))
+    found = {v.quantity: v for v in check(mission(Signals(9.0, (jump, kick))), LIMITS)}
+    assert found["position jump"].value == pytest.approx(0.5)
+    assert found["position jump"].time_s == 1.0
+    assert found["velocity jump"].value == pytest.approx(0.5 * 2.0 * pi / 3.0)
+    assert "lengthen rise_s and fall_s" in found["velocity jump"].text
+
+
+def test_an_end_in_mid_swing_names_the_duration_it_takes() -> None:
+    (signals,) = [step for step in load_mission("case-b").steps if isinstance(step, Signals)]
+    found = check(mission(replace(signals, duration_s=40.0)), LIMITS)
+    assert [violation.quantity for violation in found] == ["velocity at the end"]
+    assert found[0].text.endswith("it must be at rest: change duration_s to 50")
+
+
+def test_a_swing_for_ever_never_comes_to_rest() -> None:
+    forever = Term("y", 0.5, 0.0, 5.0, None, 0.0, (Sine(3.0),))
+    (violation,) = check(mission(Signals(9.0, (forever,))), LIMITS)
+    assert violation.text.endswith("change the signals so that all come to rest")
+
+
+def test_peaks_of_a_sine_held_are_those_of_the_formula() -> None:
+    along = peaks(load_mission("case-b"), LIMITS)[2]
+    omega = 2.0 * pi / 3.0
+    # the envelope's slope adds less than this share
+    assert along.speed.value == pytest.approx(omega, rel=2e-3)
+    assert along.accel.value == pytest.approx(omega**2, rel=2e-3)
+    assert along.tension_low.value == pytest.approx(0.1 * 9.81, rel=1e-6)
+
+
+def test_transfers_keep_the_speed_and_acceleration_they_are_given() -> None:
+    along = peaks(mission(Speed(1.5), Waypoint(4.0, 3.0, 2.0)), replace(LIMITS, accel_m_s2=0.7))[2]
+    # 201 samples along the transfer
+    assert max(along.speed.value / 1.5, along.accel.value / 0.7) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_transfer_too_fast() -> None:
+    hasty = replace(LIMITS, accel_m_s2=14.0)
+    found = check(mission(Speed(20.0), Waypoint(30.0, 0.0, 2.0)), hasty)
+    assert {violation.quantity for violation in found} >= {"thrust", "tilt"}
+    assert found[0].text.endswith("lower speed_m_s or the acceleration of transfers")
+
+
+@pytest.mark.parametrize("controlled", ["vehicle", "load"])
+def test_attitude_runs(controlled: str) -> None:
+    gentle = AttitudeRun(controlled, 0.0, radians(10.0), 1.2)
+    steep = AttitudeRun(controlled, radians(50.0), 0.0, 4.0)
+    sudden = AttitudeRun(controlled, radians(30.0), 0.0, 0.1)
+    assert check(mission(gentle), LIMITS) == []
+    assert "tilt" in {violation.quantity for violation in check(mission(steep), LIMITS)}
+    assert "rotor force" in {violation.quantity for violation in check(mission(sudden), LIMITS)}
+
+
+def test_an_attitude_run_of_the_vehicle_carries_the_weight_on_a_slope() -> None:
+    along = peaks(mission(AttitudeRun("vehicle", radians(20.0), 0.0, 3.0)), LIMITS)[1]
+    assert along.tilt.value == pytest.approx(radians(20.0), rel=1e-6)
+    assert along.thrust.value == pytest.approx(0.5 * 9.81 / cos(radians(20.0)), rel=1e-6)
+
+
+def test_legs_follow_the_load() -> None:
+    push = Signals(5.0, (Term("x", 3.0, 0.0, 4.0, None, 0.0), Term("y", 1.0, 0.0, 1.0, 1.0, 1.0)))
+    plan = mission(Waypoint(1.0, 2.0, 3.0, 4.0), push, Delay(2.0), ReturnHome())
+    found = list(legs(plan, 2.0, 1.0))
+    assert [leg.end for leg in found] == [
+        (0.0, 0.0, 2.0),
+        (1.0, 2.0, 3.0),
+        (4.0, 2.0, 3.0),
+        (4.0, 2.0, 3.0),
+        (0.0, 0.0, 3.0),
+        (0.0, 0.0, 0.0),
+    ]
+    assert [leg.begin for leg in found[1:]] == [leg.end for leg in found[:-1]]
+    assert found[1].duration_s == pytest.approx(4.0 + transfer_duration(sqrt(6.0), 2.0, 1.0))
+    assert found[2].duration_s == 5.0
+
+
+def test_durations_adds_take_off_and_landing() -> None:
+    lift = transfer_duration(2.0, 0.8, 2.0)
+    assert durations(load_mission("hover"), 2.0, 2.0) == pytest.approx(
+        TAUTEN_S + lift + 10.0 + lift + SET_DOWN_S
+    )

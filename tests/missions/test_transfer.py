@@ -1,0 +1,85 @@
+"""The rest-to-rest transfer against its own definition, in exact arithmetic."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from missions.transfer import PEAK_ACCELERATION, PEAK_SPEED, transfer, transfer_duration
+
+P0, P1 = (1.0, -2.0, 3.0), (4.0, 2.0, 2.5)
+# Horner with alternating coefficients up to 24024 on half the interval leaves some twelve digits, relative
+# to the peak of each derivative.
+RELATIVE_ROUNDING = 1e-11
+
+u = sp.Symbol("u")
+
+
+def smoothstep() -> sp.Expr:
+    """Slope proportional to u^6 (1 - u)^6, normalised to rise by one."""
+    slope = u**6 * (1 - u) ** 6
+    return sp.integrate(sp.expand(slope / sp.integrate(slope, (u, 0, 1))), u)
+
+
+def test_position_and_derivatives_are_those_of_the_polynomial() -> None:
+    s, duration = smoothstep(), 3.5
+    path = np.subtract(P1, P0)
+    for order in range(7):
+        derivative = sp.lambdify(u, sp.expand(sp.diff(s, u, order)))
+        peak = max(abs(float(derivative(sp.Rational(k, 60)))) for k in range(61))
+        for k in range(0, 71, 3):
+            exact = float(derivative(sp.Rational(k, 70)))
+            expected = path * exact / duration**order + (np.array(P0) if order == 0 else 0.0)
+            found = transfer(P0, P1, duration, duration * k / 70)[order]
+            assert np.allclose(found, expected, rtol=0.0, atol=RELATIVE_ROUNDING * 5.0 * peak), (order, k)
+
+
+@pytest.mark.parametrize("t", [-1.0, 0.0, 3.5, 99.0])
+def test_outside_it_rests_at_the_ends(t: float) -> None:
+    jet = transfer(P0, P1, 3.5, t)
+    assert jet[0] == (P0 if t <= 0.0 else P1)
+    assert all(component == 0.0 for derivative in jet[1:] for component in derivative)
+
+
+def test_no_way_to_go_takes_no_time() -> None:
+    assert transfer_duration(0.0, 2.0, 1.0) == 0.0
+    assert transfer(P0, P0, 0.0, 0.0)[0] == P0
+
+
+def test_the_peak_factors_are_the_extremes_of_the_polynomial() -> None:
+    s = smoothstep()
+    assert float(sp.diff(s, u).subs(u, sp.Rational(1, 2))) == PEAK_SPEED
+    where = (1 - 1 / sp.sqrt(11)) / 2
+    assert sp.simplify(sp.diff(s, u, 3).subs(u, where)) == 0
+    assert float(sp.diff(s, u, 2).subs(u, where)) == pytest.approx(PEAK_ACCELERATION, rel=1e-15)
+
+
+@given(distance=st.floats(0.01, 100.0), speed=st.floats(0.1, 10.0), accel=st.floats(0.1, 10.0))
+def test_speed_and_acceleration_stay_within_and_one_is_reached(
+    distance: float, speed: float, accel: float
+) -> None:
+    duration = transfer_duration(distance, speed, accel)
+    jets = [
+        transfer((0.0, 0.0, 0.0), (distance, 0.0, 0.0), duration, duration * k / 400.0) for k in range(401)
+    ]
+    fastest = max(abs(jet[1][0]) for jet in jets) / speed
+    hardest = max(abs(jet[2][0]) for jet in jets) / accel
+    assert max(fastest, hardest) <= 1.0 + 1e-9
+    # 400 samples miss a peak by less than this
+    assert max(fastest, hardest) >= 0.999
+
+
+@given(t=st.floats(0.0, 3.5))
+def test_it_moves_one_way_only(t: float) -> None:
+    jet = transfer(P0, P1, 3.5, t)
+    # |p1 - p0| is 5.02 m
+    assert -1e-12 <= np.dot(np.subtract(jet[0], P0), np.subtract(P1, P0)) / 25.25 <= 1.0 + 1e-12
+    assert np.dot(jet[1], np.subtract(P1, P0)) >= 0.0
+
+
+def test_plain_python_and_machine_code_agree_to_the_bit() -> None:
+    for k in range(36):
+        assert transfer.py_func(P0, P1, 3.5, 0.1 * k) == transfer(P0, P1, 3.5, 0.1 * k)

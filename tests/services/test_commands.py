@@ -1,0 +1,302 @@
+"""Commands: one table from what clients send to what the supervisor is asked, and what comes back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
+from autopilot.services.identity import AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
+from autopilot.services.records import Verdict
+from autopilot.services.requests import (
+    Arm,
+    ChangeSpeed,
+    Continue,
+    Land,
+    Pause,
+    Reboot,
+    Reposition,
+    ReturnHome,
+    RunPrearmChecks,
+    SetCurrent,
+    SetHome,
+    SetMode,
+    StartMission,
+    Takeoff,
+    Terminate,
+)
+from autopilot.wire.convert import geodetic_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
+
+NAN = math.nan
+OK, DENIED, UNSUPPORTED = (
+    mavlink.MAV_RESULT_ACCEPTED,
+    mavlink.MAV_RESULT_DENIED,
+    mavlink.MAV_RESULT_UNSUPPORTED,
+)
+PACKED_LAND = float(AUTO_LAND << 24 | AUTO << 16)
+
+# what is sent as COMMAND_LONG, what the supervisor is asked (None: nothing), the result
+LONG = [
+    (400, (1,), Arm(True, False), OK),
+    (400, (0,), Arm(False, False), OK),
+    *[(400, (0, magic), Arm(False, True), OK) for magic in FORCE_ARM],
+    (400, (1, 1), Arm(True, False), OK),
+    (400, (NAN,), None, DENIED),
+    (400, (2,), None, DENIED),
+    (22, (NAN,) * 7, Takeoff(None), OK),  # MAVSDK
+    (22, (-1, 0, 0, NAN, NAN, NAN, 5), Takeoff(5.0), OK),  # QGroundControl
+    (22, (0, 0, 0, 0, 0, 0, -3), None, DENIED),
+    (22, (0, 0, 0, 0, 0, 0, 0), None, DENIED),
+    (21, (NAN,) * 7, Land(), OK),
+    (20, (), ReturnHome(), OK),
+    (176, (1, AUTO, AUTO_MISSION), SetMode(AUTO, AUTO_MISSION), OK),
+    (176, (129, AUTO), SetMode(AUTO, AUTO_MISSION), OK),
+    (176, (1, OFFBOARD, NAN), SetMode(OFFBOARD, 0), OK),
+    (176, (1, PACKED_LAND), SetMode(AUTO, AUTO_LAND), OK),
+    (176, (1, AUTO, 77), None, DENIED),
+    (176, (1, 3e9), None, DENIED),
+    (176, (1, -1), None, DENIED),
+    (176, (0, AUTO, AUTO_MISSION), None, UNSUPPORTED),
+    (176, (NAN, AUTO, 4), None, DENIED),
+    (300, (0, 0), StartMission(0), OK),
+    (300, (3,), StartMission(3), OK),
+    (300, (NAN,), StartMission(None), OK),
+    (300, (-1,), None, DENIED),
+    (300, (0.5,), None, DENIED),
+    (193, (0,), Pause(), OK),
+    (193, (1,), Continue(), OK),
+    (193, (NAN,), None, DENIED),
+    (224, (7,), SetCurrent(7), OK),
+    (224, (NAN,), None, DENIED),
+    (192, (-1, 1, 0, NAN, NAN, NAN, NAN), Pause(), OK),  # QGroundControl's pause
+    (192, (-1, 1, 0, NAN, 200, 0, 5), None, DENIED),
+    (192, (-1, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
+    (192, (-1, 0, 0, NAN, NAN, NAN, math.inf), None, DENIED),
+    (178, (1, 2.5, -1), ChangeSpeed(2.5), OK),
+    (178, (1, -1, -1), None, DENIED),
+    (178, (1, NAN, -1), None, DENIED),
+    (179, (1,), SetHome(None), OK),
+    (179, (0, 0, 0, 0, NAN, 0, 0), None, DENIED),
+    (185, (1,), Terminate(), OK),
+    (185, (0,), None, DENIED),
+    (401, (), RunPrearmChecks(), OK),
+    (246, (1,), Reboot(False), OK),
+    (246, (2,), Reboot(True), OK),
+    (246, (NAN,), None, UNSUPPORTED),
+    (245, (1,), None, OK),
+    (245, (2,), None, UNSUPPORTED),
+    (512, (148,), None, OK),
+    (512, (397,), None, UNSUPPORTED),
+    (512, (NAN,), None, UNSUPPORTED),
+    (512, (244, NAN), None, UNSUPPORTED),
+    (512, (244, math.inf), None, UNSUPPORTED),
+    (520, (1,), None, OK),
+    (519, (1,), None, UNSUPPORTED),
+    (511, (30, 100_000), None, OK),
+    (511, (30, NAN), None, DENIED),
+    (511, (30, -2), None, DENIED),
+    (511, (30, 3e38), None, OK),
+    (511, (77, 1000), None, UNSUPPORTED),
+    (511, (0, -1), None, DENIED),
+    (510, (30,), None, OK),
+    (510, (1e9,), None, UNSUPPORTED),
+    (211, (1, 1), None, UNSUPPORTED),
+    (65535, (), None, UNSUPPORTED),
+]
+
+
+def long(command, params=(), confirmation=0, system=1, component=1):
+    values = (*params, *(0.0,) * (7 - len(params)))
+    return mavlink.MAVLink_command_long_message(system, component, command, confirmation, *values)
+
+
+def as_int(command, frame, params=(0, 0, 0, 0), x=0, y=0, z=0.0, system=1, component=1):
+    return mavlink.MAVLink_command_int_message(system, component, frame, command, 0, 0, *params, x, y, z)
+
+
+def acks(replies):
+    return [(m.command, m.result) for m in replies if m.get_type() == "COMMAND_ACK"]
+
+
+@pytest.mark.parametrize(("command", "params", "request_", "result"), LONG, ids=lambda value: str(value)[:40])
+def test_command_long(rig, command, params, request_, result):
+    replies = rig.replies(long(command, params))
+    assert acks(replies) == [(command, result)]
+    assert rig.asked == ([] if request_ is None else [request_])
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "result"),
+    [(c, p, r) for c, p, _, r in LONG if len(p) <= 4],
+    ids=lambda v: str(v)[:40],
+)
+def test_command_int_is_acknowledged_as_command_long(rig, command, params, result):
+    p = (*params, *(0.0,) * (4 - len(params)))
+    expected = result if command not in (22, 179) else None
+    (answer,) = acks(rig.replies(as_int(command, mavlink.MAV_FRAME_GLOBAL_INT, p)))
+    assert answer[0] == command
+    assert expected in (None, answer[1])
+
+
+def test_no_command_is_left_without_an_answer(rig):
+    for command in range(0, 65536, 97):
+        assert len(acks(rig.replies(long(command)))) == 1
+
+
+def test_the_ack_names_the_asker(rig):
+    (ack,) = rig.replies(long(20), system=245, component=77)
+    assert (ack.target_system, ack.target_component) == (245, 77)
+
+
+@pytest.mark.parametrize("component", [0, 1])
+@pytest.mark.parametrize("system", [0, 1])
+def test_broadcast_and_own_address_execute(rig, system, component):
+    assert acks(rig.replies(long(20, system=system, component=component))) == [(20, OK)]
+
+
+@pytest.mark.parametrize(("system", "component"), [(2, 1), (2, 0), (1, 169), (1, 25), (255, 190)])
+def test_for_somebody_else_there_is_silence(rig, system, component):
+    assert rig.replies(long(400, (1,), system=system, component=component)) == []
+    assert rig.replies(as_int(400, 0, (1, 0, 0, 0), system=system, component=component)) == []
+    assert rig.asked == []
+
+
+def test_only_the_asker_hears_the_ack_but_all_hear_the_reason(rig):
+    rig.endpoint.add_link("api")
+    rig.verdict = lambda request: Verdict(DENIED, "Arm: the load is not measured")
+    rig.poll()
+    rig.send(long(400, (1,)))
+    out = rig.poll()
+    kinds = {link: [r.message.get_type() for r in got] for link, got in out.items()}
+    assert kinds["gcs"][:2] == ["STATUSTEXT", "COMMAND_ACK"]
+    assert "STATUSTEXT" in kinds["api"]
+    assert "COMMAND_ACK" not in kinds["api"]
+
+
+@pytest.mark.parametrize("frame", [3, 6])
+def test_takeoff_above_home_by_frame(rig_with, frame):
+    rig = rig_with()
+    rig.replies(as_int(22, frame, z=4.0))
+    assert rig.asked == [Takeoff(4.0)]
+
+
+def test_takeoff_below_home_says_the_height_it_understood(rig):
+    replies = rig.replies(long(22, (0, 0, 0, 0, 0, 0, -4)))
+    assert "-4" in replies[0].text
+    assert acks(replies) == [(22, DENIED)]
+
+
+@pytest.mark.parametrize(("frame", "up"), [(0, 7.0), (5, 7.0), (3, 7.0), (6, 7.0)])
+def test_reposition_by_int_is_metres_from_home(rig, snap, frame, up):
+    home = snap().home
+    latitude, longitude, _ = geodetic_from_enu((30.0, -20.0, 0.0), home)
+    rig.replies(as_int(192, frame, (-1, 1, 0, NAN), latitude, longitude, up))
+    (request,) = rig.asked
+    assert (request.east_m, request.north_m) == pytest.approx((30.0, -20.0), abs=0.01)  # 1e-7 degrees
+    assert (request.altitude_m, request.change_mode) == (up, True)
+
+
+def test_set_mode_message_is_acknowledged_as_the_command(rig):
+    message = mavlink.MAVLink_set_mode_message(1, 1, AUTO_LAND << 24 | AUTO << 16)
+    assert acks(rig.replies(message)) == [(176, OK)]
+    assert rig.asked == [SetMode(AUTO, AUTO_LAND)]
+
+
+@pytest.mark.parametrize(
+    ("base_mode", "custom", "result"), [(1, 99 << 16, DENIED), (0, 4 << 16, UNSUPPORTED)]
+)
+def test_set_mode_message_refused(rig, base_mode, custom, result):
+    assert acks(rig.replies(mavlink.MAVLink_set_mode_message(1, base_mode, custom))) == [(176, result)]
+    assert rig.asked == []
+
+
+def test_set_current_message_is_answered_by_mission_current(rig):
+    rig.changes = {"mission_current": 5, "mission_total": 9, "mission_state": 3}
+    rig.poll()
+    rig.send(mavlink.MAVLink_mission_set_current_message(1, 1, 5))
+    answers = [r.message for r in rig.poll()["gcs"]]
+    (current,) = [m for m in answers if m.get_type() == "MISSION_CURRENT"]
+    assert (current.seq, current.total, current.mission_state) == (5, 9, 3)
+    assert rig.asked == [SetCurrent(5)]
+
+
+def test_a_repeated_command_is_acknowledged_but_done_once(rig):
+    rig.replies(long(22, (NAN,) * 7))
+    rig.verdict = lambda request: Verdict(DENIED, "already flying")
+    assert acks(rig.replies(long(22, (NAN,) * 7, confirmation=1))) == [(22, OK)]
+    assert len(rig.asked) == 1
+
+
+@pytest.mark.parametrize("other", ["parameters", "asker", "late", "first refused"])
+def test_a_repetition_is_the_same_command_from_the_same_asker_soon_after(rig, other):
+    if other == "first refused":
+        rig.verdict = lambda request: Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+    rig.replies(long(300, (0,)))
+    if other == "late":
+        rig.now_us += REPEAT_US + 1
+    params = (1,) if other == "parameters" else (0,)
+    rig.replies(long(300, params, confirmation=1), system=245 if other == "asker" else 255)
+    assert len(rig.asked) == 2
+
+
+def test_heartbeat_at_once_when_the_supervisor_did_something(rig):
+    rig.poll()
+    rig.poll()
+    rig.send(long(400, (1,)))
+    rig.changes = {"armed": True}
+    beats = [r.message for r in rig.poll()["gcs"] if r.message.get_type() == "HEARTBEAT"]
+    assert [beat.base_mode & 128 for beat in beats] == [128]
+
+
+@pytest.mark.parametrize("ask", [long(512, (148,)), long(520, (1,))], ids=["512", "520"])
+def test_version_comes_with_its_ack(rig, ask):
+    assert [m.get_type() for m in rig.replies(ask)] == ["COMMAND_ACK", "AUTOPILOT_VERSION"]
+
+
+def test_intervals_are_told_and_kept_by_link(rig):
+    rig.endpoint.add_link("api")
+    replies = rig.replies(long(511, (mavlink.MAVLINK_MSG_ID_LOAD_STATE, 4000)), long(510, (60101,)))
+    intervals = [m.interval_us for m in replies if m.get_type() == "MESSAGE_INTERVAL"]
+    assert intervals == [4000]
+    counts = {"gcs": 0, "api": 0}
+    for _ in range(250):
+        for link, received in rig.poll().items():
+            counts[link] += sum(r.message.get_type() == "LOAD_STATE" for r in received)
+    assert counts == {"gcs": 250, "api": 20}
+
+
+@pytest.mark.parametrize(("message_id", "interval_us"), [(30, 40_000), (148, -1), (9999, 0)])
+def test_interval_of_a_stream_of_a_message_on_request_and_of_neither(rig, message_id, interval_us):
+    for ask in (long(510, (message_id,)), long(512, (244, message_id))):
+        (told,) = [m for m in rig.replies(ask) if m.get_type() == "MESSAGE_INTERVAL"]
+        assert (told.message_id, told.interval_us) == (message_id, interval_us)
+
+
+def test_a_stream_turned_off_and_on_again(rig):
+    rig.replies(long(511, (30, -1)))
+    assert not [r for r in rig.run(1_000_000) if r.message.get_type() == "ATTITUDE"]
+    rig.replies(long(511, (30, 0)))
+    assert len([r for r in rig.run(1_000_000) if r.message.get_type() == "ATTITUDE"]) == 25
+
+
+def test_a_data_stream_request_turns_nothing_off(rig):
+    rig.replies(mavlink.MAVLink_request_data_stream_message(1, 1, 0, 0, 0))
+    assert len([r for r in rig.run(1_000_000) if r.message.get_type() == "ATTITUDE"]) == 25
+
+
+def test_every_command_stands_in_the_manual():
+    manual = (Path(__file__).parents[2] / "docs" / "mavlink.md").read_text()
+    for command in PARSERS:
+        name = mavlink.enums["MAV_CMD"][command].name.removeprefix("MAV_CMD_")
+        assert f"| {name} | {command} |" in manual
+
+
+def test_every_parser_is_in_the_case_table():
+    assert {command for command, *_ in LONG} >= set(PARSERS)
+
+
+def test_takeoff_in_the_px4_flavour_is_above_the_sea():
+    assert not Identity().flavour.takeoff_above_home

@@ -1,0 +1,73 @@
+"""Who the vehicle says it is, read back by pymavlink's own tables."""
+
+from __future__ import annotations
+
+import pytest
+from pymavlink import mavutil
+
+from autopilot.services.heartbeat import heartbeat_message, load_heartbeat_message
+from autopilot.services.identity import AUTO, FLAVOURS, PX4, Identity, autopilot_version_message
+from autopilot.wire.dialect import plumbline as mavlink
+
+
+@pytest.mark.parametrize("mode", PX4.modes, ids=lambda mode: mode.name)
+def test_pymavlink_names_every_px4_mode_as_the_table_does(mode, snap):
+    beat = heartbeat_message(snap(main_mode=mode.main, sub_mode=mode.sub), Identity())
+    named = mavutil.interpret_px4_mode(beat.base_mode, beat.custom_mode)
+    assert named == mode.name
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS.values(), ids=lambda flavour: flavour.name)
+def test_modes_of_a_flavour_can_be_told_apart(flavour):
+    assert len({mode.custom_mode for mode in flavour.modes}) == len(flavour.modes)
+    assert len({(mode.main, mode.sub) for mode in flavour.modes}) == len(flavour.modes)
+    for mode in flavour.modes:
+        assert flavour.mode(mode.main, mode.sub) is mode
+        assert flavour.mode_of_number(mode.custom_mode) is mode
+
+
+def test_auto_without_a_sub_mode_is_the_mission_mode():
+    mode = PX4.mode(AUTO, 0)
+    assert mode is not None
+    assert mode.name == "MISSION"
+
+
+@pytest.mark.parametrize("armed", [False, True])
+def test_heartbeat_says_armed_and_never_manual_input_in_auto(armed, snap):
+    beat = heartbeat_message(snap(armed=armed), Identity())
+    assert (beat.type, beat.autopilot) == (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
+    assert beat.base_mode == (29 | 128 if armed else 29)
+
+
+def test_heartbeat_in_a_mode_without_a_name_is_still_sent(snap):
+    beat = heartbeat_message(snap(main_mode=99), Identity())
+    assert beat.custom_mode == 0
+    assert beat.base_mode == mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+
+
+def test_the_load_has_no_autopilot(snap):
+    beat = load_heartbeat_message(snap())
+    assert (beat.type, beat.autopilot) == (mavlink.MAV_TYPE_AIRSHIP, mavlink.MAV_AUTOPILOT_INVALID)
+
+
+def test_capabilities_promise_what_is_served_and_nothing_else():
+    capabilities = autopilot_version_message(Identity()).capabilities
+    for name in ("MISSION_INT", "COMMAND_INT", "MAVLINK2", "PARAM_ENCODE_BYTEWISE"):
+        assert capabilities & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{name}")
+    unserved = [
+        "FTP",
+        "MISSION_FENCE",
+        "MISSION_RALLY",
+        "SET_ATTITUDE_TARGET",
+        "PARAM_ENCODE_C_CAST",
+        "TERRAIN",
+    ]
+    for name in unserved:
+        assert not capabilities & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{name}")
+
+
+def test_release_is_one_that_ground_stations_accept():
+    word = autopilot_version_message(Identity()).flight_sw_version
+    assert word >> 24 >= 1
+    assert (word >> 24, word >> 16 & 0xFF, word >> 8 & 0xFF) >= (1, 4, 1)
+    assert word & 0xFF == mavlink.FIRMWARE_VERSION_TYPE_DEV

@@ -1,0 +1,139 @@
+"""The parameter protocol, with a ground station that misses what it likes."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from autopilot.services.parameters import DOES_NOT_EXIST, LIST_PACE_US, OUT_OF_RANGE, READ_ONLY, TYPE_MISMATCH
+from autopilot.services.records import ParameterChanged
+from autopilot.wire.dialect import plumbline as m
+
+REAL32 = m.MAV_PARAM_TYPE_REAL32
+
+
+def set_(name: bytes, value: float, kind: int = REAL32):
+    return m.MAVLink_param_set_message(1, 1, name, value, kind)
+
+
+def read(name: bytes = b"", index: int = -1):
+    return m.MAVLink_param_request_read_message(1, 1, name, index)
+
+
+def values(messages):
+    return [(x.param_id, x.param_value, x.param_index) for x in messages if x.get_type() == "PARAM_VALUE"]
+
+
+def errors(messages):
+    return [(x.param_id, x.error) for x in messages if x.get_type() == "PARAM_ERROR"]
+
+
+def listed(rig, link="gcs", duration_us=200_000):
+    return [r.message for r in rig.run(duration_us, link) if r.message.get_type() == "PARAM_VALUE"]
+
+
+def test_the_list_is_whole_in_order_and_real32(rig):
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    got = listed(rig)
+    assert [x.param_id for x in got] == list(rig.table.names)
+    assert [x.param_index for x in got] == list(range(len(rig.table)))
+    assert {x.param_count for x in got} == {len(rig.table)}
+    assert {x.param_type for x in got} == {REAL32}
+
+
+def test_the_list_is_paced_and_only_for_the_asker(rig):
+    rig.endpoint.add_link("api")
+    rig.run(8000)
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    names = []
+    for _ in range(4):
+        out = rig.poll()
+        assert not values(r.message for r in out.get("api", []))
+        names.append(len(values(r.message for r in out.get("gcs", []))))
+    per_tick = 4000 // LIST_PACE_US
+    assert names[0] <= per_tick
+    assert names[:3] == [1, per_tick, 1]  # 4 in all
+
+
+def test_a_second_request_begins_again(rig):
+    rig.poll()
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    rig.poll()
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    assert [x.param_index for x in listed(rig)] == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_a_gap_is_filled_by_index(rig, index):
+    name = rig.table.names[index]
+    ((got, _, place),) = values(rig.replies(read(index=index)))
+    assert (got, place) == (name, index)
+
+
+@pytest.mark.parametrize("name", [b"LOAD_MASS", b"SIXTEEN_LETTERS1"])
+def test_read_by_name(rig, name):
+    ((got, value, _),) = values(rig.replies(read(name)))
+    assert got == name.decode()
+    assert value == pytest.approx(rig.table[got], rel=1e-7)  # float32
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [read(b"NONE"), read(index=4), read(index=-2), read(b""), read(b"\xff\x80"), set_(b"NONE", 1.0)],
+    ids=["name", "index", "negative", "empty", "not ascii", "set"],
+)
+def test_what_is_not_there_is_said_and_no_other_name_is_sent(rig, ask):
+    replies = rig.replies(ask)
+    assert values(replies) == []
+    assert [error for _, error in errors(replies)] == [DOES_NOT_EXIST]
+
+
+def test_set_is_echoed_to_all_and_kept_as_the_number_that_was_typed(rig):
+    rig.endpoint.add_link("api")
+    rig.poll()
+    rig.send(set_(b"LOAD_MASS", 0.1))
+    out = rig.poll()
+    for link in ("gcs", "api"):
+        ((name, _, index),) = values(r.message for r in out[link])
+        assert (name, index) == ("LOAD_MASS", rig.table.index("LOAD_MASS"))
+    assert rig.table["LOAD_MASS"] == 0.1
+    assert rig.events == [ParameterChanged("LOAD_MASS", 0.1)]
+
+
+def test_setting_what_is_already_so_is_echoed_but_is_no_change(rig):
+    assert values(rig.replies(set_(b"MIS_TAKEOFF_ALT", 2.0))) == [
+        ("MIS_TAKEOFF_ALT", 2.0, rig.table.index("MIS_TAKEOFF_ALT"))
+    ]
+    assert rig.events == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind", "error"),
+    [
+        (b"LOAD_MASS", math.nan, REAL32, OUT_OF_RANGE),
+        (b"LOAD_MASS", math.inf, REAL32, OUT_OF_RANGE),
+        (b"LOAD_MASS", 2.0, REAL32, OUT_OF_RANGE),
+        (b"CTRL_RATE_HZ", 250.5, REAL32, OUT_OF_RANGE),
+        (b"CTRL_RATE_HZ", 500.0, REAL32, READ_ONLY),
+        (b"LOAD_MASS", 0.2, m.MAV_PARAM_TYPE_INT32, TYPE_MISMATCH),
+    ],
+)
+def test_a_refused_value_is_answered_with_reason_and_value_in_force(rig, name, value, kind, error):
+    rig.table.freeze()
+    before = rig.table.values()
+    replies = rig.replies(set_(name, value, kind))
+    assert errors(replies) == [(name.decode(), error)]
+    ((echoed, stored, _),) = values(replies)
+    assert echoed == name.decode()
+    assert stored == pytest.approx(before[echoed], rel=1e-7)  # float32
+    assert name.decode() in "".join(x.text for x in replies if x.get_type() == "STATUSTEXT")
+    assert rig.table.values() == before
+    assert rig.events == []
+
+
+def test_a_change_by_the_vehicle_itself_is_shown(rig):
+    rig.table.set("LOAD_MASS", 0.2)
+    rig.poll()
+    rig.endpoint.parameter_changed("LOAD_MASS")
+    assert [name for name, *_ in values(r.message for r in rig.poll()["gcs"])] == ["LOAD_MASS"]

@@ -1,0 +1,94 @@
+"""What the simulator's tests share: a core in free flight, an autopilot of constant forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from autopilot.wire import convert
+from autopilot.wire.codec import FrameWriter, decode
+from sitl.hil import HilSimulator
+from sitl.plant.step import initial_state
+from sitl.sensors.files import load_profile, parse_profile
+from sitl.sim_core import SimCore, settings_of
+from sitl.truth.files import load_truth
+from sitl.truth.parameters import apply, sim_parameters
+
+Forces = tuple[float, float, float, float]
+
+
+def build_core(profile: str = "ideal", seed: int = 1, vehicle: str = "thesis", **settings: float) -> SimCore:
+    """A core; `profile` is a shipped name or the text of a TOML file."""
+    truth = load_truth(vehicle)
+    table = sim_parameters(truth)
+    for name, value in settings.items():
+        table.set(name, value)
+    fitted = parse_profile(profile, "test.toml") if "\n" in profile else load_profile(profile)
+    return SimCore(apply(truth, table), fitted, settings_of(table), seed)
+
+
+def lift(core: SimCore) -> SimCore:
+    """Put vehicle and load at rest high up in the air, 0.3 m apart, so that nothing touches anything."""
+    high = initial_state(core.truth)
+    core.state = high._replace(
+        x_quad=(1.0, 2.0, 50.0),
+        x_load=(1.0, 2.0, 49.7),
+        q_cable=(0.0, 0.0, -1.0),
+        vehicle_on_ground=0.0,
+        load_on_ground=0.0,
+    )
+    return core
+
+
+@pytest.fixture
+def core() -> Callable[..., SimCore]:
+    return build_core
+
+
+@pytest.fixture
+def core_in_the_air() -> Callable[..., SimCore]:
+    return lambda *args, **kwargs: lift(build_core(*args, **kwargs))
+
+
+class Answerer:
+    """The autopilot's end of the link, with the same forces for ever."""
+
+    def __init__(self, forces: Forces = (1.0, 1.0, 1.0, 1.0), system: int = 1) -> None:
+        self.forces = forces
+        self.writer = FrameWriter(system, 1)
+
+    def answer(self, time_us: int, forces: Forces | None = None, armed: bool = True) -> bytes:
+        message = convert.hil_actuator_controls_message(time_us, forces or self.forces, armed, True)
+        return self.writer.frame(message)
+
+    def fly(self, simulator: HilSimulator, ticks: int) -> list[bytes]:
+        """All datagrams of so many ticks, truth before sensors."""
+        sent = []
+        for _ in range(ticks):
+            truth = simulator.truth_datagram()
+            if truth is not None:
+                sent.append(truth)
+            sent.append(simulator.sensor_datagram())
+            assert simulator.receive(self.answer(simulator.now_us))
+            simulator.advance()
+        return sent
+
+
+@pytest.fixture
+def answerer() -> type[Answerer]:
+    return Answerer
+
+
+@pytest.fixture
+def messages() -> Callable[[bytes], list[Any]]:
+    """The messages of a datagram that holds nothing but whole frames."""
+
+    def read(datagram: bytes) -> list[Any]:
+        received, junk = decode(datagram)
+        assert junk == 0
+        assert all((one.system, one.component) == (1, 26) for one in received)
+        return [one.message for one in received]
+
+    return read

@@ -1,0 +1,190 @@
+"""Rates, latencies, delays and losses: exact to the microsecond, and the same in every run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from autopilot.wire.parameters import ParameterError
+
+G = 9.81
+# Free flight of a point mass is a polynomial of degree two in time, which the integrator gets exactly: what
+# is left are some hundred roundings of numbers of order 50 m.
+ROUNDING = 1e-11
+FORCES = (2.0, 2.0, 2.0, 2.0)
+
+IMU = "accel_noise_m_s2 = 0.0\ngyro_noise_rad_s = 0.0\n"
+
+
+def with_mocap(lines: str, imu: str = "") -> str:
+    """A profile of a perfect IMU and a perfect tracker with these lines."""
+    return (
+        f'description = "test"\n[imu]\n{IMU}{imu}\n[mocap]\nposition_noise_m = 0.0\n'
+        f"attitude_noise_rad = 0.0\n{lines}\n"
+    )
+
+
+def fallen(core, t: float, thrust_from: float) -> float:
+    """Height of the vehicle at time t, dropped at rest from 50 m, under thrust since `thrust_from`."""
+    climb = 0.5 * sum(FORCES) / core.truth.quad_mass * max(t - thrust_from, 0.0) ** 2
+    return 50.0 - 0.5 * G * t * t + climb
+
+
+@pytest.mark.parametrize("rate", [100, 250, 1000])
+@pytest.mark.parametrize("delay_ms", [0.0, 1.0, 5.5, 12.0, 20.001])
+def test_command_takes_effect_after_the_delay(core_in_the_air, rate: int, delay_ms: float) -> None:
+    core = core_in_the_air(SIM_RATE_HZ=rate, SIM_ACT_DELAY_MS=delay_ms)
+    for _ in range(rate * 40 // 1000):
+        core.tick(FORCES)
+        t = core.now_us * 1e-6
+        assert core.state.x_quad[2] == pytest.approx(fallen(core, t, delay_ms * 1e-3), abs=ROUNDING)
+    assert core.now_us == 40_000
+
+
+def test_commands_on_their_way_keep_their_order(core_in_the_air) -> None:
+    core = core_in_the_air(SIM_ACT_DELAY_MS=10.0)
+    sent = [(0.1 * k,) * 4 for k in range(8)]
+    in_force = []
+    for command in sent:
+        core.tick(command)
+        in_force.append(core.state.rotor_force)
+    # command k takes effect at 4k + 10 ms, so the end of tick k + 3 (4k + 12 ms) shows it first
+    assert in_force == [(0.0,) * 4] * 2 + sent[:6]
+
+
+def test_rotors_stand_until_the_first_command(core_in_the_air) -> None:
+    core = core_in_the_air(SIM_ACT_DELAY_MS=200.0)
+    for _ in range(50):
+        core.tick(FORCES)
+        assert core.state.rotor_force == (0.0, 0.0, 0.0, 0.0)
+    core.tick(FORCES)
+    assert core.state.rotor_force == FORCES
+
+
+@pytest.mark.parametrize(("rate", "latency_ms", "extra_ms"), [(200, 4.0, 0), (30, 50.0, 0), (333.3, 0.5, 7)])
+def test_readings_show_their_instant_and_leave_in_time(
+    core_in_the_air, rate: float, latency_ms: float, extra_ms: int
+) -> None:
+    core = core_in_the_air(
+        with_mocap(f"rate_hz = {rate}\nlatency_ms = {latency_ms}"), SIM_SENS_LAT_MS=extra_ms
+    )
+    latency_us = (latency_ms + extra_ms) * 1000
+    got = []
+    for _ in range(50):  # 0.2 s: the cable is still slack
+        for measured in core.tick(FORCES).mocap:
+            got.append(measured.time_us)
+            t = measured.time_us * 1e-6
+            if got[-1] > 0:  # the reading of instant 0 was taken before the test lifted the vehicle
+                assert measured.reading.position[2] == pytest.approx(fallen(core, t, 0.0), abs=ROUNDING)
+            # at the first tick that is not before measurement + latency
+            assert 0 <= core.now_us - measured.time_us - latency_us < core.settings.tick_us
+    last = core.now_us - latency_us
+    assert got == [round(n * 1e6 / rate) for n in range(1000) if round(n * 1e6 / rate) <= last]
+
+
+def test_imu_shows_the_state_one_latency_ago(core_in_the_air) -> None:
+    core = core_in_the_air(with_mocap("rate_hz = 1", imu="latency_ms = 5.0"), SIM_ACT_DELAY_MS=10.0)
+    for _ in range(10):
+        (measured,) = core.tick(FORCES).imu
+        assert measured.time_us == max(core.now_us - 5000, 0)
+        # thrust acts from 10 ms on; the sample of 10 ms itself was taken just before
+        felt = sum(FORCES) / core.truth.quad_mass if measured.time_us > 10_000 else 0.0
+        if measured.time_us > 0:
+            assert measured.reading.accel_body[2] == pytest.approx(felt, abs=ROUNDING)
+
+
+def test_a_sensor_at_the_tick_rate_without_latency_shows_now(core) -> None:
+    flown = core("ideal")
+    for _ in range(3):
+        readings = flown.tick(FORCES)
+        assert [m.time_us for m in readings.mocap] == [flown.now_us]
+        assert readings.mocap[0].reading.position == flown.state.x_quad
+        assert readings.load_tracker[0].reading.velocity == flown.state.v_load
+
+
+def test_a_sensor_faster_than_the_ticks_loses_nothing(core) -> None:
+    flown = core(with_mocap("rate_hz = 1000"))
+    times = [m.time_us for _ in range(5) for m in flown.tick(FORCES).mocap]
+    assert times == list(range(1000, 20_001, 1000))
+
+
+def collected(flown, ticks: int) -> dict[str, dict[int, object]]:
+    """Readings by sensor and instant."""
+    out: dict[str, dict[int, object]] = {}
+    for _ in range(ticks):
+        for name, readings in flown.tick(FORCES)._asdict().items():
+            for measured in readings:
+                out.setdefault(name, {})[measured.time_us] = measured.reading
+    return out
+
+
+def test_loss_has_its_share_and_leaves_the_rest_unchanged(core) -> None:
+    mocap = "position_bias_m = 0.1\nposition_walk_m = 0.1\nrate_hz = 1000"
+    whole = collected(core(with_mocap(mocap)), 1000)["mocap"]
+    lossy = collected(core(with_mocap(mocap + "\nloss = 0.2")), 1000)["mocap"]
+    assert len(whole) == 4000
+    # four standard deviations of a binomial count
+    assert abs(len(lossy) - 3200) < 4.0 * (4000 * 0.2 * 0.8) ** 0.5
+    assert all(whole[t].position == reading.position for t, reading in lossy.items())
+
+
+def test_loss_by_parameter_spares_the_imu(core) -> None:
+    lossy = collected(core("lab", SIM_DROP_PCT=50.0), 500)
+    assert len(lossy["imu"]) == 500
+    for name in ("mocap", "load_tracker"):
+        assert abs(len(lossy[name]) - 200) < 4.0 * (400 * 0.25) ** 0.5
+    assert not collected(core("lab", SIM_DROP_PCT=100.0), 50).get("mocap")
+
+
+def test_outages_have_their_frequency_and_length(core) -> None:
+    lines = "rate_hz = 1000\noutages_per_min = 300\noutage_s = 0.05"
+    times = np.array(sorted(collected(core(with_mocap(lines)), 10_000)["mocap"]))
+    gaps = np.diff(times)
+    outages = gaps[gaps > 1000] * 1e-6
+    # they begin 5 times a second of the time that is not itself outage: 1 in 0.2 + 0.05 s of the 40 s
+    assert abs(len(outages) - 160) < 4.0 * 160**0.5
+    # an outage of length x silences the sensor for x rounded up to whole milliseconds, plus the period
+    assert abs(outages.mean() - 0.051) < 4.0 * 0.05 / len(outages) ** 0.5
+
+
+def test_same_seed_same_readings_other_seed_other_readings(core) -> None:
+    first, second, other = (collected(core("rtk", seed=seed), 100) for seed in (1, 1, 2))
+    assert first == second
+    assert all(first[name] != other[name] for name in first)
+
+
+def test_one_sensor_does_not_touch_the_noise_of_another(core) -> None:
+    gps, rtk = collected(core("gps"), 200), collected(core("rtk"), 200)
+    for name in ("barometer", "magnetometer", "cable_sensor"):
+        assert gps.get(name) == rtk.get(name)
+
+
+def test_noise_scale(core) -> None:
+    silent = collected(core("lab", SIM_NOISE_SCALE=0.0), 100)
+    resting = core("lab").state
+    assert all(r.position == resting.x_load for r in list(silent["load_tracker"].values())[:1])
+    whole = np.array([r.gyro_body for r in collected(core("lab"), 50)["imu"].values()])
+    double = np.array([r.gyro_body for r in collected(core("lab", SIM_NOISE_SCALE=2.0), 50)["imu"].values()])
+    true = np.array([r.gyro_body for r in collected(core("lab", SIM_NOISE_SCALE=0.0), 50)["imu"].values()])
+    assert np.allclose(double - true, 2.0 * (whole - true), rtol=0, atol=ROUNDING)
+
+
+def test_wind_blows_and_gusts_vary_about_it(core) -> None:
+    windy = core("ideal", vehicle="bebop", SIM_WIND_E=3.0, SIM_GUST_STD=1.0, SIM_GUST_TAU_S=0.05)
+    blown = []
+    for _ in range(4000):
+        windy.tick((0.0, 0.0, 0.0, 0.0))
+        blown.append(windy.wind)
+    samples = np.array(blown)
+    # 16 s with a correlation time of 0.05 s: 160 independent values per axis
+    assert np.all(np.abs(samples.mean(0) - (3.0, 0.0, 0.0)) < 4.0 / 160**0.5)
+    assert np.all(np.abs(samples.std(0) - 1.0) < 4.0 / 320**0.5)
+    calm = core("ideal", vehicle="bebop", SIM_WIND_N=2.0)
+    calm.tick(FORCES)
+    assert calm.wind == (0.0, 2.0, 0.0)
+
+
+@pytest.mark.parametrize("rate", [300, 333, 240])
+def test_rates_that_do_not_divide_are_refused(core, rate: int) -> None:
+    with pytest.raises(ParameterError, match=rf"SIM_RATE_HZ = {rate} Hz; .*1000000 us / {rate} is not"):
+        core("ideal", SIM_RATE_HZ=rate)

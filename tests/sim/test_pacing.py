@@ -1,0 +1,45 @@
+"""Punctuality from recorded times: no clock is read."""
+
+from __future__ import annotations
+
+import pytest
+
+from sitl.pacing import Pacing, percentile
+
+SECOND = 1_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("values", "share", "expected"),
+    [([], 0.5, 0), ([7], 0.0, 7), ([7], 1.0, 7), (list(range(1, 101)), 0.99, 99), ([1, 2, 3], 0.5, 2)],
+)
+def test_percentile(values: list[int], share: float, expected: int) -> None:
+    assert percentile(values, share) == expected
+
+
+def test_figures_of_the_last_second() -> None:
+    pacing = Pacing(speed=2.0)
+    assert pacing.figures == (2.0, 0.0, 0, 0, 0)
+    for tick in range(500):
+        due = tick * SECOND // 250
+        pacing.record(due, due + 5000 + (90_000 if tick == 100 else 0))
+    assert pacing.figures.rate_hz == pytest.approx(250.0, rel=0.01)  # a window ends up to one tick late
+    assert (pacing.figures.late_p50_us, pacing.figures.late_p99_us, pacing.figures.late_max_us) == (5, 5, 95)
+    for tick in range(500, 800):
+        pacing.record(tick * SECOND // 250, tick * SECOND // 250)
+    assert pacing.figures.late_max_us == 0
+
+
+def test_summary() -> None:
+    pacing = Pacing(speed=1.0)
+    assert pacing.summary(0) == "no ticks"
+    for tick in range(101):
+        pacing.record(tick * SECOND // 250, tick * SECOND // 250 + 3000)
+    assert pacing.summary(4) == ("250.00 ticks/s, late p50 3 p99 3 max 3 us, 4 of 101 commands missed")
+
+
+def test_a_tick_before_its_time_is_not_late() -> None:
+    pacing = Pacing(speed=1.0)
+    pacing.record(1000, 0)
+    pacing.record(2000, 1500)
+    assert "late p50 0 p99 0 max 0 us" in pacing.summary(0)

@@ -1,0 +1,487 @@
+"""Frames and units of the messages: against explicit axes and SciPy, and there and back again."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from autopilot.geometry.so3 import Quat
+from autopilot.wire import convert
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert import Home
+
+FLOAT32 = 2.0**-23  # relative spacing of float32
+DEG_E7_M = convert.EARTH_RADIUS_M * math.pi / 180.0 * 1e-7  # m northwards of one unit of latitude
+HOME = Home()
+NAN = math.nan
+NED_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+FRD_FLU = np.diag([1.0, -1.0, -1.0])
+
+quick = settings(max_examples=60, deadline=None, derandomize=True)
+numbers = st.floats(-1e4, 1e4)
+vectors = st.tuples(numbers, numbers, numbers)
+positive = st.floats(0.0, 1e4)
+times = st.integers(0, 2**63)
+small = st.floats(-300.0, 300.0)
+small_vectors = st.tuples(small, small, small)
+
+
+def _quat(seed: int) -> Quat:
+    x, y, z, w = Rotation.random(rng=np.random.default_rng(seed)).as_quat()
+    sign = 1.0 if w >= 0.0 else -1.0
+    return (float(sign * w), float(sign * x), float(sign * y), float(sign * z))
+
+
+quats = st.integers(0, 10**6).map(_quat)
+
+
+def same_side(q: Quat, other: Quat) -> Quat:
+    """q or -q: the same rotation, whichever is nearer to the other."""
+    return (-q[0], -q[1], -q[2], -q[3]) if np.dot(q, other) < 0.0 else q
+
+
+def over_the_wire(message: Any) -> Any:
+    received, junk = decode(FrameWriter(1, 25).frame(message))
+    assert junk == 0
+    return received[0].message
+
+
+def assert_close(got: Any, sent: Any, absolute: float = 1e-6, relative: float = FLOAT32) -> None:
+    """Field by field; float32 rounding unless said otherwise."""
+    assert type(got) is type(sent)
+    for name, one, other in zip(sent._fields, got, sent, strict=True):
+        if other is None or isinstance(other, bool | int):
+            assert one == other, name
+        else:
+            assert one == pytest.approx(other, rel=relative, abs=absolute, nan_ok=True), name
+
+
+RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[Any], Any]]] = {
+    "hil_sensor": (
+        st.builds(
+            convert.HilSensor,
+            times,
+            vectors,
+            vectors,
+            vectors,
+            positive,
+            numbers,
+            numbers,
+            st.integers(0, 0x1FFF),
+            st.integers(0, 255),
+        ),
+        convert.hil_sensor_message,
+        convert.read_hil_sensor,
+    ),
+    "load_sensor": (
+        st.builds(
+            convert.LoadSensor,
+            times,
+            st.none() | vectors,
+            st.none() | vectors,
+            st.none() | vectors,
+            positive,
+            positive,
+            positive,
+            st.integers(0, 2),
+        ),
+        convert.load_sensor_message,
+        convert.read_load_sensor,
+    ),
+    "hil_actuator_controls": (
+        st.builds(
+            convert.HilActuatorControls,
+            times,
+            st.tuples(numbers, numbers, numbers, numbers),
+            st.booleans(),
+            st.booleans(),
+        ),
+        convert.hil_actuator_controls_message,
+        convert.read_hil_actuator_controls,
+    ),
+    "load_state": (
+        st.builds(
+            convert.LoadState,
+            times,
+            st.integers(0, 2),
+            vectors,
+            vectors,
+            vectors,
+            vectors,
+            positive,
+            numbers,
+            st.booleans(),
+            st.integers(0, 65535),
+        ),
+        convert.load_state_message,
+        convert.read_load_state,
+    ),
+    "load_setpoint": (
+        st.builds(
+            convert.LoadSetpoint,
+            times,
+            st.integers(0, 9),
+            st.integers(0, 4),
+            st.integers(0, 65535),
+            vectors,
+            vectors,
+            vectors,
+            vectors,
+            positive,
+            positive | st.just(NAN),
+        ),
+        convert.load_setpoint_message,
+        convert.read_load_setpoint,
+    ),
+    "cascade_errors": (
+        st.builds(
+            convert.CascadeErrors,
+            times,
+            st.integers(0, 4),
+            *[vectors] * 6,
+            numbers,
+            numbers,
+            numbers,
+            vectors,
+        ),
+        convert.cascade_errors_message,
+        convert.read_cascade_errors,
+    ),
+    "rotor_state": (
+        st.builds(
+            convert.RotorState,
+            times,
+            st.integers(0, 2),
+            st.tuples(numbers, numbers, numbers, numbers),
+            numbers,
+            positive | st.just(math.inf),
+            st.integers(0, 15),
+        ),
+        convert.rotor_state_message,
+        convert.read_rotor_state,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RECORDS)
+@given(st.data())
+@quick
+def test_a_record_comes_back(name: str, data: st.DataObject) -> None:
+    records, build, read = RECORDS[name]
+    record = data.draw(records)
+    assert_close(read(over_the_wire(build(*record))), record)
+
+
+@given(
+    st.tuples(
+        *(times, vectors, quats, st.none() | vectors, st.none() | vectors),
+        *(positive, positive, positive, st.integers(0, 255)),
+    )
+)
+@quick
+def test_odometry_comes_back(fields: Any) -> None:
+    sent = convert.Odometry(*fields)
+    if sent.velocity is None:
+        sent = sent._replace(velocity_std=NAN)
+    # a quaternion that is half a turn away may come back with the other sign
+    got = convert.read_odometry(over_the_wire(convert.odometry_message(*fields)))
+    got = got._replace(quat_wxyz=same_side(got.quat_wxyz, sent.quat_wxyz))
+    assert_close(got, sent)
+
+
+def test_the_covariance_of_odometry_is_diagonal_and_in_its_place() -> None:
+    message = convert.odometry_message(1, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), None, None, 0.1, 0.2, 0.3)
+    triangle = np.zeros((6, 6))
+    triangle[np.triu_indices(6)] = message.pose_covariance
+    assert np.array_equal(triangle, np.diag(triangle.diagonal()))
+    assert triangle.diagonal() == pytest.approx([0.01] * 3 + [0.04] * 3)
+    assert math.isnan(message.velocity_covariance[0])
+    assert all(math.isnan(v) for v in (message.vx, message.vy, message.vz, message.rollspeed))
+
+
+@given(
+    st.tuples(
+        *(times, st.integers(0, 6), small_vectors, small_vectors),
+        *(st.floats(0.0, 600.0), st.floats(0.0, 600.0), st.integers(0, 255)),
+    )
+)
+@quick
+def test_hil_gps_comes_back_on_its_lattice(fields: Any) -> None:
+    sent = convert.HilGps(*fields)
+    got = convert.read_hil_gps(over_the_wire(convert.hil_gps_message(*fields, home=HOME)), HOME)
+    assert_close(got, sent, absolute=0.5 * 0.01 + 0.1 * DEG_E7_M + 1e-9)  # half of the coarsest step
+
+
+@given(
+    st.tuples(
+        *(times, quats, small_vectors, small_vectors, small_vectors), *(st.floats(0.0, 600.0), small_vectors)
+    )
+)
+@quick
+def test_the_true_state_comes_back_on_its_lattice(fields: Any) -> None:
+    sent = convert.HilStateQuaternion(*fields)
+    message = over_the_wire(convert.hil_state_quaternion_message(*fields, home=HOME))
+    got = convert.read_hil_state_quaternion(message, HOME)
+    got = got._replace(quat_wxyz=same_side(got.quat_wxyz, sent.quat_wxyz))
+    assert_close(got, sent, absolute=0.5 * DEG_E7_M + 1e-9)
+
+
+@given(quats, vectors, vectors)
+@quick
+def test_axes_and_attitude_against_matrices(quat: Any, position: Any, rate: Any) -> None:
+    message = convert.odometry_message(0, position, quat, position, rate, 1.0, 1.0, 1.0)
+    assert (message.x, message.y, message.z) == tuple(NED_ENU @ position)
+    assert (message.vx, message.vy, message.vz) == tuple(NED_ENU @ position)
+    assert (message.rollspeed, message.pitchspeed, message.yawspeed) == tuple(FRD_FLU @ rate)
+    w, x, y, z = quat
+    R = NED_ENU @ Rotation.from_quat([x, y, z, w]).as_matrix() @ FRD_FLU
+    w, x, y, z = message.q
+    # products of a few rounded numbers of size 1
+    assert Rotation.from_quat([x, y, z, w]).as_matrix() == pytest.approx(R, abs=1e-14)
+
+
+@given(quats)
+@quick
+def test_euler_angles_against_scipy(quat: Any) -> None:
+    w, x, y, z = quat
+    R = NED_ENU @ Rotation.from_quat([x, y, z, w]).as_matrix() @ FRD_FLU
+    roll, pitch, yaw = convert.euler_ned_frd(quat)
+    # ill conditioned near a pitch of 90 degrees: the rotation is compared, not the angles
+    assert Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix() == pytest.approx(R, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("yaw_enu_deg", "heading_deg"), [(90.0, 0.0), (0.0, 90.0), (-90.0, 180.0), (180.0, 270.0), (45.0, 45.0)]
+)
+def test_headings_a_pilot_would_name(yaw_enu_deg: float, heading_deg: float) -> None:
+    half = math.radians(yaw_enu_deg) / 2.0
+    assert convert.heading_cdeg((math.cos(half), 0.0, 0.0, math.sin(half))) == heading_deg * 100.0
+
+
+def test_a_vehicle_that_pitches_down_and_flies_east() -> None:
+    # nose east, 10 degrees nose down: FLU pitch is positive nose down
+    half = math.radians(10.0) / 2.0
+    quat = (math.cos(half), 0.0, math.sin(half), 0.0)
+    attitude = convert.attitude_message(5_000, quat, (0.1, 0.2, 0.3))
+    assert (attitude.roll, attitude.pitch, attitude.yaw) == pytest.approx(
+        (0.0, math.radians(-10.0), math.radians(90.0)), abs=1e-15
+    )
+    assert (attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed) == (0.1, -0.2, -0.3)
+    assert attitude.time_boot_ms == 5
+    local = convert.local_position_ned_message(0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    assert (local.x, local.y, local.z, local.vx, local.vy, local.vz) == (2.0, 1.0, -3.0, 5.0, 4.0, -6.0)
+    hud = convert.vfr_hud_message((3.0, 0.0, 4.0), quat, 7.0, 0.55, Home(0.0, 0.0, 100.0))
+    assert (hud.groundspeed, hud.airspeed, hud.climb, hud.alt, hud.heading, hud.throttle) == (
+        3.0, 5.0, 4.0, 107.0, 90, 55,
+    )  # fmt: skip
+    place = convert.global_position_int_message(0, (0.0, 0.0, 3.0), (1.0, 2.0, 3.0), quat, HOME)
+    assert (place.relative_alt, place.vx, place.vy, place.vz, place.hdg) == (3000, 200, 100, -300, 9000)
+
+
+@given(quats, vectors, st.integers(0, 2**40))
+@quick
+def test_telemetry_comes_back(quat: Any, vector: Any, now_us: int) -> None:
+    attitude = convert.attitude_quaternion_message(now_us, quat, vector)
+    got = convert.read_attitude_quaternion(over_the_wire(attitude))
+    assert abs(np.dot(got.quat_wxyz, quat)) == pytest.approx(1.0, abs=FLOAT32)
+    assert got.omega_body == pytest.approx(vector, rel=FLOAT32)
+    assert got.boot_ms == now_us // 1000 % 2**32
+    local = convert.read_local_position_ned(
+        over_the_wire(convert.local_position_ned_message(now_us, vector, vector))
+    )
+    assert local.position == local.velocity == pytest.approx(vector, rel=FLOAT32)
+
+
+WILD = (1e30, -1e30, math.inf)
+WILD_NAN = (NAN, NAN, NAN)
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+SKEW = (NAN, NAN, NAN, NAN)
+
+
+@pytest.mark.parametrize(("v", "quat"), [(WILD, UPRIGHT), (WILD_NAN, UPRIGHT), (WILD, SKEW)])
+def test_no_state_however_wild_raises(v: Any, quat: Any) -> None:
+    messages = [
+        convert.hil_sensor_message(0, v, v, v, v[0], v[0], v[0], 0),
+        convert.odometry_message(0, v, quat, v, v, v[0], v[0], v[0]),
+        convert.load_sensor_message(0, v, v, v, v[0], v[0], v[0]),
+        convert.hil_gps_message(0, 3, v, v, v[0], v[0], 10, home=HOME),
+        convert.hil_state_quaternion_message(0, quat, v, v, v, v[0], v, home=HOME),
+        convert.hil_actuator_controls_message(0, (*v, v[0]), True, True),
+        convert.load_state_message(0, 0, v, v, v, v, v[0], v[0], True, 10**9),
+        convert.load_setpoint_message(0, 0, 0, 10**9, v, v, v, v, v[0], v[0]),
+        convert.cascade_errors_message(0, 0, v, v, v, v, v, v, v[0], v[0], v[0], v),
+        convert.rotor_state_message(0, 0, (*v, v[0]), v[0], v[0], 0),
+        convert.attitude_message(0, quat, v),
+        convert.attitude_quaternion_message(0, quat, v),
+        convert.local_position_ned_message(0, v, v),
+        convert.global_position_int_message(0, v, v, quat, HOME),
+        convert.gps_raw_int_message(0, 3, v, v, v[0], v[0], 10, HOME),
+        convert.altitude_message(0, v[0], HOME),
+        convert.vfr_hud_message(v, quat, v[0], v[0], HOME),
+        convert.home_position_message(0, HOME),
+        convert.gps_global_origin_message(0, HOME),
+        convert.position_target_local_ned_message(0, v, v, v),
+        convert.attitude_target_message(0, quat, v, v[0]),
+        convert.winch_status_message(0, v[0], v[0]),
+    ]
+    for message in messages:
+        over_the_wire(message)
+    assert convert.read_hil_gps(over_the_wire(messages[3]), HOME).satellites == 10
+    convert.read_odometry(over_the_wire(messages[1]))
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(0.4, 0), (0.6, 1), (-0.6, -1), (1e9, 32767), (-1e9, -32768), (math.inf, 32767), (NAN, 0)],
+)
+def test_integers_round_and_saturate(value: float, expected: int) -> None:
+    assert convert.int16(value) == expected
+    struct.pack("<h", convert.int16(value))
+
+
+HOMES = [
+    HOME,
+    Home(0.0, 0.0, 0.0),
+    Home(-35.363261, 149.16523, 584.0),
+    Home(-16.8, 179.99999, 5.0),
+    Home(70.0, -180.0, -3.0),
+]
+
+
+@pytest.mark.parametrize("home", HOMES)
+@given(
+    st.integers(-10_000_000, 10_000_000), st.integers(-10_000_000, 10_000_000), st.integers(-(10**6), 10**6)
+)
+@quick
+def test_geodetic_coordinates_are_restored_exactly(home: Home, north: int, east: int, up: int) -> None:
+    latitude, longitude, altitude = convert.geodetic_from_enu((0.0, 0.0, 0.0), home)
+    turn = 3_600_000_000
+    longitude = (longitude + east + turn // 2) % turn - turn // 2
+    latitude, altitude = latitude + north, altitude + up
+    position = convert.enu_from_geodetic(latitude, longitude, altitude, home)
+    assert convert.geodetic_from_enu(position, home) == (latitude, longitude, altitude)
+
+
+@pytest.mark.parametrize("home", HOMES)
+@given(st.tuples(numbers, numbers, numbers))
+@quick
+def test_positions_are_restored_to_half_a_step(home: Home, position: Any) -> None:
+    back = convert.enu_from_geodetic(*convert.geodetic_from_enu(position, home), home)
+    # half a step, and the rounding of degrees in float64 (1e-14 of 180 degrees is 0.2 micrometres)
+    assert back[:2] == pytest.approx(position[:2], abs=0.5 * DEG_E7_M + 1e-6)
+    assert back[2] == pytest.approx(position[2], abs=0.5e-3 + 1e-9)
+
+
+def test_north_and_east_are_where_a_map_has_them() -> None:
+    latitude, longitude, _ = convert.geodetic_from_enu((1000.0, 2000.0, 0.0), HOME)
+    # 1 degree of latitude is 111.3 km, of longitude that times the cosine of the latitude
+    assert latitude * 1e-7 - HOME.latitude_deg == pytest.approx(2.0 / 111.3, rel=1e-3)
+    assert longitude * 1e-7 - HOME.longitude_deg == pytest.approx(
+        1.0 / 111.3 / math.cos(math.radians(HOME.latitude_deg)), rel=1e-3
+    )
+
+
+def test_home_from_text() -> None:
+    assert convert.home_from_text("47.4, 8.5,488") == Home(47.4, 8.5, 488.0)
+
+
+@pytest.mark.parametrize("text", ["", "1,2", "1,2,3,4", "a,2,3", "91,0,0", "0,181,0", "nan,0,0", "0,0,1e9"])
+def test_a_home_that_is_nowhere_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="home"):
+        convert.home_from_text(text)
+
+
+V = (1.0, 2.0, 3.0)
+NED = [2.0, 1.0, -3.0]
+FRD = [1.0, -2.0, -3.0]
+CENTI_NED = [200, 100, -300]
+ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
+    (
+        convert.hil_sensor_message(0, V, V, V, 101325.0, 0.0, 0.0, 0),
+        {"xacc yacc zacc": FRD, "xgyro ygyro zgyro": FRD, "xmag ymag zmag": FRD, "abs_pressure": [1013.25]},
+    ),
+    (
+        convert.odometry_message(0, V, UPRIGHT, V, V, 1.0, 1.0, 1.0),
+        {
+            "x y z": NED,
+            "vx vy vz": NED,
+            "rollspeed pitchspeed yawspeed": FRD,
+            "frame_id child_frame_id": [1, 1],
+        },
+    ),
+    (
+        convert.load_sensor_message(0, V, V, V, 1.0, 1.0, 1.0),
+        {"x y z": NED, "vx vy vz": NED, "dx dy dz": FRD, "fields": [7]},
+    ),
+    (
+        convert.hil_gps_message(0, 3, V, V, 1.0, 2.0, 9, home=HOME),
+        {"vn ve vd": CENTI_NED, "eph epv": [100, 200], "alt": [3000], "cog": [2657]},
+    ),
+    (
+        convert.hil_state_quaternion_message(0, UPRIGHT, V, V, V, 1.0, (0.0, 0.0, 9.80665), home=HOME),
+        {"rollspeed pitchspeed yawspeed": FRD, "vx vy vz": CENTI_NED, "xacc yacc zacc": [0, 0, -1000]},
+    ),
+    (
+        convert.load_state_message(0, 1, V, V, V, V, 4.0, 5.0, True, 6),
+        {
+            "x y z": NED,
+            "vx vy vz": NED,
+            "qx qy qz": NED,
+            "qx_dot qy_dot qz_dot": NED,
+            "distance tension slack_events taut source": [4.0, 5.0, 6, 1, 1],
+        },
+    ),
+    (
+        convert.load_setpoint_message(0, 5, 3, 7, V, V, V, V, 1.0, 2.0),
+        {
+            "x y z": NED,
+            "vx vy vz": NED,
+            "ax ay az": NED,
+            "qx qy qz": NED,
+            "elapsed duration seq phase control_mode": [1.0, 2.0, 7, 5, 3],
+        },
+    ),
+    (
+        convert.cascade_errors_message(0, 3, V, V, V, V, V, V, 0.1, 0.2, 4.0, V),
+        {
+            **{name: [tuple(NED)] for name in ("e_x", "e_v", "e_q", "e_q_dot")},
+            **{name: [tuple(FRD)] for name in ("e_r", "e_omega", "moment")},
+            "psi_r psi_q thrust control_mode": [0.1, 0.2, 4.0, 3],
+        },
+    ),
+    (
+        convert.rotor_state_message(0, 2, (1.0, 2.0, 3.0, 4.0), 0.0, math.inf, 9),
+        {"force": [(1.0, 2.0, 3.0, 4.0)], "force_min force_max saturated source": [0.0, math.inf, 9, 2]},
+    ),
+    (
+        convert.position_target_local_ned_message(0, V, V, V),
+        {"x y z": NED, "vx vy vz": NED, "afx afy afz": NED, "type_mask": [0xC00]},
+    ),
+    (
+        convert.attitude_target_message(0, UPRIGHT, V, 0.5),
+        {"body_roll_rate body_pitch_rate body_yaw_rate thrust": [*FRD, 0.5]},
+    ),
+]
+
+
+@pytest.mark.parametrize(("message", "expected"), ON_THE_WIRE, ids=lambda one: getattr(one, "msgname", ""))
+def test_every_field_has_its_axis_and_its_sign(message: Any, expected: dict[str, list[Any]]) -> None:
+    """Written out, because a wrong axis in a builder and in its reader would cancel."""
+    for names, values in expected.items():
+        assert [getattr(message, name) for name in names.split()] == values, names
+
+
+def test_full_scale_of_the_actuators() -> None:
+    message = convert.hil_actuator_controls_message(4000, (0.0, 0.98, 1.96, 3.92), True, True)
+    assert message.controls[:5] == [0.0, 0.5, 1.0, 2.0, 0.0]
+    assert len(message.controls) == 16
+    assert (message.time_usec, message.mode & 128, message.flags & 1) == (4000, 128, 1)
+    assert convert.hil_actuator_controls_message(0, (0.0,) * 4, False, False).mode & 128 == 0

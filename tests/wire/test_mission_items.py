@@ -1,0 +1,319 @@
+"""Missions as mission items: there and back, refusals, what other ground stations send."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from autopilot.geometry.frames import ned_from_enu
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert import EARTH_RADIUS_M, Home, geodetic_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import (
+    FASTEST_M_S,
+    LONGEST_S,
+    MOST_FACTORS,
+    MOST_TERMS,
+    LocatedStep,
+    MissionItemError,
+    WireItem,
+    decode_items,
+    encode_mission,
+    encode_steps,
+    located_steps,
+)
+from missions.fileformat import load_mission, shipped
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    ReturnHome,
+    Signals,
+    Sine,
+    Speed,
+    Step,
+    Takeoff,
+    Term,
+    Waypoint,
+)
+
+HOME = Home(47.397742, 8.545594, 488.0)
+FLOAT32 = 2.0**-24  # half a step of float32, relative
+MS = 0.5e-3 + 1e-9  # half a millisecond
+PLACE_M = 0.5e-7 * EARTH_RADIUS_M * math.pi / 180.0 + 1e-6  # half of 1e-7 degrees
+
+quick = settings(max_examples=150, deadline=None, derandomize=True)
+
+
+def real(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high).map(lambda value: value + 0.0)  # no -0.0
+
+
+seconds = real(0.0, 3600.0)
+edges = real(0.1, 3600.0)
+sines = st.builds(Sine, real(0.1, 2000.0), real(-7.0, 7.0), seconds)
+terms = st.builds(
+    Term,
+    st.sampled_from(["x", "y", "z"]),
+    real(-1000.0, 1000.0),
+    seconds,
+    edges,
+    st.none() | seconds,
+    edges,
+    st.lists(sines, max_size=MOST_FACTORS).map(tuple),
+)
+steps: st.SearchStrategy[Step] = st.one_of(
+    st.builds(Takeoff, real(0.1, 1000.0)),
+    st.builds(Waypoint, real(-1000.0, 1000.0), real(-1000.0, 1000.0), real(0.1, 1000.0), seconds),
+    st.builds(Speed, real(0.01, 20.0)),
+    st.builds(Delay, seconds),
+    st.just(ReturnHome()),
+    st.just(Land()),
+    st.builds(Signals, real(0.1, 3600.0), st.lists(terms, min_size=1, max_size=4).map(tuple)),
+    st.builds(AttitudeRun, st.sampled_from(["vehicle", "load"]), real(-1.5, 1.5), real(-1.5, 1.5), edges),
+)
+missions = st.lists(steps, max_size=8)
+
+
+def item(command: int, *params: float, frame: int = 2, x: int = 0, y: int = 0, z: float = 0.0) -> WireItem:
+    p1, p2, p3, p4 = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
+    return WireItem(frame, command, 0, 1, p1, p2, p3, p4, x, y, z)
+
+
+TERM = item(31010, 0.0, 1.0, 0.5, 0.5, y=-1)
+FACTOR = item(31011, x=3_000_000)
+RUN = item(31012, x=10_000)
+
+
+def numbers(value: Any) -> list[Any]:
+    """Everything that a step is made of, in order."""
+    if hasattr(value, "__dataclass_fields__"):
+        inside = [getattr(value, name) for name in value.__dataclass_fields__]
+        return [type(value), *(n for one in inside for n in numbers(one))]
+    if isinstance(value, tuple):
+        return [len(value), *(n for one in value for n in numbers(one))]
+    return [value]
+
+
+def assert_same_steps(got: tuple[Step, ...], sent: tuple[Step, ...]) -> None:
+    for one, other in zip(got, sent, strict=True):
+        place = PLACE_M if isinstance(other, Waypoint) else 0.0
+        for a, b in zip(numbers(one), numbers(other), strict=True):
+            assert a == pytest.approx(b, rel=FLOAT32, abs=max(MS, place)) if isinstance(b, float) else a == b
+
+
+@given(missions)
+@quick
+def test_a_mission_comes_back(sent: list[Step]) -> None:
+    items = encode_steps(sent, HOME)
+    got = decode_items(items, HOME)
+    assert_same_steps(got, tuple(sent))
+    assert encode_steps(got, HOME) == items
+
+
+@given(missions)
+@quick
+def test_items_survive_the_wire(sent: list[Step]) -> None:
+    items = encode_steps(sent, HOME)
+    writer = FrameWriter(255, 190)
+    for seq, one in enumerate(items):
+        message = mavlink.MAVLink_mission_item_int_message(1, 1, seq, *one)
+        received = decode(writer.frame(message))[0][0].message
+        assert WireItem(*(getattr(received, name) for name in WireItem._fields)) == one
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_shipped_missions_come_back(name: str) -> None:
+    mission = load_mission(name)
+    assert_same_steps(decode_items(encode_mission(mission, HOME), HOME), mission.steps)
+
+
+def test_decimals_come_back_as_they_were_typed() -> None:
+    sent = (Signals(7.1, (Term("z", 0.3, 0.7, 0.78, None, 0.0, (Sine(2.1, 0.1, 0.123),)),)), Speed(1.1))
+    assert decode_items(encode_steps(sent, HOME), HOME) == sent
+
+
+def test_axes_are_those_of_ned() -> None:
+    for axis, unit in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0))):
+        term = Term(axis, 2.0, 0.0, 1.0, None, 0.0)  # type: ignore[arg-type]
+        first = encode_steps([Signals(1.0, (term,))], HOME)[0]
+        along = [0.0, 0.0, 0.0]
+        along[int(first.param1)] = first.param2 / 2.0
+        assert tuple(along) == ned_from_enu(unit)
+
+
+def test_the_standard_commands_are_as_any_ground_station_has_them() -> None:
+    takeoff, go, speed, delay, back, land = encode_steps(
+        [Takeoff(2.0), Waypoint(10.0, 20.0, 3.0, 1.5), Speed(2.5), Delay(4.0), ReturnHome(), Land()], HOME
+    )
+    latitude, longitude, _ = geodetic_from_enu((10.0, 20.0, 0.0), HOME)
+    assert (takeoff.command, takeoff.frame, takeoff.z) == (22, 6, 2.0)
+    assert go == WireItem(6, 16, 0, 1, 1.5, 0.0, 0.0, 0.0, latitude, longitude, 3.0)
+    assert (speed.command, speed.param1, speed.param2) == (178, 1.0, 2.5)
+    assert (delay.command, delay.param1, delay.param2) == (93, 4.0, -1.0)
+    assert (back.command, land.command) == (20, 21)
+
+
+def test_each_step_knows_its_items() -> None:
+    items = [item(93, 1.0), item(203), TERM, FACTOR, TERM, RUN, item(20)]
+    located = located_steps(items, HOME)
+    assert [(one.first, one.last) for one in located] == [(0, 0), (2, 5), (6, 6)]
+    assert isinstance(located[1], LocatedStep)
+    assert [len(term.factors) for term in located[1].step.terms] == [1, 0]  # type: ignore[union-attr]
+
+
+REFUSALS = [
+    # items, item that is refused, MAV_MISSION_RESULT, what the text speaks of
+    ([item(17, frame=6)], 0, "UNSUPPORTED", "command 17"),
+    ([item(82, frame=6)], 0, "UNSUPPORTED", "command 82"),
+    ([item(16, frame=10, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 10"),
+    ([item(16, frame=2, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 2"),
+    ([item(22, frame=8, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 8"),
+    ([item(22, frame=6, z=math.nan)], 0, "INVALID_PARAM7", "height above home = nan m"),
+    ([item(22, frame=6, z=-1.0)], 0, "INVALID_PARAM7", "height above home = -1 m"),
+    ([item(22, frame=0, z=488.0)], 0, "INVALID_PARAM7", "height above home = 0 m"),
+    ([item(16, math.nan, frame=1, z=-5.0)], 0, "INVALID_PARAM1", "hold = nan s"),
+    ([item(16, -1.0, frame=1, z=-5.0)], 0, "INVALID_PARAM1", "hold = -1 s"),
+    ([item(16, frame=1, z=5.0)], 0, "INVALID_PARAM7", "height above home = -5 m"),
+    ([item(16, frame=6, x=2**31 - 1, z=5.0)], 0, "INVALID_PARAM5_X", "latitude"),
+    ([item(16, frame=6, x=473977420, y=2**31 - 1, z=5.0)], 0, "INVALID_PARAM6_Y", "longitude"),
+    ([item(16, frame=6, x=0, y=0, z=5.0)], 0, "INVALID_PARAM5_X", "north of home"),
+    ([item(178, 7.0, 1.0)], 0, "INVALID_PARAM1", "speed type = 7"),
+    ([item(178, 1.0, math.nan)], 0, "INVALID_PARAM2", "speed = nan m/s"),
+    ([item(178, 1.0, 0.0)], 0, "INVALID_PARAM2", "speed = 0 m/s"),
+    ([item(93, -1.0)], 0, "INVALID_PARAM1", "delay = -1 s"),
+    ([item(112, math.inf)], 0, "INVALID_PARAM1", "delay = inf s"),
+    ([item(20), RUN], 1, "INVALID", "must follow a term"),
+    ([FACTOR, RUN], 0, "INVALID", "must follow a term"),
+    ([TERM, FACTOR], 1, "INVALID", "item 0 has no run"),
+    ([TERM, item(20), RUN], 0, "INVALID", "item 0 has no run"),
+    ([TERM._replace(frame=6), RUN], 0, "UNSUPPORTED_FRAME", "frame 6; must be 2"),
+    ([TERM._replace(param1=3.0), RUN], 0, "INVALID_PARAM1", "axis = 3"),
+    ([TERM._replace(param1=0.5), RUN], 0, "INVALID_PARAM1", "axis = 0.5"),
+    ([TERM._replace(param1=math.nan), RUN], 0, "INVALID_PARAM1", "axis = nan"),
+    ([TERM._replace(param2=math.nan), RUN], 0, "INVALID_PARAM2", "amplitude = nan m"),
+    ([TERM._replace(param3=0.0), RUN], 0, "INVALID_PARAM3", "rise = 0 s"),
+    ([TERM._replace(param4=0.0, y=100), RUN], 0, "INVALID_PARAM4", "fall = 0 s"),
+    ([TERM._replace(x=-1), RUN], 0, "INVALID_PARAM5_X", "start = -0.001 s"),
+    ([TERM._replace(y=-2), RUN], 0, "INVALID_PARAM6_Y", "hold = -0.002 s"),
+    ([TERM, FACTOR._replace(x=0), RUN], 1, "INVALID_PARAM5_X", "period = 0 s"),
+    ([TERM, FACTOR._replace(param1=math.nan), RUN], 1, "INVALID_PARAM1", "phase = nan rad"),
+    ([TERM, RUN._replace(x=0)], 1, "INVALID_PARAM5_X", "duration = 0 s"),
+    ([TERM] * (MOST_TERMS + 1) + [RUN], MOST_TERMS, "NO_SPACE", "more than"),
+    ([TERM] + [FACTOR] * (MOST_FACTORS + 1) + [RUN], MOST_FACTORS + 1, "NO_SPACE", "more than"),
+    ([item(31013, 3.0, 0.1, x=1000)], 0, "INVALID_PARAM1", "mode = 3"),
+    ([item(31013, 1.0, 1.6, x=1000)], 0, "INVALID_PARAM2", "tilt north = 1.6 rad"),
+    ([item(31013, 1.0, 0.0, math.nan, x=1000)], 0, "INVALID_PARAM3", "tilt east = nan rad"),
+    ([item(31013, 1.0, 0.1, x=0)], 0, "INVALID_PARAM5_X", "duration = 0 s"),
+]
+
+
+@pytest.mark.parametrize(("items", "seq", "result", "text"), REFUSALS)
+def test_what_cannot_be_flown_is_refused(items: list[WireItem], seq: int, result: str, text: str) -> None:
+    with pytest.raises(MissionItemError) as refused:
+        decode_items(items, HOME)
+    assert (refused.value.seq, refused.value.result) == (seq, getattr(mavlink, f"MAV_MISSION_{result}"))
+    assert text in refused.value.text
+    assert str(refused.value) == f"mission item {seq}: {refused.value.text}"
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        Delay(math.nan),
+        Delay(2.0 * LONGEST_S),
+        Speed(2.0 * FASTEST_M_S),
+        Takeoff(-1.0),
+        Waypoint(math.inf, 0.0, 1.0),
+        Signals(1e12, (Term("x", 1.0, 0.0, 1.0, None, 0.0),)),
+        Signals(math.nan, (Term("x", 1.0, 0.0, 1.0, None, 0.0),)),
+        Signals(1.0, (Term("x", 1e300, 0.0, 1.0, None, 0.0),)),
+        Signals(1.0, ()),
+    ],
+)
+def test_a_step_that_would_be_refused_is_not_sent(step: Step) -> None:
+    with pytest.raises(MissionItemError):
+        encode_steps([Takeoff(1.0), step], HOME)
+
+
+KNOWN = [16, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
+integers = st.integers(-(2**31), 2**31 - 1)
+floats32 = st.floats(width=32)
+
+
+@given(
+    st.lists(
+        st.builds(
+            WireItem,
+            st.integers(0, 25),
+            st.sampled_from(KNOWN) | st.integers(0, 65535),
+            st.integers(0, 1),
+            st.integers(0, 1),
+            *[floats32] * 4,
+            integers,
+            integers,
+            floats32,
+        ),
+        max_size=6,
+    )
+)
+@quick
+def test_any_items_are_flown_or_refused(items: list[WireItem]) -> None:
+    try:
+        steps_of_them = decode_items(items, HOME)
+    except MissionItemError as refused:
+        assert 0 <= refused.seq < len(items)
+        assert refused.result != mavlink.MAV_MISSION_ACCEPTED
+    else:
+        assert all(math.isfinite(n) for one in steps_of_them for n in numbers(one) if isinstance(n, float))
+
+
+def test_frames_of_a_place() -> None:
+    place = (12.0, -7.0, 5.0)
+    latitude, longitude, above_sea_mm = geodetic_from_enu(place, HOME)
+    same = [
+        item(16, frame=frame, x=latitude, y=longitude, z=height)
+        for frame, height in ((0, above_sea_mm / 1e3), (5, above_sea_mm / 1e3), (3, 5.0), (6, 5.0))
+    ]
+    same.append(item(16, frame=1, x=-70_000, y=120_000, z=-5.0))
+    for step in decode_items(same, HOME):
+        assert isinstance(step, Waypoint)
+        assert (step.east_m, step.north_m, step.altitude_m) == pytest.approx(place, abs=PLACE_M)
+
+
+def test_the_home_row_of_a_waypoint_file_is_not_flown() -> None:
+    latitude, longitude, _ = geodetic_from_enu((0.0, 0.0, 0.0), HOME)
+    row = WireItem(0, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, HOME.altitude_m)
+    assert decode_items([row, item(93, 1.0)], HOME) == (Delay(1.0),)
+    first = WireItem(6, 16, 1, 1, 0.0, 0.0, 0.0, 0.0, latitude, longitude, 3.0)
+    (step,) = decode_items([first], HOME)
+    assert isinstance(step, Waypoint)
+
+
+def test_a_landing_elsewhere_is_a_transfer_first() -> None:
+    latitude, longitude, _ = geodetic_from_enu((30.0, 40.0, 0.0), HOME)
+    there = item(21, frame=6, x=latitude, y=longitude)
+    up, go, down = decode_items([item(22, frame=6, z=4.0), there], HOME)
+    assert isinstance(go, Waypoint)
+    assert (go.east_m, go.north_m, go.altitude_m) == pytest.approx((30.0, 40.0, 4.0), abs=PLACE_M)
+    assert (up, down) == (Takeoff(4.0), Land())
+    assert decode_items([item(22, frame=6, z=4.0), item(21, frame=6)], HOME) == (Takeoff(4.0), Land())
+
+
+def test_commands_for_other_things_are_kept_and_not_flown() -> None:
+    assert decode_items([item(command) for command in (1000, 203, 177, 31000, 31014, 43000)], HOME) == ()
+
+
+def test_speeds_that_change_nothing_here() -> None:
+    items = [item(178, 1.0, -1.0), item(178, 2.0, 5.0), item(178, 0.0, 2.0)]
+    assert decode_items(items, HOME) == (Speed(2.0),)
+
+
+def test_float32_rounding_of_an_item_is_done_before_it_is_sent() -> None:
+    (delay,) = encode_steps([Delay(0.1)], HOME)
+    assert delay.param1 == struct.unpack("<f", struct.pack("<f", 0.1))[0]
