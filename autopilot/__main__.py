@@ -33,7 +33,6 @@ from autopilot.wire.parameters import ParameterError, ParameterTable
 Address = tuple[str, int]
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
-GROUND_SYNC_US = 20_000
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _GROUND_RESEND_S = 1.0
@@ -130,7 +129,6 @@ class GroundInStep:
     def __init__(self, address: Address) -> None:
         self._socket = _open(address, "ground station")
         self._address = address
-        self._next_us = 0
 
     def join(self, onboard: Onboard) -> None:
         """Serve the link from now on."""
@@ -141,12 +139,11 @@ class GroundInStep:
         """Send what is due; at the end of a window wait for the ground station's word on it."""
         for _, datagram in onboard.ground_datagrams():
             self._send(datagram)
-        if onboard.now_us < self._next_us:
+        ask = onboard.question(_GROUND_LINK)
+        if ask is None:
             return
-        self._next_us = onboard.now_us - onboard.now_us % GROUND_SYNC_US + GROUND_SYNC_US
-        stamp = onboard.now_us * 1000
-        ask = onboard.endpoint.datagram(_GROUND_LINK, mavlink.MAVLink_timesync_message(0, stamp))
         self._send(ask)
+        stamp = onboard.now_us * 1000
         asked = time.monotonic()
         while True:
             arrived = _receive(self._socket)

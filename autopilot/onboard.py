@@ -36,6 +36,9 @@ from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 
 
+GROUND_WINDOW_US = 20_000
+
+
 class Onboard:
     """One autopilot. `receive_sensors` moves its clock; nothing else does."""
 
@@ -58,6 +61,7 @@ class Onboard:
         self._version = parameters.version
         self.stale = 0  # ticks in a row that lay in the past
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
+        self._next_question_us = 0
         self._setup = self._build_setup(1)
         self._take_plan(self.endpoint.mission)
 
@@ -164,6 +168,16 @@ class Onboard:
                 (link, datagram) for link, datagram in sent if not self._sent_loss.drops(datagram, percent)
             ]
         return sent
+
+    def question(self, link: Link) -> bytes | None:
+        """TIMESYNC for a ground station that shares our clock, at the first tick of each window; else None.
+
+        The shell sends it after `ground_datagrams` and lets the clock stand until it is answered.
+        """
+        if self.now_us < self._next_question_us:
+            return None
+        self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
+        return self.endpoint.datagram(link, mavlink.MAVLink_timesync_message(0, self.now_us * 1000))
 
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""

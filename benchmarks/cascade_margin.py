@@ -11,7 +11,7 @@ circle, all commands delayed alike.
 `delay` is all that passes between a motion and the command that answers it, besides the hold: sensor latency,
 computation, transport.
 
-    python benchmarks/cascade_margin.py [--loop attitude|position] [--set k_R=0.45 ...]
+    python benchmarks/cascade_margin.py [--loop attitude|position|vehicle] [--set k_R=0.45 ...]
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 
 from autopilot.control import thesis
 from autopilot.control.command_filter import FilterState
+from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Reference, State, Vehicle
 
 Array = NDArray[np.float64]
@@ -40,6 +41,8 @@ HOVER = 0.25 * (BEBOP.quad_mass + BEBOP.load_mass) * BEBOP.gravity  # N, each ro
 HEADING = (1.0, 0.0, 0.0)
 # central differences: truncation and rounding both below 1e-9
 STEP = 1e-5
+# the innermost loop, the load position cascade, the vehicle position law with the load hanging
+LOOPS = ("attitude", "position", "vehicle")
 GREATEST_DELAY = 0.2  # s; more is reported as this
 GREATEST_GAIN = 101.0
 LOST = 1.0 + 1e-9  # spectral radius
@@ -146,6 +149,8 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     """(memory, motion) -> (memory, f, M) of one control tick, as arrays."""
     filters = thesis.thesis_filters(settings.period, **settings.filters)
     reference = Reference((ZERO,) * 7, HEADING)
+    above = (0.0, 0.0, vehicle.cable_length)
+    vehicle_reference = Reference((above, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), HEADING)
     level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
@@ -154,6 +159,17 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
         if settings.loop == "attitude":
             after, command = thesis.quad_attitude(
                 memory, state, level, weight, settings.gains, filters, vehicle
+            )
+        elif settings.loop == "vehicle":
+            after, command = quad_position(
+                memory,
+                state,
+                vehicle_reference,
+                vehicle.load_mass,
+                QUAD_POSITION_GAINS,
+                settings.gains,
+                filters,
+                vehicle,
             )
         else:
             after, command = thesis.load_position(memory, state, reference, settings.gains, filters, vehicle)
@@ -361,11 +377,11 @@ def parsed(pairs: Iterable[str]) -> tuple[thesis.ThesisGains, dict[str, float]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--loop", choices=("attitude", "position", "both"), default="both")
+    parser.add_argument("--loop", choices=LOOPS, help="default: all")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="gain or filter")
     arguments = parser.parse_args()
     gains, filters = parsed(arguments.set)
-    loops = ("attitude", "position") if arguments.loop == "both" else (arguments.loop,)
+    loops = LOOPS if arguments.loop is None else (arguments.loop,)
     for loop in loops:
         print(f"\n{loop} loop, {' '.join(arguments.set) or 'gains of Table 4-3, filters of 4-3'}")
         grid = [
@@ -378,6 +394,8 @@ def main() -> None:
             )
         ]
         print(table(grid))
+    if "position" not in loops:
+        return
     print("\nrotor command, standard deviation, for noise white from tick to tick; 250 Hz, rotor lag 20 ms")
     settings = Settings(0.02, 0.004, 0.0, "position", gains, filters)
     if not margin(settings).stable:

@@ -29,9 +29,9 @@ def run_lockstep(
     ended: Ended,
     display: FlightDisplay,
     stop: StopRequest,
-    first_turn: Callable[[], None],
+    first_word: Callable[[], None],
 ) -> None:
-    """Fly until the client has its outcome. `first_turn` is called when the vehicle asks for the first time.
+    """Fly until the client has its outcome. `first_word` is called when the vehicle is heard at first.
 
     A process that ends before that raises NoVehicleError; one that ends later is an outcome.
     """
@@ -68,7 +68,7 @@ def run_lockstep(
                 continue
             if not started:
                 started = True
-                first_turn()
+                first_word()
             pending.append(datagram)
             now_us = question_ns // 1000
             truth_queue.put(truth.drain())
@@ -108,14 +108,19 @@ def run_wall_clock(
     ended: Ended,
     display: FlightDisplay,
     stop: StopRequest,
+    first_word: Callable[[], None],
 ) -> None:
     """Fly until the client has its outcome. Log records bear the vehicle's clock once it is known."""
     sockets = [vehicle] if truth is None else [vehicle, truth]
+    started = False
     while client.outcome is None:
         wait(sockets, _TICK_S)
         now_us = monotonic_us()
         _turn(client, capture, truth.drain() if truth else [], vehicle.drain(), now_us, vehicle)
         capture.flush(client.view.time_us or 0)
+        if not started and client.connection.target is not None:
+            started = True
+            first_word()
         display.update(client.progress)
         if stop:
             client.interrupt()

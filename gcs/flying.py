@@ -87,15 +87,15 @@ def fly(options: FlightOptions) -> Flight:
     mission = load_checked(options.mission, options.vehicle, options.force)
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with _Folder(out) as folder, StopRequest("stopping; Ctrl-C again abandons the report") as stop:
-        began_s = time.monotonic()
+        watch = _Stopwatch()
         tlog = out / "flight.tlog"
         with tlog.open("wb") as file:
             log = TlogWriter(file)
             if options.connect is not None:
-                client = _fly_running(mission, options, options.connect, log, stop)
+                client = _fly_running(mission, options, options.connect, log, stop, watch)
             else:
-                client = _fly_own(mission, options, log, out, stop)
-        wall_s = time.monotonic() - began_s
+                client = _fly_own(mission, options, log, out, stop, watch)
+        wall_s = watch.stop()
         outcome = client.outcome or Outcome("interrupted")
         if tlog.stat().st_size == 0:
             raise GcsError(outcome.reason or "stopped before the vehicle said anything")
@@ -105,23 +105,34 @@ def fly(options: FlightOptions) -> Flight:
 
 
 def _fly_own(
-    mission: Mission, options: FlightOptions, log: TlogWriter, out: Path, stop: StopRequest
+    mission: Mission,
+    options: FlightOptions,
+    log: TlogWriter,
+    out: Path,
+    stop: StopRequest,
+    watch: _Stopwatch,
 ) -> FlightClient:
     """With a simulator and an autopilot of our own, which are gone afterwards."""
     client = _client(mission, options, Home())
     display = FlightDisplay(mission.name, options.quiet)
     vehicle, truth = UdpSocket(), UdpSocket()
-    lockstep = options.speed is None
     with tempfile.TemporaryDirectory(prefix="plumbline-") as storage, Processes() as processes, display:
+        ended = processes.ended
+
+        def begun() -> None:
+            watch.start()
+            if options.speed is None:
+                processes.share_one_core()
+
         try:
             _start(processes, options, out, Path(storage), vehicle.address, truth.address)
-            if lockstep:
+            if options.speed is None:
                 capture = Capture(log, LOCKSTEP_BOOT_UNIX_US)
-                first_turn = processes.share_one_core
-                run_lockstep(client, capture, vehicle, truth, processes.ended, display, stop, first_turn)
+                run_lockstep(client, capture, vehicle, truth, ended, display, stop, begun)
             else:
                 capture = Capture(log, unix_us())
-                run_wall_clock(client, capture, vehicle, truth, processes.ended, display, stop)
+                run_wall_clock(client, capture, vehicle, truth, ended, display, stop, begun)
+            watch.stop()
         finally:
             vehicle.close()
             truth.close()
@@ -153,7 +164,12 @@ def _start(
 
 
 def _fly_running(
-    mission: Mission, options: FlightOptions, address: Address, log: TlogWriter, stop: StopRequest
+    mission: Mission,
+    options: FlightOptions,
+    address: Address,
+    log: TlogWriter,
+    stop: StopRequest,
+    watch: _Stopwatch,
 ) -> FlightClient:
     """With a vehicle that somebody else has started, and that goes on afterwards."""
     with Session(address) as session:
@@ -163,7 +179,9 @@ def _fly_running(
     vehicle = open_address(address)
     try:
         with FlightDisplay(mission.name, options.quiet) as display:
-            run_wall_clock(client, Capture(log, unix_us()), vehicle, truth, lambda: "", display, stop)
+            capture = Capture(log, unix_us())
+            run_wall_clock(client, capture, vehicle, truth, lambda: "", display, stop, watch.start)
+        watch.stop()
     finally:
         vehicle.close()
         if truth is not None:
@@ -232,6 +250,23 @@ def _command_line(options: FlightOptions) -> str:
     for setting in options.settings:
         words += ["--set", setting]
     return " ".join(words)
+
+
+class _Stopwatch:
+    """The wall time from the vehicle's first word to the end of the flight."""
+
+    def __init__(self) -> None:
+        self._began_s: float | None = None
+        self._wall_s: float | None = None
+
+    def start(self) -> None:
+        self._began_s = time.monotonic()
+
+    def stop(self) -> float:
+        """Stop if it runs; the time measured."""
+        if self._wall_s is None:
+            self._wall_s = 0.0 if self._began_s is None else time.monotonic() - self._began_s
+        return self._wall_s
 
 
 class _Folder:

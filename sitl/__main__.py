@@ -175,15 +175,16 @@ def run_real_time(
     """Tick for ever on an absolute schedule; a command that comes too late is missed, and counted."""
     watch = Watch(say)
     period_ns = simulator.tick_us * 1000 / speed
+    simulator.pacing = pacing.figures
     start = time.perf_counter_ns()
     tick = 0
     while True:
         due = start + round(tick * period_ns)
         now = _sleep_until(due)
         link.send(simulator)
-        link.send_truth(simulator)
         pacing.record(due, now)
         simulator.pacing = pacing.figures
+        link.send_truth(simulator)
         if now - due > _STALL_NS:
             start += now - due
         tick += 1
@@ -358,7 +359,9 @@ def main(
         def build() -> HilSimulator:
             return HilSimulator.build(vehicle, sensors, seed, dict(settings), home, lockstep, truth_every)
 
-        build().advance()  # compiles, or loads, every kernel
+        warm = build()  # compiles, or loads, every kernel
+        warm.truth_datagram()
+        warm.advance()
         simulator = build()
         _prepare_process(cpu)
         mode = "in lockstep" if lockstep else f"at {factor:g} x real time"

@@ -32,6 +32,9 @@ STATUS_PERIOD_US = 200_000
 COMMAND_TIMEOUT_US = 500_000
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
+_DIVERGED = mavlink.MAVLink_statustext_message(
+    mavlink.MAV_SEVERITY_CRITICAL, b"Simulation stopped: outside its model"
+)
 _TRACKER, _CAMERA, _ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
 _FIX = {"3d": mavlink.GPS_FIX_TYPE_3D_FIX, "rtk": mavlink.GPS_FIX_TYPE_RTK_FIXED}
 
@@ -83,7 +86,8 @@ class HilSimulator:
         self._field = _ZERO
         self._height = core.state.x_quad[2]
         self._sensors = self._sensor_frames(core.readings)
-        self._truth = self._truth_frames()
+        self._truth: bytes | None = None
+        self._truth_made = False
 
     @classmethod
     def build(
@@ -130,7 +134,10 @@ class HilSimulator:
         return self._sensors
 
     def truth_datagram(self) -> bytes | None:
-        """Truth telemetry of this tick; None on the ticks between."""
+        """Truth telemetry of this tick; None on the ticks between. Made when first asked for."""
+        if not self._truth_made:
+            self._truth = self._truth_frames()
+            self._truth_made = True
         return self._truth
 
     def greets(self, datagram: bytes) -> bool:
@@ -175,7 +182,7 @@ class HilSimulator:
                 self._command = STOPPED
         self.answered = False
         self._sensors = self._sensor_frames(self._core.tick(self._command))
-        self._truth = self._truth_frames()
+        self._truth_made = False
 
     def _sensor_frames(self, readings: Readings) -> bytes:
         frame = self._sensor_writer.frame
@@ -287,6 +294,8 @@ class HilSimulator:
             frames = [frame(vehicle), frame(load), frame(rotors)]
         if status_due:
             frames.append(frame(self._status()))
+            if self.diverged:
+                frames.append(frame(_DIVERGED))
         return b"".join(frames)
 
     def _status(self) -> object:

@@ -1,8 +1,9 @@
 """The thesis's cascade with its command filters (4-3), in its three flight modes, each usable alone (3-2).
 
-    load_position:  x_d -> filter -> (3-43) A -> (3-42) q_c -> filter -+ load_attitude:
-    q_d -> filter -+-> (3-31) F -> (3-27) R_c -> filter -+ quad_attitude:
-    R_d -> filter -+-----+-> (3-36) M
+    load_position:  x_d -> filter -> (3-43) A -> (3-42) q_c -> filter -+
+    load_attitude:                                      q_d -> filter -+-> (3-31) F -> (3-27) R_c -+
+    quad_attitude:                                                                            R_d -+
+                                                                     -> filter -> (3-36) M, (3-35) f
 
 | symbol          | code name       | value          | unit       | equation |
 |-----------------|-----------------|----------------|------------|----------|

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats, swing, tilt
-from gcs.analysis.samples import AIRBORNE, CARRIED, HOLD, MISSION, UNKNOWN, Samples, in_window
+from gcs.analysis.samples import AIRBORNE, CARRIED, HOLD, MISSION, Samples, in_window
 from gcs.analysis.step import find_step, step_response
 from gcs.analysis.tracks import Telemetry
 
@@ -177,7 +177,7 @@ def coverage_numbers(samples: Samples) -> Numbers:
     }
 
 
-DIVERGED_M = 2.0  # two cable lengths of the nominal vehicle and more: nothing is being tracked any longer
+DIVERGED_M = 2.0  # nearly three cable lengths of the nominal vehicle: nothing is tracked any longer
 
 
 def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
@@ -186,11 +186,9 @@ def outcome_of(telemetry: Telemetry, samples: Samples) -> str:
     if len(phase) == 0 and len(samples.time_s) == 0:
         return "no telemetry"
     error = np.linalg.norm(samples.error_m[samples.position_tracked], axis=1)
-    if not np.isfinite(samples.actual_m).all() or bool((error > DIVERGED_M).any()):
+    lost = not np.isfinite(samples.actual_m).all() or bool((error > DIVERGED_M).any())
+    if lost or (phase == mavlink.PLUMBLINE_PHASE_FAILSAFE).any():
         return "diverged"
-    known = phase[phase != UNKNOWN]
-    if (known == mavlink.PLUMBLINE_PHASE_FAILSAFE).any():
-        return "failsafe"
-    if (known == MISSION).any() and known[-1] == mavlink.PLUMBLINE_PHASE_DISARMED:
+    if np.isin(phase, CARRIED).any() and phase[-1] == mavlink.PLUMBLINE_PHASE_DISARMED:
         return "completed"
     return "incomplete"

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 METADATA_KEY = b"plumbline"
 
 _AXES = ("x", "y", "z")
-_BODY = ("x", "y", "z")
 
 
 def _spread(name: str, unit: str, values: Floats, parts: tuple[str, ...] = _AXES) -> dict[str, Floats]:
@@ -58,7 +57,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         **_spread("load_velocity_desired", "m_s", samples.desired_m_s),
         **_spread("load_velocity_true", "m_s", samples.actual_m_s),
         **_spread("cable_true", "", truth.q_cable),
-        **_spread("cable_rate_true", "1_s", truth.q_cable_dot),
+        **_spread("cable_rate_true", "per_s", truth.q_cable_dot),
         **_spread("cable_angle", "rad", cable_angles(truth.q_cable), cable),
         "cable_distance_m": truth.distance_m,
         "cable_tension_n": truth.tension_n,
@@ -67,18 +66,18 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         **_spread("vehicle_true", "m", samples.vehicle_m),
         **_spread("vehicle_quaternion", "", samples.quat_wxyz, ("w", "x", "y", "z")),
         **_spread("vehicle_angle", "rad", roll_pitch_yaw(samples.quat_wxyz), ("roll", "pitch", "yaw")),
-        **_spread("vehicle_rate", "rad_s", linear(attitude.time_s, attitude.omega_body, t), _BODY),
+        **_spread("vehicle_rate", "rad_s", linear(attitude.time_s, attitude.omega_body, t)),
         **_spread("rotor_force", "n", as_of(true_rotors.time_s, true_rotors.force_n, t), rotors),
         **_spread("rotor_command", "n", held(commanded.force_n), rotors),
         "rotor_saturated": held(commanded.saturated),
         "thrust_asked_n": error(cascade.thrust_n),
-        **_spread("moment_asked", "n_m", error(cascade.moment_n_m), _BODY),
+        **_spread("moment_asked", "n_m", error(cascade.moment_n_m)),
         **_spread("e_x", "m", error(cascade.e_x)),
         **_spread("e_v", "m_s", error(cascade.e_v)),
         **_spread("e_q", "", error(cascade.e_q)),
-        **_spread("e_q_dot", "1_s", error(cascade.e_q_dot)),
-        **_spread("e_R", "", error(cascade.e_R), _BODY),
-        **_spread("e_Omega", "rad_s", error(cascade.e_Omega), _BODY),
+        **_spread("e_q_dot", "per_s", error(cascade.e_q_dot)),
+        **_spread("e_R", "", error(cascade.e_R)),
+        **_spread("e_Omega", "rad_s", error(cascade.e_Omega)),
         "psi_R": error(cascade.psi_R),
         "psi_q": error(cascade.psi_q),
     }

@@ -1,4 +1,4 @@
-"""A flight as named columns: what was received, per message type and source, on one clock, in one set of axes.
+"""A flight as named columns, per message type and source, on one clock and in one set of axes.
 
 Times are seconds of the vehicle's clock since boot (`time_usec` / 1e6). Worlds are ENU relative to home,
 bodies FLU, units SI. Each track is sorted by time, one sample per time stamp. A track that was never

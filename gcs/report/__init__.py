@@ -1,0 +1,1 @@
+"""The report of a flight: pictures, a page, a table, and the files they are kept in."""

@@ -35,7 +35,7 @@ _FIRST_LABELS = {
     "slack_events": "times slack",
     "flight_s": "of flight",
 }
-_MOODS = {"completed": "good", "diverged": "bad", "failsafe": "bad"}
+_MOODS = {"completed": "good", "diverged": "bad", "lost": "bad"}
 _LEVELS = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 
 

@@ -17,7 +17,7 @@ from gcs.analysis.tracks import Ints
 
 # Okabe and Ito's palette
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-PURPLE, SKY = "#CC79A7", "#56B4E9"
+PURPLE = "#CC79A7"
 INK, GREY, PALE, SHADOW = "#22272e", "#7b838c", "#c9ced4", "#d5dae0"
 
 FAINT = "#a9b2bb"  # a line behind another

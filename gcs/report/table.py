@@ -9,7 +9,7 @@ from gcs.analysis.record import GROUPS, Record, shown
 if TYPE_CHECKING:
     from rich.table import Table
 
-_OUTCOME_STYLES = {"completed": "bold green", "diverged": "bold red", "failsafe": "bold red"}
+_OUTCOME_STYLES = {"completed": "bold green", "diverged": "bold red", "lost": "bold red"}
 
 
 def record_table(record: Record) -> Table:

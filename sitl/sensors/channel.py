@@ -79,12 +79,13 @@ class Channel(Generic[ReadingT]):
         self._fate = fate
         self._noise = noise
         self._state = start(config, noise)
-        period_us = timing.nominal_us(1) - timing.nominal_us(0)
+        self._nominal_us = timing.nominal_us(0)
+        period_us = timing.nominal_us(1) - self._nominal_us
         self._outage_chance = fate.outages_per_s * period_us / _SECOND_US
         self._outage_end_us = 0
         self._count = 0
         self._on_the_way: deque[tuple[int, Measurement[ReadingT]]] = deque()
-        self.due_us = max(timing.nominal_us(0), 0)  # instant of the next measurement
+        self.due_us = max(self._nominal_us, 0)  # instant of the next measurement
 
     def measure(self, truth_state: PlantState) -> None:
         """Take the measurement that is due, of the state at `due_us`."""
@@ -92,10 +93,11 @@ class Channel(Generic[ReadingT]):
         noise = Noise(key.seed, key.stream, self._count, key.scale)
         reading, self._state = self._sample(truth_state, self._state, self._config, noise)
         if self._delivers(noise):
-            leaves_us = self._timing.nominal_us(self._count) + self._timing.latency_us
+            leaves_us = self._nominal_us + self._timing.latency_us
             self._on_the_way.append((leaves_us, Measurement(self.due_us, reading)))
         self._count += 1
-        self.due_us = max(self._timing.nominal_us(self._count), 0)
+        self._nominal_us = self._timing.nominal_us(self._count)
+        self.due_us = max(self._nominal_us, 0)
 
     def collect(self, now_us: int) -> tuple[Measurement[ReadingT], ...]:
         """The readings that have left by now, oldest first; each is given once."""

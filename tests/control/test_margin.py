@@ -57,8 +57,8 @@ def test_linear_model_is_that_of_the_equations(tool: ModuleType, model: SimpleNa
 def test_published_delay_margins(
     tool: ModuleType, k_R: float, k_Omega: float, J: float, crossover: float, delay: float
 ) -> None:
-    """(k_Omega s + k_R)/(J s^2) with ideal rotors, for three published sets of gains. The hold of a period takes
-    half of it; the printed figures have two or three digits."""
+    """(k_Omega s + k_R)/(J s^2) with ideal rotors, for three published sets of gains. The hold of a period
+    takes half of it; the printed figures have two or three digits."""
     period = 0.02 / crossover
     gains = tool.thesis.THESIS_GAINS._replace(k_R=(k_R,) * 3, k_Omega=(k_Omega,) * 3)
     vehicle = tool.BEBOP._replace(inertia=(J, J, J))

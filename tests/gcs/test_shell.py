@@ -211,7 +211,7 @@ def test_a_process_that_ends_before_the_flight_is_an_error(items, tmp_path, lock
             if lockstep:
                 run_lockstep(*arguments, lambda: None)
             else:
-                run_wall_clock(*arguments)
+                run_wall_clock(*arguments, lambda: None)
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
@@ -225,7 +225,7 @@ def test_ctrl_c_stops_the_flight_once_and_in_order(items, tmp_path, lockstep, ca
         if lockstep:
             run_lockstep(*arguments, lambda: None)
         else:
-            run_wall_clock(*arguments)
+            run_wall_clock(*arguments, lambda: None)
         assert client.outcome is not None
         assert client.outcome.name == "interrupted"
         with pytest.raises(KeyboardInterrupt):

@@ -120,6 +120,21 @@ def test_instant_rotors_release_the_cable_at_once(thesis, aloft):
     assert state.v_quad[2] == pytest.approx(-(thesis.gravity + 0.4 / thesis.quad_mass) * 4e-3, abs=1e-14)
 
 
+@pytest.mark.parametrize(("speed", "taut"), [(0.5, 1.0), (-0.5, 0.0)])
+def test_a_stretched_cable_is_taken_up_at_once_unless_it_shortens(thesis, speed, taut):
+    """What a step with too many impacts may leave behind: a distance a little above the cable length."""
+    start = initial_state(thesis)._replace(
+        x_quad=(0.0, 0.0, 50.0),
+        x_load=(0.0, 0.0, 50.0 - thesis.cable_length - 1e-6),
+        v_load=(0.0, 0.0, -speed),
+        q_cable=(0.0, 0.0, -1.0),
+    )
+    state = advance(start, thesis, OFF, CALM, 1e-6)
+    assert state.taut == taut
+    if taut:
+        assert math.dist(state.x_load, state.x_quad) == pytest.approx(thesis.cable_length, abs=1e-12)
+
+
 @pytest.mark.parametrize("case", ["taut", "slack", "switching"])
 def test_order_of_the_step_in_the_air(convergence, case):
     errors, order = convergence.study(case, (4e-3, 2e-3, 1e-3, 5e-4))

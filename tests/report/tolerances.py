@@ -10,8 +10,6 @@ CROSSING_S = 1e-3
 PEAK_RELATIVE = 2e-3
 # the same formula evaluated by arrays and by scalars
 ROUNDING = 1e-15
-# between samples 8 ms apart a cubic through value and rate misses a path by h^4/384 of its fourth derivative
-HERMITE_M = 1e-9
 # angles go through arcus functions, whose slope is up to ten within the drawn ranges
 ANGLE = 1e-13
 # a polynomial with coefficients up to 5 over a few seconds, relative to its greatest value

@@ -149,6 +149,16 @@ def test_truth_is_the_truth(answerer, messages) -> None:
     )
 
 
+def test_a_plant_that_diverged_says_so(answerer, messages) -> None:
+    simulator = HilSimulator.build(vehicle="thesis")
+    sent = answerer((300.0, 0.0, 0.0, 0.0)).fly(simulator, 250)  # spins up beyond all bounds
+    assert simulator.diverged
+    texts = [m for datagram in sent for m in messages(datagram) if m.get_type() == "STATUSTEXT"]
+    assert texts
+    assert all(text.text == "Simulation stopped: outside its model" for text in texts)
+    assert messages(simulator.sensor_datagram())[-1].time_usec == simulator.now_us == 1_000_000
+
+
 def test_only_the_answer_to_this_tick_counts(answerer) -> None:
     simulator, pilot = HilSimulator.build(), answerer()
     pilot.fly(simulator, 3)
@@ -254,9 +264,9 @@ def test_real_time_rotors_stop_when_commands_stay_away(answerer) -> None:
 
 def test_status_carries_what_the_shell_measured(answerer, messages) -> None:
     simulator = HilSimulator.build(lockstep=False)
-    simulator.pacing = PacingFigures(2.0, 499.5, 3, 40, 500)
     simulator.advance()
     answerer().fly(simulator, 49)
+    simulator.pacing = PacingFigures(2.0, 499.5, 3, 40, 500)
     status = messages(simulator.truth_datagram())[-1]
     assert (status.speed_factor, status.rate_hz, status.late_p50_us) == (2.0, 499.5, 3)
     assert (status.late_p99_us, status.late_max_us, status.missed) == (40, 500, 1)

@@ -1,0 +1,101 @@
+"""A whole flight in one process: simulator, autopilot and ground station joined by byte queues.
+
+The same cores that the three programs run, in the same order of exchange, so that a flight flown here and one
+flown over UDP in lockstep leave the same log, byte for byte. This is the one module that joins the rooms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from autopilot.onboard import Onboard
+from autopilot.services.identity import Identity
+from autopilot.services.mission_store import StoredMission
+from autopilot.telemetry_view import Options
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.convert import Home
+from autopilot.wire.mission_items import encode_mission
+from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
+from gcs.clients.flight import FlightClient, Outcome
+from gcs.clients.lockstep import LockstepTurns, TruthQueue
+from gcs.expected import expected_duration_s
+from missions.model import Mission
+from sitl.hil import HilSimulator
+
+_GROUND = "ground"
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What is flown, but for the mission."""
+
+    vehicle: str = "bebop"
+    sensors: str = "lab"
+    seed: int = 1
+    settings: Mapping[str, float] = field(default_factory=dict)  # SIM_ and autopilot parameters by name
+
+
+def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
+    """An autopilot under these conditions."""
+    table = autopilot_parameters(load_belief(conditions.vehicle))
+    for name, value in conditions.settings.items():
+        if name in table or not name.startswith("SIM_"):
+            table.set(name, value)
+    table.freeze()
+    return Onboard(table, Identity(), Options(home, LOCKSTEP_BOOT_UNIX_US), mission)
+
+
+def build_simulator(conditions: Conditions, home: Home) -> HilSimulator:
+    """A world under these conditions."""
+    return HilSimulator.build(
+        conditions.vehicle, conditions.sensors, conditions.seed, conditions.settings, home, lockstep=True
+    )
+
+
+def fly(mission: Mission, conditions: Conditions, log: FrameLog) -> Outcome:
+    """Fly a mission from take-off to landing; the log gets what `gcs fly --lockstep` writes."""
+    home = Home()
+    onboard = build_onboard(conditions, home)
+    onboard.add_link(_GROUND)
+    simulator = build_simulator(conditions, home)
+    client = FlightClient(encode_mission(mission, home), expected_duration_s(mission))
+    capture = Capture(log)
+    turns, truth_queue = LockstepTurns(), TruthQueue()
+    said: list[bytes] = []
+    while client.outcome is None:
+        truth = simulator.truth_datagram()
+        if truth is not None:
+            truth_queue.put([truth])
+        answer = onboard.receive_sensors(simulator.sensor_datagram())
+        said += [datagram for _, datagram in onboard.ground_datagrams()]
+        question = onboard.question(_GROUND)
+        if question is not None:
+            now_us = onboard.now_us
+            said.append(question)
+            sent = ground_turn(client, capture, truth_queue.until(now_us), said, now_us)
+            said.clear()
+            for datagram in (*sent, turns.answer(now_us * 1000)):
+                onboard.receive_ground(datagram, _GROUND)
+            capture.flush(now_us)
+        if answer is not None:
+            simulator.receive(answer)
+        simulator.advance()
+    return client.outcome
+
+
+def ground_turn(
+    client: FlightClient, capture: Capture, truth: list[bytes], vehicle: list[bytes], now_us: int
+) -> list[bytes]:
+    """The ground station's turn: hears everything, answers, and keeps a record of both."""
+    for datagram in truth:
+        client.receive(datagram, "truth", now_us)
+        capture.on_truth(datagram)
+    for datagram in vehicle:
+        client.receive(datagram, "vehicle", now_us)
+        capture.on_vehicle(datagram)
+    sent = client.poll(now_us)
+    for datagram in sent:
+        capture.on_sent(datagram)
+    return sent
