@@ -22,9 +22,9 @@ from missions.transfer import transfer_duration
 SPEED_M_S = 1.5
 ACCELERATION_M_S2 = 1.5
 LIFT_M_S = 0.8
-TAUTEN_S = 15.0  # rising over the load until a cable of about a metre is taut
-SET_DOWN_S = 15.0  # landing beside the load, and rotors off
-SETTLE_S = 1.0  # between two steps
+TAUTEN_S = 7.0  # rising over the load until a cable of about a metre is taut
+SET_DOWN_S = 7.0  # landing beside the load, and rotors off
+SETTLE_S = 0.3  # between two steps
 
 Place = tuple[float, float, float]
 

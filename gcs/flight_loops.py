@@ -14,7 +14,7 @@ from gcs.link import UdpSocket, monotonic_us, wait
 from gcs.stopping import StopRequest
 
 _WAIT_S = 0.2
-_TICK_S = 0.02  # of the wall clock, in real time
+_TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to those who must be punctual
 START_LIMIT_S = 180.0  # the very first start compiles the kernels
 SILENCE_LIMIT_S = 20.0  # of a vehicle in lockstep that was there before
 
@@ -111,10 +111,9 @@ def run_wall_clock(
     first_word: Callable[[], None],
 ) -> None:
     """Fly until the client has its outcome. Log records bear the vehicle's clock once it is known."""
-    sockets = [vehicle] if truth is None else [vehicle, truth]
     started = False
     while client.outcome is None:
-        wait(sockets, _TICK_S)
+        time.sleep(_TICK_S)
         now_us = monotonic_us()
         _turn(client, capture, truth.drain() if truth else [], vehicle.drain(), now_us, vehicle)
         capture.flush(client.view.time_us or 0)

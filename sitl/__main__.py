@@ -109,19 +109,17 @@ class Watch:
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
-        self._heard = time.monotonic()
         self._lost = False
 
     def heard(self, link: Link) -> None:
         """An answer came."""
-        self._heard = time.monotonic()
         if self._lost:
             self._lost = False
             self._say(f"autopilot at {_shown(link.peer)} answers again")
 
-    def silence(self, link: Link, simulator: HilSimulator) -> None:
-        """No answer so far."""
-        if not self._lost and time.monotonic() - self._heard > _LOST_S:
+    def silence(self, since: float, link: Link, simulator: HilSimulator) -> None:
+        """No answer since that time of the monotonic clock."""
+        if not self._lost and time.monotonic() - since > _LOST_S:
             self._lost = True
             self._say(
                 f"no answer from the autopilot at {_shown(link.peer)} for {_LOST_S:g} s "
@@ -142,11 +140,10 @@ def meet(link: Link, simulator: HilSimulator, say: Callable[[str], None]) -> Non
 def run_lockstep(link: Link, simulator: HilSimulator, say: Callable[[str], None]) -> None:
     """Tick for ever, each tick as soon as the one before is answered."""
     watch = Watch(say)
-    lost = False
     while True:
         link.send_truth(simulator)
         link.send(simulator)
-        sent = time.monotonic() if lost else 0.0
+        began = sent = time.monotonic()
         silence_s = _RESEND_FIRST_S
         link.timeout(silence_s)
         while not simulator.answered:
@@ -154,18 +151,15 @@ def run_lockstep(link: Link, simulator: HilSimulator, say: Callable[[str], None]
             greeted = arrived is not None and link.take(*arrived, simulator)
             if simulator.answered:
                 break
-            # from here on something is odd, and time may be spent on it
-            watch.silence(link, simulator)
-            lost = True
+            # not for every stray datagram: the answer to one doubled tick would double all that follow
             now = time.monotonic()
-            if arrived is None or greeted or now - sent > silence_s:
+            if arrived is None or greeted or now - sent >= silence_s:
                 link.send(simulator)
                 sent = now
                 silence_s = min(2.0 * silence_s, _RESEND_LAST_S)
                 link.timeout(silence_s)
-        if lost:
-            watch.heard(link)
-            lost = False
+            watch.silence(began, link, simulator)
+        watch.heard(link)
         simulator.advance()
 
 
@@ -176,6 +170,7 @@ def run_real_time(
     watch = Watch(say)
     period_ns = simulator.tick_us * 1000 / speed
     simulator.pacing = pacing.figures
+    heard = time.monotonic()
     start = time.perf_counter_ns()
     tick = 0
     while True:
@@ -189,9 +184,10 @@ def run_real_time(
             start += now - due
         tick += 1
         if _await_answer(link, simulator, start + round(tick * period_ns)):
+            heard = time.monotonic()
             watch.heard(link)
         else:
-            watch.silence(link, simulator)
+            watch.silence(heard, link, simulator)
         simulator.advance()
 
 
@@ -203,11 +199,10 @@ def _await_answer(link: Link, simulator: HilSimulator, due_ns: int) -> bool:
             link.take(*arrived, simulator)
             if simulator.answered:
                 return True
-            continue
         left = due_ns - time.perf_counter_ns()
         if left <= 0:
             return False
-        if left > _SPIN_NS:
+        if not arrived and left > _SPIN_NS:
             link.wait((left - _SPIN_NS) * 1e-9)
 
 

@@ -22,6 +22,7 @@ from autopilot.services.answers import (
 )
 from autopilot.services.commands import CommandService
 from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT, Identity
+from autopilot.services.links import LinkState, Outgoing
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.missions import MissionService
 from autopilot.services.parameters import ParameterService
@@ -46,14 +47,13 @@ from autopilot.services.requests import (
 )
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
-from autopilot.services.streams import OFF, Streams
+from autopilot.services.streams import OFF
 from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
-from autopilot.wire.codec import FrameWriter, Received, decode
+from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterTable
 
-DATAGRAM_BYTES = 1400  # below the MTU of any common network, with headers
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
 _INT32 = 2**31 - 1
@@ -64,30 +64,6 @@ _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
 SnapshotFactory = Callable[[], Snapshot]
-# a system and a component that speak, and what they say
-_Outgoing = tuple[tuple[int, int], Any]
-
-
-class _LinkState:
-    """One way to clients: its streams, its sequence counters, and what waits to be sent."""
-
-    __slots__ = ("announced", "configured", "heard_us", "queue", "streams", "writers")
-
-    def __init__(self, configured: bool, defaults: dict[int, int], now_us: int) -> None:
-        self.configured = configured
-        self.heard_us = now_us
-        self.streams = Streams(defaults, now_us)
-        self.writers: dict[tuple[int, int], FrameWriter] = {}
-        self.queue: list[Any] = []  # answers of the autopilot
-        self.announced: dict[int, None] = {_HEARTBEAT: None}  # streamed messages out of turn, in order
-
-    def frame(self, outgoing: _Outgoing) -> bytes:
-        """The next frame of a source on this link."""
-        source, message = outgoing
-        writer = self.writers.get(source)
-        if writer is None:
-            writer = self.writers[source] = FrameWriter(*source)
-        return writer.frame(message)
 
 
 class VehicleEndpoint:
@@ -101,7 +77,7 @@ class VehicleEndpoint:
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
         self._texts = TextWriter()
-        self._links: dict[Link, _LinkState] = {}
+        self._links: dict[Link, LinkState] = {}
         self._table: dict[int, Stream] = dict(STREAMS)
         if identity.load_system:
             self._table |= LOAD_STREAMS
@@ -124,7 +100,7 @@ class VehicleEndpoint:
 
     def add_link(self, link: Link, now_us: int = 0) -> None:
         """A link that always gets telemetry, whether or not somebody is heard on it."""
-        self._links[link] = _LinkState(True, self._defaults, now_us)
+        self._links[link] = LinkState(True, self._defaults, now_us)
         self._work = True
 
     def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
@@ -184,41 +160,26 @@ class VehicleEndpoint:
             snapshot = make_snapshot()
             self._watch(snapshot)
         datagrams: list[tuple[Link, bytes]] = []
-        built: dict[int, list[_Outgoing]] = {}
+        built: dict[int, list[Outgoing]] = {}
         own = (self.identity.system, AUTOPILOT_COMPONENT)
         for link, state in self._links.items():
-            outgoing: list[_Outgoing] = [(own, message) for message in state.queue]
+            outgoing: list[Outgoing] = [(own, message) for message in state.queue]
             for key in dict.fromkeys((*state.announced, *taken[link])):
                 if key not in built:
                     built[key] = self._build(key, snapshot)
                 outgoing += built[key]
             state.queue.clear()
             state.announced.clear()
-            datagrams += [(link, datagram) for datagram in self._packed(state, outgoing)]
+            datagrams += [(link, datagram) for datagram in state.datagrams(outgoing)]
         return datagrams
 
     # ---- sending
 
-    def _build(self, key: int, snapshot: Snapshot) -> list[_Outgoing]:
+    def _build(self, key: int, snapshot: Snapshot) -> list[Outgoing]:
         stream = self._table[key]
         system = self.identity.load_system if key & LOAD_SYSTEM else self.identity.system
         source = (system, stream.component)
         return [(source, message) for message in stream.build(snapshot, self.identity)]
-
-    def _packed(self, state: _LinkState, outgoing: list[_Outgoing]) -> list[bytes]:
-        datagrams: list[bytes] = []
-        frames: list[bytes] = []
-        size = 0
-        for one in outgoing:
-            frame = state.frame(one)
-            if size + len(frame) > DATAGRAM_BYTES:
-                datagrams.append(b"".join(frames))
-                frames, size = [], 0
-            frames.append(frame)
-            size += len(frame)
-        if frames:
-            datagrams.append(b"".join(frames))
-        return datagrams
 
     def _watch(self, snapshot: Snapshot) -> None:
         """Announce what changed since it was last looked at."""
@@ -232,7 +193,7 @@ class VehicleEndpoint:
         for state in self._states(link):
             state.announced[key] = None
 
-    def _states(self, link: Link | None) -> list[_LinkState]:
+    def _states(self, link: Link | None) -> list[LinkState]:
         if link is None:
             return list(self._links.values())
         state = self._links.get(link)
@@ -258,11 +219,11 @@ class VehicleEndpoint:
 
     # ---- links
 
-    def _heard(self, link: Link, now_us: int) -> _LinkState:
+    def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)
         if state is None:
             self._make_room()
-            state = self._links[link] = _LinkState(False, self._defaults, now_us)
+            state = self._links[link] = LinkState(False, self._defaults, now_us)
             self._work = True
         state.heard_us = now_us
         return state
@@ -297,7 +258,7 @@ class VehicleEndpoint:
         component = getattr(message, "target_component", 0)
         return system in (0, self.identity.system) and component in (0, AUTOPILOT_COMPONENT)
 
-    def _decider(self, state: _LinkState, peer: Peer, now_us: int, decide: Decide) -> Decide:
+    def _decider(self, state: LinkState, peer: Peer, now_us: int, decide: Decide) -> Decide:
         """`decide` for the supervisor's requests, joined with what is answered here."""
 
         def decided(request: Any) -> Verdict:
@@ -319,7 +280,7 @@ class VehicleEndpoint:
 
         return decided
 
-    def _request_message(self, state: _LinkState, peer: Peer, message_id: int, argument: float) -> Verdict:
+    def _request_message(self, state: LinkState, peer: Peer, message_id: int, argument: float) -> Verdict:
         if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._request_interval(state, int(argument) if 0.0 <= argument <= _UINT16 else -1)
         if message_id not in STREAMS:
@@ -327,14 +288,14 @@ class VehicleEndpoint:
         self._do([Announce(peer.link, (message_id,))], [])
         return _ACCEPTED
 
-    def _request_interval(self, state: _LinkState, message_id: int) -> Verdict:
+    def _request_interval(self, state: LinkState, message_id: int) -> Verdict:
         if not 0 <= message_id <= _UINT16:
             return _UNSUPPORTED
         interval = state.streams.interval(message_id) or 0  # 0: not available
         state.queue.append(mavlink.MAVLink_message_interval_message(message_id, min(interval, _INT32)))
         return _ACCEPTED
 
-    def _set_interval(self, state: _LinkState, message_id: int, interval_us: int, now_us: int) -> Verdict:
+    def _set_interval(self, state: LinkState, message_id: int, interval_us: int, now_us: int) -> Verdict:
         if message_id not in STREAMS:
             return _UNSUPPORTED
         slowest = STREAMS[_HEARTBEAT].interval_us

@@ -83,7 +83,7 @@ class View:
 def track(view: View, path: Path) -> None:
     """Load track in three dimensions."""
     figure = new_figure(9.0, 6.4)
-    draw_track(figure, view.samples, (0.0, 0.0, 0.91, 0.92), (0.915, 0.22, 0.014, 0.5))
+    draw_track(figure, view.samples, (0.0, 0.0, 0.88, 0.92), (0.925, 0.22, 0.014, 0.5))
     figure.text(0.03, 0.945, "Load track", fontsize=12, weight="bold")
     figure.text(
         0.03,

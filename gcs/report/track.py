@@ -105,8 +105,9 @@ def _frame(ax: Any, samples: Samples, shown: Indices) -> tuple[Floats, Floats]:
     ax.set_zlim(low[2], high[2])
     ax.set_box_aspect(_box(size))
     ax.view_init(elev=17, azim=-38)
-    for axis, name in ((ax.xaxis, "x east (m)"), (ax.yaxis, "y north (m)"), (ax.zaxis, "z up (m)")):
-        axis.set_label_text(name, fontsize=9)
+    named = zip((ax.xaxis, ax.yaxis, ax.zaxis), ("x east (m)", "y north (m)", "z up (m)"), strict=True)
+    for (axis, name), shortened in zip(named, size > _box(size), strict=True):
+        axis.set_label_text(name + ", shortened" * bool(shortened), fontsize=9)
         axis.set_pane_color((0.965, 0.97, 0.975, 1.0))
         axis.line.set_color(PALE)
         axis.set_major_locator(_ticks())

@@ -1,12 +1,13 @@
 """Bringing columns to other time stamps."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcs.analysis.align import as_of, hermite, linear
 
 
+@settings(deadline=None)  # a busy machine is no failure
 @given(st.tuples(*[st.floats(-5.0, 5.0)] * 4), st.integers(2, 20))
 def test_cubics_are_met_exactly_and_lines_by_both(tolerances, coefficients, n):
     t = np.cumsum(np.linspace(0.1, 0.4, n))

@@ -230,6 +230,12 @@ def test_a_repeated_command_is_acknowledged_but_done_once(rig):
     assert len(rig.asked) == 1
 
 
+def test_a_command_said_twice_is_done_twice(rig):
+    rig.replies(long(193, (0,)))
+    rig.replies(long(193, (0,)))
+    assert rig.asked == [Pause(), Pause()]
+
+
 @pytest.mark.parametrize("other", ["parameters", "asker", "late", "first refused"])
 def test_a_repetition_is_the_same_command_from_the_same_asker_soon_after(rig, other):
     if other == "first refused":

@@ -6,8 +6,9 @@ import math
 
 import pytest
 
-from autopilot.services.endpoint import DATAGRAM_BYTES, LINK_SILENCE_US, MAX_LINKS
+from autopilot.services.endpoint import LINK_SILENCE_US, MAX_LINKS
 from autopilot.services.identity import AUTO, AUTO_MISSION, DIALECT_COMPONENT, LOAD_COMPONENT, Identity
+from autopilot.services.links import DATAGRAM_BYTES
 from autopilot.services.records import TimesyncAnswered
 from autopilot.services.statustext import CHUNK
 from autopilot.services.streams import OFF
@@ -155,14 +156,6 @@ def test_links_are_bounded_and_the_most_silent_makes_room(rig):
     assert "gcs" in rig.endpoint.links
     assert "n0" not in rig.endpoint.links
     assert f"n{MAX_LINKS + 2}" in rig.endpoint.links
-
-
-def test_a_list_under_way_ends_with_its_link(rig):
-    rig.send(m.MAVLink_param_request_list_message(1, 1), link="late")
-    rig.now_us += LINK_SILENCE_US + 1
-    rig.poll()
-    rig.poll()
-    assert not rig.endpoint.due(rig.now_us)
 
 
 @pytest.mark.parametrize("origin", [{"component": 1}, {"component": DIALECT_COMPONENT}])

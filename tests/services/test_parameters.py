@@ -6,8 +6,16 @@ import math
 
 import pytest
 
-from autopilot.services.parameters import DOES_NOT_EXIST, LIST_PACE_US, OUT_OF_RANGE, READ_ONLY, TYPE_MISMATCH
-from autopilot.services.records import ParameterChanged
+from autopilot.services.parameters import (
+    DOES_NOT_EXIST,
+    LIST_PACE_US,
+    OUT_OF_RANGE,
+    READ_ONLY,
+    TYPE_MISMATCH,
+    ParameterService,
+)
+from autopilot.services.records import ParameterChanged, Peer
+from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as m
 
 REAL32 = m.MAV_PARAM_TYPE_REAL32
@@ -137,3 +145,12 @@ def test_a_change_by_the_vehicle_itself_is_shown(rig):
     rig.poll()
     rig.endpoint.parameter_changed("LOAD_MASS")
     assert [name for name, *_ in values(r.message for r in rig.poll()["gcs"])] == ["LOAD_MASS"]
+
+
+def test_a_list_under_way_ends_with_its_link(rig):
+    service = ParameterService(rig.table)
+    service.receive_request_list(None, Peer("late", 255, 190), 0, rig.decide)
+    assert service.next_timer() == 0
+    service.forget("late")
+    assert service.next_timer() == NEVER_US
+    assert service.poll(10**9) == []

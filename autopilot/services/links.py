@@ -1,0 +1,54 @@
+"""One way to clients: its streams, its sequence counters, and what waits to be sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from autopilot.services.streams import Streams
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+
+DATAGRAM_BYTES = 1400  # below the MTU of any common network, with headers
+
+# (system, component) that speaks, and what it says
+Outgoing = tuple[tuple[int, int], Any]
+
+
+class LinkState:
+    """What the endpoint keeps for a link; a new one begins with a HEARTBEAT."""
+
+    __slots__ = ("announced", "configured", "heard_us", "queue", "streams", "writers")
+
+    def __init__(self, configured: bool, defaults: Mapping[int, int], now_us: int) -> None:
+        self.configured = configured  # never forgotten
+        self.heard_us = now_us
+        self.streams = Streams(defaults, now_us)
+        self.writers: dict[tuple[int, int], FrameWriter] = {}
+        self.queue: list[Any] = []  # answers of the autopilot
+        # streamed messages out of turn, in their order
+        self.announced: dict[int, None] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: None}
+
+    def frame(self, outgoing: Outgoing) -> bytes:
+        """The next frame of a source on this link."""
+        source, message = outgoing
+        writer = self.writers.get(source)
+        if writer is None:
+            writer = self.writers[source] = FrameWriter(*source)
+        return writer.frame(message)
+
+    def datagrams(self, outgoing: Iterable[Outgoing]) -> list[bytes]:
+        """Frames in their order, as many in a datagram as go in."""
+        datagrams: list[bytes] = []
+        frames: list[bytes] = []
+        size = 0
+        for one in outgoing:
+            frame = self.frame(one)
+            if size + len(frame) > DATAGRAM_BYTES:
+                datagrams.append(b"".join(frames))
+                frames, size = [], 0
+            frames.append(frame)
+            size += len(frame)
+        if frames:
+            datagrams.append(b"".join(frames))
+        return datagrams
