@@ -100,7 +100,11 @@ def fly(options: FlightOptions) -> Flight:
         if tlog.stat().st_size == 0:
             raise GcsError(outcome.reason or "stopped before the vehicle said anything")
         folder.keep()
-        record = make_report(tlog, out, _meta(mission, options, outcome, wall_s), options.quiet)
+        try:
+            record = make_report(tlog, out, _meta(mission, options, outcome, wall_s), options.quiet)
+        except KeyboardInterrupt:
+            say(f"report abandoned; the telemetry is in {tlog}")
+            raise
         return Flight(outcome, record, out, bool(stop))
 
 

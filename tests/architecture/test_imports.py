@@ -39,6 +39,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
 TOP: dict[str, tuple[str, ...]] = {
     "autopilot.flight_core": (
         "autopilot.onboard",
+        "autopilot.rehearsal",
         "autopilot.telemetry_view",
         "autopilot.__main__",
         "gcs.closed_loop",

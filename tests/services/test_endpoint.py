@@ -6,15 +6,18 @@ import math
 
 import pytest
 
-from autopilot.services.endpoint import LINK_SILENCE_US, MAX_LINKS
+from autopilot.services.endpoint import LINK_SILENCE_US, MAX_LINKS, VehicleEndpoint
 from autopilot.services.identity import AUTO, AUTO_MISSION, DIALECT_COMPONENT, LOAD_COMPONENT, Identity
 from autopilot.services.links import DATAGRAM_BYTES
-from autopilot.services.records import TimesyncAnswered
+from autopilot.services.records import TimesyncAnswered, Verdict
+from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import CHUNK
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import STREAMS
 from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.parameters import Parameter, ParameterTable
 
 GCS_BEAT = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 
@@ -156,6 +159,17 @@ def test_links_are_bounded_and_the_most_silent_makes_room(rig):
     assert "gcs" in rig.endpoint.links
     assert "n0" not in rig.endpoint.links
     assert f"n{MAX_LINKS + 2}" in rig.endpoint.links
+
+
+def test_a_list_under_way_ends_with_its_link():
+    many = ParameterTable([Parameter(f"P{n}", 0.0, 0.0, 1.0, "", "") for n in range(100)])
+    endpoint = VehicleEndpoint(Identity(), Home(), many)
+    ask = FrameWriter(255, 190).frame(m.MAVLink_param_request_list_message(1, 1))
+    endpoint.receive(ask, "late", 0, lambda request: Verdict(m.MAV_RESULT_ACCEPTED))
+    assert endpoint.due(0)
+    assert endpoint.poll(Snapshot, LINK_SILENCE_US + 1) == []
+    assert endpoint.links == ()
+    assert not endpoint.due(2 * LINK_SILENCE_US)
 
 
 @pytest.mark.parametrize("origin", [{"component": 1}, {"component": DIALECT_COMPONENT}])

@@ -1,0 +1,77 @@
+"""The real programs as a user starts them; every one is gone when its test is over."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+END_S = 10.0
+
+
+class Program:
+    """One running program with its output in a file."""
+
+    def __init__(self, arguments: list[str], log: Path) -> None:
+        self.log = log
+        with log.open("wb") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", *arguments], stdout=output, stderr=subprocess.STDOUT, cwd=log.parent
+            )
+
+    def kill(self) -> None:
+        """As kill -9 does."""
+        self.process.kill()
+        self.process.wait(END_S)
+
+    def interrupt(self) -> int:
+        """As Ctrl-C does; the exit code."""
+        self.process.send_signal(signal.SIGINT)
+        return self.process.wait(60.0)
+
+    def stop(self) -> None:
+        """As a session's end does."""
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(END_S)
+            except subprocess.TimeoutExpired:
+                self.kill()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
+    """Start a program: start("sitl", "--lockstep")."""
+    programs: list[Program] = []
+
+    def begin(*arguments: str) -> Program:
+        program = Program(list(arguments), tmp_path / f"{arguments[0]}-{len(programs)}.log")
+        programs.append(program)
+        return program
+
+    yield begin
+    for program in reversed(programs):
+        program.stop()
+
+
+@pytest.fixture
+def gcs(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run a gcs command to its end: gcs("fly", "hover")."""
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "gcs", *arguments],
+            capture_output=True,
+            text=True,
+            timeout=240.0,
+            cwd=tmp_path,
+            env={**os.environ, "COLUMNS": "200"},
+            check=False,
+        )
+
+    return run

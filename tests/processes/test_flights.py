@@ -1,0 +1,79 @@
+"""Flights through three real processes over UDP, as a user flies them."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from autopilot.wire.tlog import TlogWriter
+from gcs.closed_loop import Conditions, fly
+from missions.fileformat import load_mission
+
+pytestmark = pytest.mark.processes
+Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
+
+STABLE_KEYS = {
+    "mission",
+    "law",
+    "sensors",
+    "seed",
+    "outcome",
+    "flight_s",
+    "wall_s",
+    "real_time_factor",
+    "load_error_max_m",
+    "load_error_rms_m",
+    "rise_time_90_s",
+    "overshoot_pct",
+    "settling_time_5pct_s",
+    "psi_R_max",
+    "psi_q_max",
+    "saturated_fraction",
+    "slack_events",
+    "report_dir",
+}
+FILES = ("flight.tlog", "flight.parquet", "summary.json", "report.html", "overview.png")
+
+
+def test_a_flight_over_udp_leaves_the_log_of_the_same_flight_in_one_process(gcs: Gcs, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    flown = gcs("fly", "hover", "--sensors", "lab", "--seed", "7", "--out", str(out), "--json")
+    assert flown.returncode == 0, flown.stderr
+    record = json.loads(flown.stdout)
+    assert record.keys() >= STABLE_KEYS
+    assert record["outcome"] == "completed"
+    assert record == json.loads((out / "summary.json").read_text())
+    for name in FILES:
+        assert (out / name).stat().st_size > 0, name
+
+    log = io.BytesIO()
+    fly(load_mission("hover"), Conditions(sensors="lab", seed=7), TlogWriter(log))
+    assert (out / "flight.tlog").read_bytes() == log.getvalue()
+
+
+def test_what_four_rotors_lose_is_reported_as_diverged(gcs: Gcs, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    flown = gcs("fly", "case-a", "--sensors", "ideal", "--out", str(out), "--json")
+    assert flown.returncode == 3, flown.stderr
+    assert json.loads(flown.stdout)["outcome"] == "diverged"
+    assert (out / "report.html").stat().st_size > 0
+
+
+def test_losses_on_the_ground_link_do_not_lose_the_flight(gcs: Gcs, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    loss = ("--set", "SIM_LOSS_PCT=20")
+    flown = gcs("fly", "hover", "--sensors", "ideal", *loss, "--out", str(out), "--json")
+    assert flown.returncode == 0, flown.stderr
+    assert json.loads(flown.stdout)["outcome"] == "completed"
+
+
+def test_rates_that_do_not_divide_are_refused_with_both_numbers(gcs: Gcs, tmp_path: Path) -> None:
+    flown = gcs("fly", "hover", "--set", "CTL_RATE_HZ=400", "--out", str(tmp_path / "out"), "--quiet")
+    assert flown.returncode == 1
+    assert "400" in flown.stderr
+    assert "250" in flown.stderr

@@ -1,0 +1,78 @@
+"""Programs that are killed, and what is still there when they come back."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from conftest import Program
+
+pytestmark = pytest.mark.processes
+Start = Callable[..., "Program"]
+Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
+
+SIM = "127.0.0.1:24560"
+GROUND = "127.0.0.1:24550"
+API = "127.0.0.1:24540"
+
+
+def autopilot(start: Start, storage: Path) -> Program:
+    return start("autopilot", "--sim", SIM, "--gcs", GROUND, "--api", API, "--storage", str(storage))
+
+
+def test_mission_and_parameters_outlive_a_killed_autopilot(start: Start, gcs: Gcs, tmp_path: Path) -> None:
+    """As by kill -9 in the middle of a mission."""
+    storage = tmp_path / "storage"
+    start("sitl", "--listen", SIM, "--truth", "127.0.0.1:24561", "--speed", "2", "--sensors", "ideal")
+    first = autopilot(start, storage)
+    connect = ("--connect", GROUND)
+    for command in (
+        ("upload", "square"),
+        ("param", "set", "NGC_KX", "6.5"),
+        ("arm",),
+        ("start",),
+    ):
+        done = gcs(*command, *connect)
+        assert done.returncode == 0, f"{command}: {done.stderr}"
+    uploaded = gcs("download", "--json", *connect).stdout
+    status = json.loads(gcs("status", "--json", *connect).stdout)
+    assert status["armed"] is True
+    first.kill()
+
+    autopilot(start, storage)
+    value = gcs("param", "get", "NGC_KX", *connect)
+    assert value.returncode == 0, value.stderr
+    assert "6.5" in value.stdout
+    downloaded = gcs("download", "--json", *connect)
+    assert downloaded.returncode == 0, downloaded.stderr
+    assert json.loads(downloaded.stdout) == json.loads(uploaded)
+
+
+def test_ctrl_c_stops_everything_and_still_writes_what_was_captured(start: Start, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    flight = start("gcs", "fly", "hover", "--sensors", "ideal", "--speed", "2", "--out", str(out))
+    log = flight.log
+    # progress is printed where there is no terminal: wait until the vehicle flies
+    while flight.process.poll() is None and b"tauten" not in log.read_bytes():
+        try:
+            flight.process.wait(0.2)
+        except subprocess.TimeoutExpired:
+            continue
+    children = _children(flight.process.pid)
+    assert len(children) == 2
+    code = flight.interrupt()
+    assert code == 130, log.read_text()
+    assert json.loads((out / "summary.json").read_text())["outcome"] == "interrupted"
+    assert (out / "report.html").stat().st_size > 0
+    assert not [pid for pid in children if Path(f"/proc/{pid}").exists()]
+
+
+def _children(pid: int) -> list[int]:
+    text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    return [int(child) for child in text.split()]
