@@ -35,7 +35,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 
-
 GROUND_WINDOW_US = 20_000
 
 

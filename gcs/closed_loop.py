@@ -20,7 +20,7 @@ from autopilot.wire.mission_items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, TruthQueue
-from gcs.expected import expected_duration_s
+from missions.legs import expected_duration_s
 from missions.model import Mission
 from sitl.hil import HilSimulator
 

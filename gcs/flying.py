@@ -27,7 +27,6 @@ from gcs.errors import (
     EXIT_NOT_MET,
     GcsError,
 )
-from gcs.expected import expected_duration_s
 from gcs.flight_loops import run_lockstep, run_wall_clock
 from gcs.link import LOOPBACK, Address, UdpSocket, free_port, open_address, unix_us
 from gcs.missions_checked import load_checked
@@ -35,6 +34,7 @@ from gcs.processes import Processes
 from gcs.reporting import make_report
 from gcs.session import Session
 from gcs.stopping import StopRequest
+from missions.legs import expected_duration_s
 from missions.model import Mission
 
 LAWS = {"thesis": 0}  # the value of CTL_LAW

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from math import degrees, inf, nextafter, radians
 
 from autopilot.geometry.linear import Vec3, norm, sub
-from missions.legs import Leg, durations, legs
+from missions.legs import Leg, legs
 from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint
 from missions.signals import evaluate, joints, signal_table
 from missions.survey import Body, Extreme, Peaks, survey_attitude, survey_signals, survey_transfer
 
-__all__ = ["Peaks", "VehicleLimits", "Violation", "check", "durations", "peaks"]
+__all__ = ["Peaks", "VehicleLimits", "Violation", "check", "peaks"]
 
 # Jumps of the path below these (m, m/s) are smaller than the error of any flight.
 _JUMP_M = 1e-3

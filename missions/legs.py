@@ -27,6 +27,8 @@ from missions.transfer import transfer_duration
 TAUTEN_S = 10.0
 SET_DOWN_S = 10.0
 VERTICAL_SPEED_M_S = 0.8
+# of transfers, for a vehicle as delivered (MIS_SPEED, MIS_ACCEL)
+SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,6 @@ def legs(mission: Mission, speed: float, accel: float) -> Iterator[Leg]:
         here = end
 
 
-def durations(mission: Mission, speed: float, accel: float) -> float:
+def expected_duration_s(mission: Mission, speed: float = SPEED_M_S, accel: float = ACCEL_M_S2) -> float:
     """Expected seconds from arming to the end of the mission: the sum over its legs."""
     return sum(leg.duration_s for leg in legs(mission, speed, accel))

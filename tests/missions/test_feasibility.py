@@ -8,9 +8,9 @@ from math import cos, inf, pi, radians, sqrt
 
 import pytest
 
-from missions.feasibility import VehicleLimits, check, durations, peaks
+from missions.feasibility import VehicleLimits, check, peaks
 from missions.fileformat import load_mission, shipped
-from missions.legs import SET_DOWN_S, TAUTEN_S, legs
+from missions.legs import SET_DOWN_S, TAUTEN_S, expected_duration_s, legs
 from missions.model import (
     AttitudeRun,
     Delay,
@@ -163,8 +163,8 @@ def test_legs_follow_the_load() -> None:
     assert found[2].duration_s == 5.0
 
 
-def test_durations_adds_take_off_and_landing() -> None:
+def test_expected_duration_adds_take_off_and_landing() -> None:
     lift = transfer_duration(2.0, 0.8, 2.0)
-    assert durations(load_mission("hover"), 2.0, 2.0) == pytest.approx(
+    assert expected_duration_s(load_mission("hover"), 2.0, 2.0) == pytest.approx(
         TAUTEN_S + lift + 10.0 + lift + SET_DOWN_S
     )
