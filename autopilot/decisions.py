@@ -38,13 +38,14 @@ from autopilot.services.requests import (
     Takeoff,
     Terminate,
 )
-from autopilot.supervisor import disarmed, enter, happen, load_setpoint
+from autopilot.supervisor import TRANSITIONS, begin_step, disarmed, happen
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
 ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 LEAST_ALTITUDE_M = 0.3
 GROUND_SPEED_M_S = 0.3  # an arming vehicle moves no faster
+TILT_TO_ARM_RAD = math.radians(20.0)
 
 
 def _denied(text: str) -> Verdict:
@@ -73,9 +74,9 @@ def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Deci
 def arming_complaints(flight: Flight, view: View) -> tuple[str, ...]:
     """What keeps the vehicle from being armed, in words."""
     found = list(view.complaints)
-    if view.tilt_rad > math.radians(20.0):
+    if not view.tilt_rad <= TILT_TO_ARM_RAD:
         found.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
-    if norm(view.v_quad) > GROUND_SPEED_M_S:
+    if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         found.append(f"moving at {norm(view.v_quad):.1f} m/s")
     return tuple(found)
 
@@ -98,7 +99,8 @@ def _arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisi
     after = happen(flight, Event.ARM, view, settings)
     assert after is not None
     if flight.selected == Selected.MISSION:
-        return _begin_mission(after, view, settings)
+        begun, verdict = _begin_mission(after, view, settings)
+        return (begun if verdict.result == ACCEPTED.result else flight), verdict
     if flight.selected == Selected.TAKEOFF:
         return _take_off(after, view, settings), ACCEPTED
     return after, ACCEPTED
@@ -124,7 +126,7 @@ def _takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) -
 
 def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     """Start the mission at `flight.step`, from the ground or from the air."""
-    plan = flight.plan
+    before, plan = flight, flight.plan
     if not plan.steps:
         return flight, _denied("Mission denied: there is none")
     if flight.phase == Phase.DISARMED:
@@ -134,15 +136,10 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         first = next((s for s in plan.steps if isinstance(s, model.Takeoff)), None)
         altitude = settings.takeoff_altitude_m if first is None else first.altitude_m
         return _take_off(replace(flight, takeoff_altitude_m=altitude), view, settings), ACCEPTED
-    if isinstance(plan.steps[flight.step], model.Land):
-        after = happen(flight, Event.LAND, view, settings)
-    else:
-        after = happen(flight, Event.MISSION, view, settings)
-    return (after, ACCEPTED) if after else _refused(flight, "Mission")
-
-
-def _refused(flight: Flight, what: str) -> Decision:
-    return replace(flight, on_mission=False), _wrong_phase(flight, what)
+    event = Event.LAND if isinstance(plan.steps[flight.step], model.Land) else Event.MISSION
+    if (before.phase, event) not in TRANSITIONS:
+        return before, _wrong_phase(before, "Mission")
+    return begin_step(flight, view, settings), ACCEPTED
 
 
 def _start_mission(flight: Flight, request: StartMission, view: View, settings: Settings) -> Decision:
@@ -162,8 +159,10 @@ def _set_current(flight: Flight, request: SetCurrent, view: View, settings: Sett
     if step is None:
         return flight, _denied(f"Mission item {request.seq} denied: nothing is flown from there")
     moved = replace(flight, step=step, step_anchor=None, mission_done=False)
-    if flight.phase == Phase.MISSION:
-        return enter(moved, Phase.MISSION, view, settings), ACCEPTED
+    if flight.on_mission and flight.phase == Phase.SET_DOWN:
+        return flight, _wrong_phase(flight, f"Mission item {request.seq}")
+    if flight.on_mission and flight.phase in (Phase.MISSION, Phase.LOWER):
+        return begin_step(moved, view, settings), ACCEPTED
     return moved, ACCEPTED
 
 
@@ -228,18 +227,22 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
     asked = (request.east_m, request.north_m, request.altitude_m)
     if verdict.result != mavlink.MAV_RESULT_ACCEPTED or asked == (None, None, None):
         return held, verdict
-    here = load_setpoint(held, view)
+    resting = held.legs[-1]
+    assert isinstance(resting, Hold)
+    here = resting.position
     there: Vec3 = (
         here[0] if asked[0] is None else asked[0],
         here[1] if asked[1] is None else asked[1],
         here[2] if asked[2] is None else asked[2],
     )
+    if not all(map(math.isfinite, there)):
+        return flight, _denied("Reposition denied: not a place")
     if there[2] < LEAST_ALTITUDE_M:
         return flight, _denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
     go = transfer_leg(here, there, flight.speed_m_s, settings.accel_m_s2, LOAD_POSITION)
-    return replace(held, legs=(go, Hold(there)), leg_start_us=view.now_us), ACCEPTED
+    return replace(held, legs=(*held.legs[:-1], go, Hold(there))), ACCEPTED
 
 
 def _change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Settings) -> Decision:
@@ -250,7 +253,9 @@ def _change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Se
 
 def _terminate(flight: Flight, request: Terminate, view: View, settings: Settings) -> Decision:
     after = happen(replace(flight, on_mission=False), Event.FAIL, view, settings)
-    return (after if after else flight), ACCEPTED
+    if after is None:
+        return flight, ACCEPTED
+    return (disarmed(after) if after.phase == Phase.DISARMED else after), ACCEPTED
 
 
 def _run_checks(flight: Flight, request: RunPrearmChecks, view: View, settings: Settings) -> Decision:

@@ -100,6 +100,7 @@ class Settings:
     load_error_limit_m: float
     tilt_limit_rad: float
     sensor_age_limit_s: float
+    gravity_m_s2: float
 
 
 class View(NamedTuple):
@@ -134,6 +135,7 @@ def settings_from(table: ParameterTable) -> Settings:
         load_error_limit_m=table["FS_LOAD_ERR"],
         tilt_limit_rad=table["FS_TILT_DEG"] * (3.141592653589793 / 180.0),
         sensor_age_limit_s=table["FS_SENSOR_S"],
+        gravity_m_s2=table["VEH_GRAVITY"],
     )
 
 

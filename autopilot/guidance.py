@@ -6,19 +6,24 @@ A leg is data. The supervisor strings legs together; the flight core asks the pr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import comb, inf
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import ZERO, Vec3, add, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.signals import SignalTable, evaluate
 from missions.swing import swing
-from missions.transfer import transfer, transfer_duration
+from missions.transfer import PEAK_SPEED, transfer, transfer_duration
 
 QUAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
 LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
 LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
 QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
+
+BRAKE_LEAST_S = 1.2  # a stop takes at least so long, however slow the motion: the load swings with 1.5 s
+
+# Taylor coefficients of transfer's s(u): of u^7 ... u^13
+_STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
 
 
 def _rest(position: Vec3) -> Jet:
@@ -50,6 +55,49 @@ class Transfer:
     def jet(self, t: float) -> Jet:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
         return transfer(self.begin, self.end, self.duration_s, t)
+
+
+@dataclass(frozen=True, slots=True)
+class Brake:
+    """From motion to rest: the velocity that the motion would go on with fades away.
+
+    x' = (v_0 + a_0 t) (1 - s(t / duration)) with the s of `missions.transfer`, so that position, velocity
+    and acceleration go on without a jump and every derivative is zero in the end.
+    """
+
+    begin: Vec3
+    velocity: Vec3
+    acceleration: Vec3
+    duration_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def end(self) -> Vec3:
+        """Where the motion ends."""
+        return self._position(1.0)
+
+    def _position(self, u: float) -> Vec3:
+        """x at t = u duration: x' integrated term by term."""
+        along, bent = u, 0.5 * u * u
+        for power, c in _STEP:
+            along -= c * u ** (power + 1) / (power + 1)
+            bent -= c * u ** (power + 2) / (power + 2)
+        T = self.duration_s
+        return axpy(bent * T * T, self.acceleration, axpy(along * T, self.velocity, self.begin))
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        if t >= self.duration_s:
+            return _rest(self.end)
+        t = max(t, 0.0)
+        # the fading factor 1 - s with its derivatives is a transfer from 1 to 0
+        w = [d[0] for d in transfer((1.0, 0.0, 0.0), ZERO, self.duration_s, t)]
+        v = axpy(t, self.acceleration, self.velocity)
+        # Leibniz; of v only the first derivative, a_0, is not zero
+        later = [scale(w[0], v)]
+        later += [axpy(n * w[n - 1], self.acceleration, scale(w[n], v)) for n in range(1, 6)]
+        x = self._position(t / self.duration_s)
+        return (x, later[0], later[1], later[2], later[3], later[4], later[5])
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +148,13 @@ class Swing:
         return swing(self.tilt_north_rad, self.tilt_east_rad, self.duration_s, t)[0]
 
 
-Leg = Hold | Transfer | Creep | Run | Swing
+Leg = Hold | Transfer | Brake | Creep | Run | Swing
+
+
+def brake_leg(begin: Vec3, velocity: Vec3, acceleration: Vec3, accel_limit: float) -> Brake:
+    """A stop that takes the velocity away with no more than about `accel_limit` (m/s^2)."""
+    duration = max(BRAKE_LEAST_S, PEAK_SPEED * norm(velocity) / accel_limit)
+    return Brake(begin, velocity, acceleration, duration)
 
 
 def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mode: int) -> Transfer:

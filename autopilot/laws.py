@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from autopilot.control import quad_position, thesis
 from autopilot.control.records import Command, Reference, State, Vehicle
-from autopilot.geometry.linear import Mat3, Vec3
+from autopilot.geometry.linear import Mat3, Vec3, axpy
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.parameters import ParameterTable
 
@@ -86,7 +86,10 @@ class ThesisLaw(NamedTuple):
         return cls(gains, filters, position_gains, vehicle)
 
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
-        return thesis.start(state, x_d, v_d)
+        # on the steady motion of the reference filter, which lags behind what moves; else x_d'' would begin
+        # with -2 zeta omega_n v_d
+        lag = self.filters.reference.ramp_lag
+        return thesis.start(state, axpy(-lag, v_d, x_d), v_d)
 
     def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
         return thesis.quad_attitude(memory, state, R_d, thrust, self.gains, self.filters, self.vehicle)

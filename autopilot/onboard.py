@@ -56,7 +56,7 @@ class Onboard:
         self._answer = b""
         self._last: Tick | None = None
         self._gps: HilGps | None = None
-        self._sensor_hz = 0.0
+        self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.stale = 0  # ticks in a row that lay in the past
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
@@ -99,8 +99,9 @@ class Onboard:
         self._last = tick
         if tick.gps is not None:
             self._gps = tick.gps
-        if self.tick == 1:
-            self._sensor_hz = 1e6 / period_us
+        if period_us > 0 and not 0 < self._shortest_us <= period_us:
+            # ticks may be lost in real time: the shortest step is that of the sensors' rate
+            self._shortest_us = period_us
             self._follow_parameters()
         elif self.parameters.version != self._version:
             self._follow_parameters()
@@ -132,11 +133,12 @@ class Onboard:
         self._version = self.parameters.version
         try:
             rate_hz = self.parameters["CTL_RATE_HZ"]
-            every = divider(self._sensor_hz, rate_hz, "CTL_RATE_HZ") if self._sensor_hz else 1
+            every = divider(1e6 / self._shortest_us, rate_hz, "CTL_RATE_HZ") if self._shortest_us else 1
         except RateError as error:
             self.fault = str(error)
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
             return
+        self.fault = ""
         self._setup = self._build_setup(every)
 
     # ---- ground

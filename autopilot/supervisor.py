@@ -8,7 +8,7 @@ flight, the view and the settings.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import degrees
+from math import degrees, isfinite
 
 from autopilot.flight import (
     CARRYING,
@@ -23,7 +23,7 @@ from autopilot.flight import (
     leg_time_s,
     setpoint,
 )
-from autopilot.geometry.linear import Vec3, axpy, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, norm, sub
 from autopilot.guidance import (
     LOAD_ATTITUDE,
     LOAD_POSITION,
@@ -34,6 +34,7 @@ from autopilot.guidance import (
     Leg,
     Run,
     Swing,
+    brake_leg,
     transfer_leg,
 )
 from autopilot.wire.dialect import plumbline as mavlink
@@ -99,8 +100,11 @@ LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below wh
 STILL_SPEED, STILL_US = 0.05, 200_000
 IDLE_DISARM_US = 10_000_000
 FAILSAFE_DISARM_US = 3_000_000
-BRAKE_S = 0.6  # a load that swings freely is asked to stop this far ahead
 SETTLE_S = 3.0  # hold after an attitude run
+AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
+LEAST_HEIGHT = 0.3  # m over home, at which a load that was being lifted or lowered is held or carried
+STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load accelerates
+TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have come taut
 
 
 def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Flight:
@@ -122,15 +126,28 @@ def happen(flight: Flight, event: Event, view: View, settings: Settings) -> Flig
     return None if phase is None else enter(flight, phase, view, settings)
 
 
-def load_setpoint(flight: Flight, view: View) -> Vec3:
-    """Where the load is asked to be; where it is (or will stop) if nothing is asked of its position."""
+def load_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, Vec3, Vec3]:
+    """Position, velocity and acceleration asked of the load; those it has if nothing is asked of it."""
     if flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
-        jet = setpoint(flight, view.now_us)
-        if jet is not None:
-            return jet[0]
-    if flight.phase in CARRYING:
-        return axpy(BRAKE_S, view.v_load, view.x_load)
-    return view.x_load
+        jet = flight.legs[0].jet(leg_time_s(flight, view.now_us))
+        return jet[0], jet[1], jet[2]
+    if flight.phase not in CARRYING:
+        return view.x_load, ZERO, ZERO
+    # a load that neither rises nor falls is accelerated by as much of its weight as the cable leans
+    cable = sub(view.x_quad, view.x_load)
+    if not cable[2] > STEEPEST * norm(cable):
+        return view.x_load, view.v_load, ZERO
+    pull = settings.gravity_m_s2 / cable[2]
+    return view.x_load, view.v_load, (pull * cable[0], pull * cable[1], 0.0)
+
+
+def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
+    """Legs that bring the load to rest out of its present motion (none if it rests), and where that is."""
+    x, v, a = load_motion(flight, view, settings)
+    if norm(v) <= AT_REST and norm(a) <= AT_REST:
+        return (), x
+    brake = brake_leg(x, v, a, settings.accel_m_s2)
+    return (brake,), brake.end
 
 
 # ---- entry of each phase
@@ -152,23 +169,30 @@ def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     return (_carry(view.x_load, top, settings.lift_speed_m_s, settings),)
 
 
+def _raised(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
+    """As `stop`, but clear of the ground."""
+    legs, here = stop(flight, view, settings)
+    if here[2] >= LEAST_HEIGHT:
+        return legs, here
+    up = (here[0], here[1], LEAST_HEIGHT)
+    return (*legs, _carry(here, up, settings.lift_speed_m_s, settings)), up
+
+
 def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    jet = setpoint(flight, view.now_us)
-    here = load_setpoint(flight, view)
-    if jet is not None and flight.legs[0].control_mode == LOAD_POSITION:
-        here = axpy(BRAKE_S, jet[1], here)
-    return (Hold(here),)
+    legs, here = _raised(flight, view, settings)
+    return (*legs, Hold(here))
 
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    here = load_setpoint(flight, view)
-    return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings),)
+    legs, here = _raised(flight, view, settings)
+    return (*legs, _carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings))
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    here = load_setpoint(flight, view)
+    legs, here = stop(flight, view, settings)
     low = (here[0], here[1], min(here[2], TOUCH_HEIGHT))
     return (
+        *legs,
         _carry(here, low, settings.lift_speed_m_s, settings),
         Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION),
     )
@@ -191,13 +215,13 @@ def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings) -> Leg:
 
 def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     step = flight.plan.steps[flight.step]
-    here = load_setpoint(flight, view)
+    legs, here = stop(flight, view, settings)
     anchor = flight.step_anchor
     if anchor is not None and isinstance(step, Signals | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
         # a step that is taken up again after a pause begins anew, from where it began
         back = _carry(here, anchor, flight.speed_m_s, settings)
-        return (back, *_step_legs(step, anchor, flight, settings))
-    return _step_legs(step, here, flight, settings)
+        return (*legs, back, *_step_legs(step, anchor, flight, settings))
+    return (*legs, *_step_legs(step, here, flight, settings))
 
 
 def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tuple[Leg, ...]:
@@ -219,7 +243,9 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
         ):
             mode = QUAD_ATTITUDE if controlled == "vehicle" else LOAD_ATTITUDE
             return (Swing(here, north, east, duration, mode),)
-        case Speed() | Land():
+        case Speed():
+            return (Hold(here, 0.0),)
+        case Land():
             return ()
     raise AssertionError(step)
 
@@ -248,8 +274,12 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         return _to(flight, E.DISARM, view, settings, (INFO, "Disarmed: nothing was asked of the vehicle"))
     if flight.phase == P.FAILSAFE and view.now_us - flight.phase_start_us > FAILSAFE_DISARM_US:
         return _to(flight, E.DISARM, view, settings, (WARNING, "Disarmed after failsafe"))
-    if flight.phase == P.TAUTEN and view.taut and len(flight.legs) == 1:
-        return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
+    if flight.phase == P.TAUTEN and len(flight.legs) == 1:
+        if view.taut:
+            return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
+        if flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(flight, settings):
+            text = "Cable never came taut, landing; is VEH_CABLE_LEN longer than the cable?"
+            return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
     if flight.phase in (P.LOWER, P.SET_DOWN):
         flight = _watch_touchdown(flight, view)
         if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= STILL_US:
@@ -302,36 +332,48 @@ def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
         return _step_done(flight, view, settings)
     after = happen(flight, E.DONE, view, settings)
     if after is None:  # a phase whose last leg has no end
-        return replace(flight, legs=(Hold(load_setpoint(flight, view)),), leg_start_us=view.now_us), Report()
+        legs, here = stop(flight, view, settings)
+        return replace(flight, legs=(*legs, Hold(here)), leg_start_us=view.now_us), Report()
     return after, Report()
 
 
 def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The present mission step is over: the next one, or the end of the mission."""
     plan = flight.plan
-    reached: tuple[int, ...] = ()
     step = plan.steps[flight.step]
-    lifted_unasked = flight.phase == P.LIFT and not isinstance(step, Takeoff)
-    if not lifted_unasked:
-        if isinstance(step, AttitudeRun) and isinstance(flight.legs[0], Swing):
-            # the load swings freely then: let the position law catch it before anything else is asked
-            there = axpy(BRAKE_S, view.v_load, view.x_load)
-            return replace(flight, legs=(Hold(there, SETTLE_S),), leg_start_us=view.now_us), Report()
-        reached = (plan.sequence[flight.step],)
-        flight = replace(flight, step=flight.step + 1, step_anchor=None)
-    if flight.step >= len(plan.steps):
-        after = enter(replace(flight, on_mission=False, mission_done=True, step=0), P.HOLD, view, settings)
-        return after, Report(((INFO, "Mission complete, holding"),), reached)
-    step = plan.steps[flight.step]
+    if flight.phase == P.LIFT and not isinstance(step, Takeoff):  # lifted unasked
+        return begin_step(flight, view, settings), Report()
+    following = plan.steps[flight.step + 1] if flight.step + 1 < len(plan.steps) else None
+    swung = flight.legs[0] if flight.legs else None
+    if isinstance(swung, Swing) and not isinstance(following, AttitudeRun):
+        # the load swings freely: let the position law catch it before anything else is asked
+        legs, here = stop(flight, view, settings)
+        return replace(flight, legs=(*legs, Hold(here, SETTLE_S)), leg_start_us=view.now_us), Report()
+    done = Report((), (plan.sequence[flight.step],))
+    flight = replace(flight, step=flight.step + 1, step_anchor=None)
+    if following is None:
+        rewound = replace(flight, on_mission=False, mission_done=True, step=0)
+        return enter(rewound, P.HOLD, view, settings), Report(
+            ((INFO, "Mission complete, holding"),), done.reached
+        )
+    if isinstance(swung, Swing):
+        # the next run takes the motion over as it is; only the height is still that of the first
+        here = (view.x_load[0], view.x_load[1], swung.anchor[2])
+        legs = _step_legs(following, here, flight, settings)
+        return replace(flight, legs=legs, leg_start_us=view.now_us, step_anchor=here), done
+    return begin_step(flight, view, settings), done
+
+
+def begin_step(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight on its present mission step, begun anew or taken up again."""
+    step = flight.plan.steps[flight.step]
     if isinstance(step, Speed):
         flight = replace(flight, speed_m_s=step.speed_m_s)
-        return replace(flight, legs=(Hold(load_setpoint(flight, view), 0.0),), phase=P.MISSION), Report(
-            (), reached
-        )
     if isinstance(step, Land):
-        return enter(flight, P.LOWER, view, settings), Report((), reached)
-    anchored = replace(flight, step_anchor=load_setpoint(flight, view))
-    return enter(anchored, P.MISSION, view, settings), Report((), reached)
+        return enter(flight, P.LOWER, view, settings)
+    if flight.step_anchor is None:
+        flight = replace(flight, step_anchor=stop(flight, view, settings)[1])
+    return enter(flight, P.MISSION, view, settings)
 
 
 def _watch_touchdown(flight: Flight, view: View) -> Flight:
@@ -352,10 +394,19 @@ def _watch_touchdown(flight: Flight, view: View) -> Flight:
     return flight if flight.still_since_us < 0 else replace(flight, still_since_us=-1)
 
 
+def _taut_by(flight: Flight, settings: Settings) -> float:
+    """Height over home that the vehicle need not climb beyond to pull the cable taut."""
+    creep = flight.legs[0]
+    assert isinstance(creep, Creep)
+    return creep.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m
+
+
 def _trouble(flight: Flight, view: View, settings: Settings) -> str:
     """Why the flight cannot go on, or an empty string."""
     if view.complaints:
         return view.complaints[0]
+    if not all(map(isfinite, (view.tilt_rad, *view.x_quad, *view.v_quad, *view.x_load, *view.v_load))):
+        return "the estimate is no number"
     if view.tilt_rad > settings.tilt_limit_rad:
         limit = degrees(settings.tilt_limit_rad)
         return f"tilt {degrees(view.tilt_rad):.0f} deg exceeds FS_TILT_DEG {limit:.0f}"

@@ -81,15 +81,17 @@ def control_state(state: EstimatorState) -> State:
 def complaints(state: EstimatorState, oldest_s: float) -> tuple[str, ...]:
     """What keeps the estimate from being flown on, in words for the operator; empty if nothing does."""
     vehicle, load = state.vehicle, state.load
+    position_var, angle_var = POSITION_STD_TO_FLY**2, ATTITUDE_STD_TO_FLY**2
     found = []
-    if vehicle.age_s > oldest_s:
+    # each is written so that NaN complains
+    if not vehicle.age_s <= oldest_s:
         found.append("no vehicle pose from a tracker")
-    elif vehicle.covariance[0] ** 0.5 > POSITION_STD_TO_FLY:
+    elif not 0.0 <= vehicle.covariance[0] <= position_var:
         found.append("vehicle position not settled")
-    elif vehicle.attitude_covariance[0] ** 0.5 > ATTITUDE_STD_TO_FLY:
+    elif not 0.0 <= vehicle.attitude_covariance[0] <= angle_var:
         found.append("vehicle attitude not settled")
-    if load.age_s > oldest_s:
+    if not load.age_s <= oldest_s:
         found.append("no load position from a tracker")
-    elif load.covariance[0] ** 0.5 > POSITION_STD_TO_FLY:
+    elif not 0.0 <= load.covariance[0] <= position_var:
         found.append("load position not settled")
     return tuple(found)
