@@ -14,7 +14,7 @@ from autopilot.estimation.records import EstimatorState, EstimatorTuning, Histor
 from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, leg_time_s
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, neg
 from autopilot.geometry.so3 import tilt_angle
-from autopilot.guidance import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION, Leg, Swing
+from autopilot.guidance import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION, Calm, Leg, Swing
 from autopilot.laws import Law, Memory
 from autopilot.mixer import MixerResult, mix
 from autopilot.scheduler import is_due
@@ -107,7 +107,7 @@ def track(setup: Setup, memory: Memory, state: State, leg: Leg, jet: Jet, t: flo
         return law.load_position(memory, state, Reference(jet, heading))
     if leg.control_mode == QUAD_POSITION:
         return law.quad_position(memory, state, Reference(jet, heading))
-    assert isinstance(leg, Swing)
+    assert isinstance(leg, Swing | Calm)
     lift = held_height(setup, state, leg.anchor)
     upward = leg.upward(t)
     if leg.control_mode == LOAD_ATTITUDE:

@@ -6,7 +6,7 @@ A leg is data. The supervisor strings legs together; the flight core asks the pr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import comb, inf
+from math import comb, inf, sqrt
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
@@ -21,6 +21,8 @@ LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
 QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
 
 BRAKE_LEAST_S = 1.2  # a stop takes at least so long, however slow the motion: the load swings with 1.5 s
+CALM_S = 1.2
+STEEPEST_LEAN = 0.7  # sine of the cable's lean that a swinging load is asked for at most
 
 # Taylor coefficients of transfer's s(u): of u^7 ... u^13
 _STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
@@ -148,7 +150,36 @@ class Swing:
         return swing(self.tilt_north_rad, self.tilt_east_rad, self.duration_s, t)[0]
 
 
-Leg = Hold | Transfer | Brake | Creep | Run | Swing
+@dataclass(frozen=True, slots=True)
+class Calm:
+    """Take the swing out of the load: the cable's lean goes on as it was and fades away.
+
+    p = (p_0 + p_0' t) (1 - s(t / duration)), p the horizontal part of the unit vector from load to vehicle, s
+    that of `missions.transfer`. As in a swing only the height of `anchor` is held meanwhile. `ends_step`: the
+    mission step that left the load swinging is over with it.
+    """
+
+    anchor: Vec3
+    lean: Vec3
+    lean_rate: Vec3
+    ends_step: bool
+    duration_s: float = CALM_S
+    control_mode: int = LOAD_ATTITUDE
+
+    def jet(self, t: float) -> Jet:
+        """The anchor at rest: of its position the height alone is tracked."""
+        return _rest(self.anchor)
+
+    def upward(self, t: float) -> Vec3:
+        """Unit vector, ENU: the direction from load to vehicle."""
+        rest = transfer((1.0, 0.0, 0.0), ZERO, self.duration_s, t)[0][0]
+        x, y, _ = scale(rest, axpy(t, self.lean_rate, self.lean))
+        shrink = min(1.0, STEEPEST_LEAN / max(sqrt(x * x + y * y), 1e-9))
+        x, y = shrink * x, shrink * y
+        return (x, y, sqrt(1.0 - x * x - y * y))
+
+
+Leg = Hold | Transfer | Brake | Creep | Run | Swing | Calm
 
 
 def brake_leg(begin: Vec3, velocity: Vec3, acceleration: Vec3, accel_limit: float) -> Brake:

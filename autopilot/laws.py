@@ -89,9 +89,7 @@ class ThesisLaw(NamedTuple):
         # on the steady motion of the reference filter, which lags behind what moves; else x_d'' would begin
         # with -2 zeta omega_n v_d
         lag = self.filters.reference.ramp_lag
-        lag_q = self.filters.direction.ramp_lag
-        st = state._replace(q_cable=axpy(-lag_q, state.q_cable_dot, state.q_cable))
-        return thesis.start(st, axpy(-lag, v_d, x_d), v_d)
+        return thesis.start(state, axpy(-lag, v_d, x_d), v_d)
 
     def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
         return thesis.quad_attitude(memory, state, R_d, thrust, self.gains, self.filters, self.vehicle)

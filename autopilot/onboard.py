@@ -6,6 +6,8 @@ waits until the shell hands it over, between two ticks.
 
 from __future__ import annotations
 
+from typing import Any
+
 from autopilot.decisions import decide, with_plan
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
@@ -34,6 +36,7 @@ from autopilot.wire.convert import HilGps, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
+from autopilot.world_parameters import WorldParameters
 
 GROUND_WINDOW_US = 20_000
 
@@ -61,6 +64,7 @@ class Onboard:
         self.stale = 0  # ticks in a row that lay in the past
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
+        self._world = WorldParameters(parameters)
         self._setup = self._build_setup(1)
         self._take_plan(self.endpoint.mission)
 
@@ -81,10 +85,11 @@ class Onboard:
         if tick.now_us == self.now_us and self.tick >= 0:
             return self._answer
         self._run(tick)
-        frame = hil_actuator_controls_message(
+        command = hil_actuator_controls_message(
             tick.now_us, self._state.mixed.forces, self.armed, self._options.lockstep
         )
-        self._answer = self._writer.frame(frame)
+        aside = self._world.messages(self.now_us)
+        self._answer = b"".join(map(self._writer.frame, (command, *aside)))
         return self._answer
 
     @property
@@ -99,6 +104,8 @@ class Onboard:
         self._last = tick
         if tick.gps is not None:
             self._gps = tick.gps
+        for message in tick.aside:
+            self._hear_simulator(message)
         if period_us > 0 and not 0 < self._shortest_us <= period_us:
             # ticks may be lost in real time: the shortest step is that of the sensors' rate
             self._shortest_us = period_us
@@ -115,6 +122,14 @@ class Onboard:
             self.endpoint.say(severity, text)
         for seq in report.reached:
             self.endpoint.item_reached(seq)
+
+    def _hear_simulator(self, message: Any) -> None:
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+            self.endpoint.say(message.severity, message.text)
+            return
+        name = self._world.receive(message)
+        if name is not None:
+            self.endpoint.parameter_changed(name)
 
     # ---- parameters
 
@@ -156,9 +171,11 @@ class Onboard:
             match event:
                 case MissionChanged(mission):
                     self._take_plan(mission)
-                case ParameterChanged() | TimesyncAnswered():
-                    pass  # the table holds the value; the shell waits for the answer
-        return events
+                case ParameterChanged(name, value):
+                    self._world.changed(name, value)
+                case TimesyncAnswered():
+                    pass  # the shell waits for it
+        return [event for event in events if not self._world.owns(event)]
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
         """What is due on the ground links at this tick."""

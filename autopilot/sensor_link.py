@@ -34,6 +34,7 @@ class Tick(NamedTuple):
     readings: Readings
     gps: HilGps | None
     fields_updated: int  # of HIL_SENSOR
+    aside: tuple[Any, ...]  # messages that are no sensor's
 
 
 def read_tick(datagram: bytes, home: Home) -> Tick | None:
@@ -43,6 +44,7 @@ def read_tick(datagram: bytes, home: Home) -> Tick | None:
     odometry: list[Any] = []
     load: list[Any] = []
     gps = None
+    aside = []
     for received in messages:
         message = received.message
         match message.get_msgId():
@@ -54,6 +56,8 @@ def read_tick(datagram: bytes, home: Home) -> Tick | None:
                 load.append(read_load_sensor(message))
             case mavlink.MAVLINK_MSG_ID_HIL_GPS:
                 gps = read_hil_gps(message, home)
+            case _:
+                aside.append(message)
     if sensor is None:
         return None
     now_us = sensor.time_us
@@ -62,7 +66,7 @@ def read_tick(datagram: bytes, home: Home) -> Tick | None:
     # written so that NaN fails
     sane = norm(sensor.accel_body) < GREATEST_ACCEL_M_S2 and norm(sensor.gyro_body) < GREATEST_RATE_RAD_S
     imu = ImuReading(sensor.gyro_body, sensor.accel_body) if sane else None
-    return Tick(now_us, Readings(imu, poses, loads), gps, sensor.fields)
+    return Tick(now_us, Readings(imu, poses, loads), gps, sensor.fields, tuple(aside))
 
 
 def _age_s(now_us: int, time_us: int) -> float | None:

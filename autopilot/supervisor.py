@@ -23,12 +23,14 @@ from autopilot.flight import (
     leg_time_s,
     setpoint,
 )
-from autopilot.geometry.linear import ZERO, Vec3, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
+from autopilot.geometry.s2 import tangent
 from autopilot.guidance import (
     LOAD_ATTITUDE,
     LOAD_POSITION,
     QUAD_ATTITUDE,
     QUAD_POSITION,
+    Calm,
     Creep,
     Hold,
     Leg,
@@ -109,7 +111,11 @@ TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have co
 
 def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Flight:
     """The flight in `phase`, with the legs with which the phase begins."""
-    legs = _ENTRY[phase](flight, view, settings) if phase in _ENTRY else ()
+    legs: tuple[Leg, ...]
+    if phase in CARRYING and flight.phase in CARRYING and flight.legs and _swings(flight.legs[0]):
+        legs = (_calm(flight.legs[0], view, ends_step=False),)
+    else:
+        legs = _ENTRY[phase](flight, view, settings) if phase in _ENTRY else ()
     return replace(
         flight,
         phase=phase,
@@ -139,6 +145,20 @@ def load_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, V
         return view.x_load, view.v_load, ZERO
     pull = settings.gravity_m_s2 / cable[2]
     return view.x_load, view.v_load, (pull * cable[0], pull * cable[1], 0.0)
+
+
+def _swings(leg: Leg) -> bool:
+    return isinstance(leg, Swing | Calm)
+
+
+def _calm(leg: Leg, view: View, ends_step: bool) -> Calm:
+    """What must come between a leg that left the position alone and one that asks for it."""
+    cable = sub(view.x_quad, view.x_load)
+    length = norm(cable)
+    lean = scale(1.0 / length, cable)
+    rate = scale(1.0 / length, tangent(lean, sub(view.v_quad, view.v_load)))
+    anchor = leg.jet(0.0)[0]
+    return Calm(anchor, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), ends_step)
 
 
 def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
@@ -328,6 +348,10 @@ def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
 
 def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The last leg of the present phase is over."""
+    calm = flight.legs[0] if flight.legs else None
+    if isinstance(calm, Calm) and not calm.ends_step:  # now the phase can begin
+        legs = _ENTRY[flight.phase](flight, view, settings)
+        return replace(flight, legs=legs, leg_start_us=view.now_us), Report()
     if flight.on_mission and flight.phase in (P.LIFT, P.MISSION):
         return _step_done(flight, view, settings)
     after = happen(flight, E.DONE, view, settings)
@@ -346,7 +370,9 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     following = plan.steps[flight.step + 1] if flight.step + 1 < len(plan.steps) else None
     swung = flight.legs[0] if flight.legs else None
     if isinstance(swung, Swing) and not isinstance(following, AttitudeRun):
-        # the load swings freely: let the position law catch it before anything else is asked
+        calm = _calm(swung, view, ends_step=True)
+        return replace(flight, legs=(calm,), leg_start_us=view.now_us), Report()
+    if isinstance(swung, Calm):
         legs, here = stop(flight, view, settings)
         return replace(flight, legs=(*legs, Hold(here, SETTLE_S)), leg_start_us=view.now_us), Report()
     done = Report((), (plan.sequence[flight.step],))
@@ -371,7 +397,7 @@ def begin_step(flight: Flight, view: View, settings: Settings) -> Flight:
         flight = replace(flight, speed_m_s=step.speed_m_s)
     if isinstance(step, Land):
         return enter(flight, P.LOWER, view, settings)
-    if flight.step_anchor is None:
+    if flight.step_anchor is None and not (flight.legs and _swings(flight.legs[0])):
         flight = replace(flight, step_anchor=stop(flight, view, settings)[1])
     return enter(flight, P.MISSION, view, settings)
 

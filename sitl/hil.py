@@ -16,7 +16,9 @@ from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from sitl.plant.records import Rotors
+from autopilot.wire.parameters import ParameterTable
+from sitl.parameter_server import ParameterServer
+from sitl.plant.records import Rotors, Truth
 from sitl.sensors.files import load_profile
 from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
@@ -63,17 +65,30 @@ class HilSimulator:
     """The simulated vehicle on the simulator link. Same arguments and datagrams in: same datagrams out."""
 
     def __init__(
-        self, core: SimCore, profile: Profile, home: Home, lockstep: bool, truth_every: int = 2
+        self,
+        truth: Truth,
+        table: ParameterTable,
+        profile: Profile,
+        seed: int,
+        home: Home,
+        lockstep: bool,
+        truth_every: int = 2,
     ) -> None:
+        """`truth` as its file has it; `table` holds the SIM_* parameters, which may change in flight."""
+        settings = settings_of(table)
+        core = SimCore(apply_parameters(truth, table), profile, settings, seed)
         self.pacing = PacingFigures()
         self.missed = 0  # ticks without an answer in time
         self.rejected = 0  # controls that were not numbers
         self.answered = False  # the present tick was
         self._core = core
+        self._file_truth = truth
+        self._profile = profile
+        self._parameters = ParameterServer(table)
         self._home = home
         self._lockstep = lockstep
         self._truth_every = truth_every
-        self._stated = stated_of(profile, core.settings.noise_scale)
+        self._stated = stated_of(profile, settings.noise_scale)
         self._fix = _FIX[profile.gnss.fix] if profile.gnss else 0
         self._satellites = profile.gnss.satellites if profile.gnss else 0
         encoder = profile.cable_sensor is not None and profile.cable_sensor.kind == "encoder"
@@ -110,9 +125,8 @@ class HilSimulator:
         for name, value in (settings or {}).items():
             if name.startswith("SIM_") and name != "SIM_LOSS_PCT":
                 table.set(name, value)
-        profile = load_profile(sensors)
-        core = SimCore(apply_parameters(truth, table), profile, settings_of(table), seed)
-        return cls(core, profile, home or Home(), lockstep, truth_every)
+        table.freeze()
+        return cls(truth, table, load_profile(sensors), seed, home or Home(), lockstep, truth_every)
 
     @property
     def now_us(self) -> int:
@@ -150,14 +164,17 @@ class HilSimulator:
     def receive(self, datagram: bytes) -> bool:
         """Take the command out of a datagram; True if the present tick has its answer now.
 
-        Whatever else a datagram may hold is ignored: other messages, systems and ticks, rubbish.
+        Beside the answer PARAM_REQUEST_LIST and PARAM_SET are heeded; whatever else a datagram may hold is
+        ignored: other messages, systems and ticks, rubbish.
         In real time a late command is still the newest one, and is used.
         """
+        was_answered = self.answered
+        aside = []
         for one in decode(datagram)[0]:
-            if (
-                one.system != VEHICLE_SYSTEM
-                or one.message.get_msgId() != mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
-            ):
+            if one.system != VEHICLE_SYSTEM:
+                continue
+            if one.message.get_msgId() != mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
+                aside.append(one.message)
                 continue
             answer = convert.read_hil_actuator_controls(one.message)
             current = answer.time_us == self._core.now_us
@@ -171,7 +188,18 @@ class HilSimulator:
                 self.rejected += 1
             self._command_us = answer.time_us
             self.answered = self.answered or current
+        if self.answered and not was_answered:  # a repeated datagram changes nothing
+            for message in aside:
+                if self._parameters.receive(message):
+                    self._retune()
         return self.answered
+
+    def _retune(self) -> None:
+        """A parameter has changed."""
+        table = self._parameters.table
+        settings = settings_of(table)
+        self._core.retune(apply_parameters(self._file_truth, table), settings)
+        self._stated = stated_of(self._profile, settings.noise_scale)
 
     def advance(self) -> None:
         """Move the world to the next tick under the last command."""
@@ -187,7 +215,7 @@ class HilSimulator:
     def _sensor_frames(self, readings: Readings) -> bytes:
         frame = self._sensor_writer.frame
         stated = self._stated
-        frames = []
+        frames = [frame(message) for message in self._parameters.take()]
         for time_us, pose in readings.mocap:
             message = convert.odometry_message(
                 time_us,

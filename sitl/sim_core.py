@@ -51,6 +51,9 @@ class Streams(NamedTuple):
     gusts: int = 8
 
 
+CHANNEL_STREAMS = Streams()[:7]  # in the order of `Readings`
+
+
 class Settings(NamedTuple):
     """What the SIM_* parameters mean to the core."""
 
@@ -118,6 +121,16 @@ class SimCore:
         self._measure(0)
         self.readings = self._collect()
 
+    def retune(self, truth: Truth, settings: Settings) -> None:
+        """Go on under another truth and other settings; tick, latency and cable length stay as they were."""
+        later_us = settings.actuator_delay_us - self.settings.actuator_delay_us
+        self._commands = deque((effect_us + later_us, command) for effect_us, command in self._commands)
+        self.truth = truth
+        self.settings = settings
+        for stream, channel in zip(CHANNEL_STREAMS, self._channels, strict=True):
+            if channel is not None:
+                channel.retune(self._noise(stream), self._extra_loss(stream))
+
     def tick(self, command: Rotors) -> Readings:
         """Integrate to the next tick; `command` (N) is the one that answers the present tick.
 
@@ -172,11 +185,11 @@ class SimCore:
         def fitted(sensor: Any, table: Any, stream: int) -> Channel[Any] | None:
             if table is None:
                 return None
-            return self._channel(sensor, table.config(tick_s), table, stream, self.settings.sensor_loss)
+            return self._channel(sensor, table.config(tick_s), table, stream)
 
         inertial = profile.imu.config(tick_s, self.truth.gravity)
         return (
-            self._channel(imu, inertial, profile.imu, streams.imu, extra_loss=0.0),
+            self._channel(imu, inertial, profile.imu, streams.imu),
             fitted(pose_tracker, profile.mocap, streams.mocap),
             fitted(load_tracker, profile.load_tracker, streams.load_tracker),
             fitted(cable_sensor, profile.cable_sensor, streams.cable_sensor),
@@ -185,9 +198,14 @@ class SimCore:
             fitted(magnetometer, profile.magnetometer, streams.magnetometer),
         )
 
-    def _channel(
-        self, sensor: Any, config: Any, delivery: Delivery, stream: int, extra_loss: float
-    ) -> Channel[Any]:
+    def _noise(self, stream: int) -> Noise:
+        return Noise(self._seed, stream, 0, self.settings.noise_scale)
+
+    def _extra_loss(self, stream: int) -> float:
+        """Loss added to a sensor's own; the inertial unit is wired to the autopilot and is spared."""
+        return 0.0 if stream == Streams().imu else self.settings.sensor_loss
+
+    def _channel(self, sensor: Any, config: Any, delivery: Delivery, stream: int) -> Channel[Any]:
         settings = self.settings
         latency_us = round(delivery.latency_ms * 1000.0) + settings.sensor_latency_us
         if isinstance(delivery, Sampled):
@@ -200,6 +218,7 @@ class SimCore:
             sensor.start,
             config,
             timing,
-            Fate.of(delivery, extra_loss),
-            Noise(self._seed, stream, 0, settings.noise_scale),
+            Fate.of(delivery),
+            self._noise(stream),
+            self._extra_loss(stream),
         )

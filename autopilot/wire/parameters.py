@@ -107,9 +107,22 @@ class ParameterTable:
             raise ParameterError(f"parameters defined twice: {', '.join(twice)}")
         self.names = tuple(self._parameters)
         self.version = 0
+        self.learned: set[str] = set()  # names that another process owns
         self._values = {parameter.name: float(parameter.default) for parameter in listed}
         self._index = {name: index for index, name in enumerate(self.names)}
         self._frozen = False
+
+    def learn(self, parameter: Parameter) -> None:
+        """Add a parameter that another process owns, at its default; all later names move up by one."""
+        if parameter.name in self._parameters:
+            raise ParameterError(f"{parameter.name}: defined already")
+        self._parameters[parameter.name] = parameter
+        self._parameters = dict(sorted(self._parameters.items()))
+        self.names = tuple(self._parameters)
+        self._index = {name: index for index, name in enumerate(self.names)}
+        self._values[parameter.name] = float(parameter.default)
+        self.learned.add(parameter.name)
+        self.version += 1
 
     def __getitem__(self, name: str) -> float:
         try:

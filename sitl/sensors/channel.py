@@ -52,9 +52,9 @@ class Fate(NamedTuple):
     outage_s: float
 
     @classmethod
-    def of(cls, delivery: Delivery, extra_loss: float) -> Fate:
-        """The fate of a sensor's readings, with a loss on the way added to its own."""
-        return cls(min(delivery.loss + extra_loss, 1.0), delivery.outages_per_min / 60.0, delivery.outage_s)
+    def of(cls, delivery: Delivery) -> Fate:
+        """The fate of a sensor's readings by its own fault."""
+        return cls(delivery.loss, delivery.outages_per_min / 60.0, delivery.outage_s)
 
 
 class Channel(Generic[ReadingT]):
@@ -72,12 +72,13 @@ class Channel(Generic[ReadingT]):
         timing: Timing,
         fate: Fate,
         noise: Noise,
+        extra_loss: float = 0.0,
     ) -> None:
         self._sample = sample
         self._config = config
         self._timing = timing
         self._fate = fate
-        self._noise = noise
+        self.retune(noise, extra_loss)
         self._state = start(config, noise)
         self._nominal_us = timing.nominal_us(0)
         period_us = timing.nominal_us(1) - self._nominal_us
@@ -86,6 +87,11 @@ class Channel(Generic[ReadingT]):
         self._count = 0
         self._on_the_way: deque[tuple[int, Measurement[ReadingT]]] = deque()
         self.due_us = max(self._nominal_us, 0)  # instant of the next measurement
+
+    def retune(self, noise: Noise, extra_loss: float) -> None:
+        """From the next measurement on: this noise, and a loss on the way added to the sensor's own."""
+        self._noise = noise
+        self._loss = min(self._fate.loss + extra_loss, 1.0)
 
     def measure(self, truth_state: PlantState) -> None:
         """Take the measurement that is due, of the state at `due_us`."""
@@ -111,10 +117,10 @@ class Channel(Generic[ReadingT]):
 
     def _delivers(self, noise: Noise) -> bool:
         """Draw the fate of this reading."""
-        if self._fate.loss == 0.0 and self._outage_chance == 0.0:
+        if self._loss == 0.0 and self._outage_chance == 0.0:
             return True
         lost, begins = uniform(noise, _FATE)
         if self.due_us >= self._outage_end_us and begins <= self._outage_chance:
             length_s = -log(uniform(noise, _OUTAGE)[0]) * self._fate.outage_s
             self._outage_end_us = self.due_us + max(round(length_s * _SECOND_US), 1)
-        return self.due_us >= self._outage_end_us and lost > self._fate.loss
+        return self.due_us >= self._outage_end_us and lost > self._loss

@@ -17,9 +17,10 @@ PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 HEAD = """# Parameters
 
 Every number that can be set by name, with the value it has for the vehicle `bebop`. Set one at start with
-`--set NAME=VALUE` (of `sitl`, `autopilot` or `gcs fly`, which hands it to the right one). Those of the autopilot are
-also served by MAVLink's parameter protocol: `gcs param list`, `gcs param set NAME VALUE`, or any ground station. A
-change is stored at once and is there again after a restart. Those marked *fixed* take effect at start only.
+`--set NAME=VALUE` (of `sitl`, `autopilot` or `gcs fly`, which hands it to the right one), or in flight by the
+parameter protocol: `gcs param list`, `gcs param set NAME VALUE`, or any ground station. The autopilot shows
+the simulator's parameters beside its own. A change of its own is stored at once and is there again after a
+restart; a change of the world lasts as long as the world. Those marked *fixed* take effect at start only.
 """
 AUTOPILOT = """
 ## Autopilot

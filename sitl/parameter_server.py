@@ -1,0 +1,57 @@
+"""The SIM_* parameters on the simulator link: listed and set by the autopilot, which shows them as its own.
+
+The parameter protocol in its plainest form: PARAM_REQUEST_LIST and PARAM_SET come in beside the answer to a
+tick, PARAM_VALUE goes out beside the sensors, a few with each tick.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameters import ParameterError, ParameterTable, decimal_from_float32
+
+VALUES_PER_TICK = 4
+STATUSTEXT_BYTES = 50
+
+
+class ParameterServer:
+    """Serves one table to one client."""
+
+    def __init__(self, table: ParameterTable) -> None:
+        self.table = table
+        self._waiting: deque[Any] = deque()
+
+    def receive(self, message: Any) -> bool:
+        """Take a message in; True if it changed a value."""
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
+                self._waiting.clear()
+                self._waiting.extend(self._value(name) for name in self.table.names)
+            case mavlink.MAVLINK_MSG_ID_PARAM_SET if message.param_id in self.table:
+                return self._set(message.param_id, decimal_from_float32(message.param_value))
+        return False
+
+    def take(self) -> list[Any]:
+        """The messages that go out with this tick."""
+        return [self._waiting.popleft() for _ in range(min(VALUES_PER_TICK, len(self._waiting)))]
+
+    def _set(self, name: str, value: float) -> bool:
+        before = self.table[name]
+        try:
+            self.table.set(name, value)
+        except ParameterError as error:
+            text = str(error).encode("ascii", errors="replace")[:STATUSTEXT_BYTES]
+            self._waiting.append(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_WARNING, text))
+        self._waiting.append(self._value(name))
+        return self.table[name] != before
+
+    def _value(self, name: str) -> Any:
+        return mavlink.MAVLink_param_value_message(
+            name.encode(),
+            self.table[name],
+            mavlink.MAV_PARAM_TYPE_REAL32,
+            len(self.table.names),
+            self.table.index(name),
+        )
