@@ -251,7 +251,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
     if flight.phase == P.TAUTEN and view.taut and len(flight.legs) == 1:
         return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
     if flight.phase in (P.LOWER, P.SET_DOWN):
-        flight = _watch_touchdown(flight, view)
+        flight = _watch_touchdown(flight, view, settings)
         if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= STILL_US:
             if flight.phase == P.LOWER:
                 return _to(flight, E.LOAD_DOWN, view, settings, (INFO, "Load on the ground"))
@@ -334,9 +334,10 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     return enter(anchored, P.MISSION, view, settings), Report((), reached)
 
 
-def _watch_touchdown(flight: Flight, view: View) -> Flight:
+def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
     """Note since when the thing that is set down no longer follows its sinking setpoint.
 
+    A load that still sinks keeps behind the setpoint by what it sinks in the lag of the law.
     The vehicle must stand still as well: a gust may hold it up. The load's velocity says nothing once the
     cable is slack.
     """
@@ -344,7 +345,7 @@ def _watch_touchdown(flight: Flight, view: View) -> Flight:
     if isinstance(leg, Creep):
         target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
         if leg.control_mode == LOAD_POSITION:
-            down = view.x_load[2] - target > LOAD_SUNK
+            down = view.x_load[2] - target > LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED
         else:
             down = view.x_quad[2] - target > VEHICLE_SUNK and abs(view.v_quad[2]) < STILL_SPEED
         if down:
