@@ -101,6 +101,7 @@ class Settings:
     tilt_limit_rad: float
     sensor_age_limit_s: float
     gravity_m_s2: float
+    ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
 
 
 class View(NamedTuple):
@@ -123,8 +124,8 @@ class Report(NamedTuple):
     reached: tuple[int, ...] = ()
 
 
-def settings_from(table: ParameterTable) -> Settings:
-    """The supervisor's settings from the parameter table."""
+def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
+    """The supervisor's settings from the parameter table and the law's lag."""
     return Settings(
         cable_length_m=table["VEH_CABLE_LEN"],
         takeoff_altitude_m=table["MIS_TAKEOFF_ALT"],
@@ -136,6 +137,7 @@ def settings_from(table: ParameterTable) -> Settings:
         tilt_limit_rad=table["FS_TILT_DEG"] * (3.141592653589793 / 180.0),
         sensor_age_limit_s=table["FS_SENSOR_S"],
         gravity_m_s2=table["VEH_GRAVITY"],
+        ramp_lag_s=ramp_lag_s,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from autopilot.control import quad_position, thesis
+from autopilot.control import lqr, quad_position, thesis
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.linear import Mat3, Vec3, axpy
 from autopilot.vehicle.parameters import LAWS
@@ -16,6 +16,10 @@ Memory = Any  # each law's own record; opaque to everyone else
 
 class Law(Protocol):
     """A cascade in its flight modes (3-2) and the vehicle position law of the slack phases."""
+
+    @property
+    def ramp_lag_s(self) -> float:
+        """How far the load keeps behind a reference that rises or sinks steadily, in time."""
 
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
         """Memory of a law that begins now, without a jump of its command."""
@@ -85,6 +89,10 @@ class ThesisLaw(NamedTuple):
         position_gains = quad_position.QuadPositionGains(k_x=(k_x, k_x, k_z), k_v=(k_v, k_v, k_w))
         return cls(gains, filters, position_gains, vehicle)
 
+    @property
+    def ramp_lag_s(self) -> float:
+        return self.filters.reference.ramp_lag
+
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
         # on the steady motion of the reference filter, which lags behind what moves; else x_d'' would begin
         # with -2 zeta omega_n v_d
@@ -108,7 +116,56 @@ class ThesisLaw(NamedTuple):
         )
 
 
-_BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {"thesis": ThesisLaw.build}
+class LqrLaw(NamedTuple):
+    """The linear regulator of A-2, which knows one mode: load position.
+
+    The other modes have no linear counterpart in the thesis. Take-off and set-down with a slack cable, and
+    the two attitude modes, are flown by the loops of the thesis's cascade with its parameters.
+    """
+
+    regulator: lqr.Lqr
+    other_modes: ThesisLaw
+
+    @classmethod
+    def build(cls, table: ParameterTable, vehicle: Vehicle) -> LqrLaw:
+        """Weights from the LQR_ parameters, the other modes from NGC_ and QP_."""
+        weights = lqr.LqrWeights(
+            position=table["LQR_Q_POS"],
+            tilt=table["LQR_Q_TILT"],
+            yaw=table["LQR_Q_YAW"],
+            swing=table["LQR_Q_SWING"],
+            rate=table["LQR_Q_RATE"],
+            thrust=table["LQR_R_THRUST"],
+            moment=table["LQR_R_MOMENT"],
+        )
+        return cls(lqr.lqr(vehicle, weights), ThesisLaw.build(table, vehicle))
+
+    @property
+    def ramp_lag_s(self) -> float:
+        return self.regulator.ramp_lag
+
+    def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
+        return self.other_modes.start(state, x_d, v_d)
+
+    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
+        return self.other_modes.quad_attitude(memory, state, R_d, thrust)
+
+    def load_attitude(
+        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+    ) -> tuple[Memory, Command]:
+        return self.other_modes.load_attitude(memory, state, q_d, b1_d, pull)
+
+    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        return memory, lqr.load_position(state, reference, self.regulator)
+
+    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        return self.other_modes.quad_position(memory, state, reference)
+
+
+_BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {
+    "thesis": ThesisLaw.build,
+    "lqr": LqrLaw.build,
+}
 
 
 def build_law(table: ParameterTable) -> Law:

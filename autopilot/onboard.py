@@ -135,12 +135,13 @@ class Onboard:
 
     def _build_setup(self, control_every: int) -> Setup:
         table = self.parameters
+        law = build_law(table)
         return Setup(
             vehicle=believed_vehicle(table),
             limited=table["VEH_ROTOR_LIM"],
-            law=build_law(table),
+            law=law,
             tuning=estimator_tuning(table),
-            settings=settings_from(table),
+            settings=settings_from(table, law.ramp_lag_s),
             control_every=control_every,
         )
 

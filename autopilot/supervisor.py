@@ -301,7 +301,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             text = "Cable never came taut, landing; is VEH_CABLE_LEN longer than the cable?"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
     if flight.phase in (P.LOWER, P.SET_DOWN):
-        flight = _watch_touchdown(flight, view)
+        flight = _watch_touchdown(flight, view, settings)
         if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= STILL_US:
             if flight.phase == P.LOWER:
                 return _to(flight, E.LOAD_DOWN, view, settings, (INFO, "Load on the ground"))
@@ -402,9 +402,10 @@ def begin_step(flight: Flight, view: View, settings: Settings) -> Flight:
     return enter(flight, P.MISSION, view, settings)
 
 
-def _watch_touchdown(flight: Flight, view: View) -> Flight:
+def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
     """Note since when the thing that is set down no longer follows its sinking setpoint.
 
+    A load that still sinks keeps behind the setpoint by what it sinks in the lag of the law.
     The vehicle must stand still as well: a gust may hold it up. The load's velocity says nothing once the
     cable is slack.
     """
@@ -412,7 +413,7 @@ def _watch_touchdown(flight: Flight, view: View) -> Flight:
     if isinstance(leg, Creep):
         target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
         if leg.control_mode == LOAD_POSITION:
-            down = view.x_load[2] - target > LOAD_SUNK
+            down = view.x_load[2] - target > LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED
         else:
             down = view.x_quad[2] - target > VEHICLE_SUNK and abs(view.v_quad[2]) < STILL_SPEED
         if down:

@@ -21,6 +21,10 @@ COMMANDS = {
     "missions": ("missions", "List the shipped missions."),
     "check": ("missions", "Check whether a vehicle can fly a mission."),
     "report": ("report", "Make the report of a captured flight again."),
+    "experiments": (
+        "experiments",
+        "Repeat published experiments beside their printed results.",
+    ),
     "status": ("status", "Show what the vehicle says of itself."),
     "capture": ("capture", "Capture telemetry until Ctrl-C."),
     "upload": ("transfer", "Put a mission on the vehicle."),

@@ -144,7 +144,17 @@ def attitude_from_axes(
 
 
 @kernel
-def axis_rates(R: Mat3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
-    """Rates of the first and third column of R: R' = R hat(Omega), so b_1' = W x b_1 with W = R Omega."""
+def attitude_from_rates(R_c: Mat3, R_c_dot: Mat3, R_c_ddot: Mat3) -> AttitudeCommand:
+    """R_c with Omega_c = vee(R_c^T R_c') (3-28) and Omega_c' = vee(R_c^T R_c'') (3-18).
+
+    R_c' (1/s) and R_c'' (1/s^2) are element by element, and may be estimates: what is symmetric in the
+    products is dropped. Of exact derivatives that is nothing in the first, hat(Omega_c)^2 in the second.
+    """
+    return AttitudeCommand(R_c, vee(mul_transposed(R_c, R_c_dot)), vee(mul_transposed(R_c, R_c_ddot)))
+
+
+@kernel
+def column_rates(R: Mat3, omega_body: Vec3) -> tuple[Vec3, Vec3, Vec3]:
+    """Rates of the columns of R: R' = R hat(Omega), so b_i' = W x b_i with W = R Omega."""
     W = apply(R, omega_body)
-    return cross(W, column(R, 0)), cross(W, column(R, 2))
+    return cross(W, column(R, 0)), cross(W, column(R, 1)), cross(W, column(R, 2))

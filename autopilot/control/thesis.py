@@ -3,7 +3,7 @@
     load_position:  x_d -> filter -> (3-43) A -> (3-42) q_c -> filter -+
     load_attitude:                                      q_d -> filter -+-> (3-31) F -> (3-27) R_c -+
     quad_attitude:                                                                            R_d -+
-                                                                     -> filter -> (3-36) M, (3-35) f
+                                           -> R_c, and R_c', R_c'' by filter -> (3-36) M, (3-35) f
 
 | symbol          | code name       | value          | unit       | equation |
 |-----------------|-----------------|----------------|------------|----------|
@@ -16,12 +16,14 @@
 | omega_n of x_d  | reference       | 25             | rad/s      | (4-3)    |
 | zeta            |                 | 0.98           |            | (4-3)    |
 
-The errors are taken from the filtered commands, x_1, as in Figure 4-5. The thesis filters the elements of
-R_c and does not say how a rotation comes back from nine filtered numbers. Here the filtered third column,
-normalised, is the thrust axis, the filtered first column without its part along it, normalised, the nose;
-Omega_c and Omega_c' are the exact derivatives of that rotation, so that they never disagree with R_c. The
-second column says nothing more and has no filter. In the same way q_c', q_c'' are those of the filtered
-vector normalised. No Euler angle appears.
+What the filters feed decides how the cascade flies, and the thesis leaves part of it open. Here:
+
+* The errors e_x, e_v, e_q, e_q' are taken from the filtered commands, x_1 and x_2 of (4-2), as in Figure 4-5.
+  The filtered q_c is normalised, q_c' and q_c'' are the exact derivatives of the normalised vector.
+* The errors e_R and Psi_R are taken from R_c itself (3-27): nine filtered numbers are no rotation. Of the
+  filters only R_c' and R_c'' are used, as 4-3 says, in (3-28) and (3-18): Omega_c = vee(R_c^T R_c').
+
+With these the printed step response of Case A is met; benchmarks/thesis_assumptions.py has the other choices.
 
 Memory comes in and goes out. A mode starts from `start`, at the present motion, so that no command jumps.
 """
@@ -48,14 +50,14 @@ from autopilot.control.load_attitude import (
 from autopilot.control.load_position import computed_direction, load_position_force
 from autopilot.control.quad_attitude import (
     AttitudeCommand,
-    attitude_from_axes,
+    attitude_from_rates,
     attitude_moment,
-    axis_rates,
+    column_rates,
     heading_axis,
 )
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Mat3, Vec3, column, cross, norm, scale
+from autopilot.geometry.linear import Mat3, Vec3, column, cross, from_columns, norm, scale
 from autopilot.geometry.s2 import unit_derivatives
 
 OMEGA_ATTITUDE = 30.0  # rad/s, 4-3
@@ -96,6 +98,7 @@ class ThesisMemory(NamedTuple):
     reference: FilterState  # of x_d
     direction: FilterState  # of q_c
     b1: FilterState  # of the first column of R_c
+    b2: FilterState  # of the second
     b3: FilterState  # of the third
 
 
@@ -129,12 +132,14 @@ def thesis_filters(
 def start(state: State, x_d: Vec3, v_d: Vec3) -> ThesisMemory:
     """Memory of a cascade that begins now: filters at the present q and R with their rates, and at x_d,
     v_d."""
-    b1_dot, b3_dot = axis_rates(state.R, state.omega_body)
+    R = state.R
+    b1_dot, b2_dot, b3_dot = column_rates(R, state.omega_body)
     return ThesisMemory(
         filter_start(x_d, v_d),
         filter_start(state.q_cable, state.q_cable_dot),
-        filter_start(column(state.R, 0), b1_dot),
-        filter_start(column(state.R, 2), b3_dot),
+        filter_start(column(R, 0), b1_dot),
+        filter_start(column(R, 1), b2_dot),
+        filter_start(column(R, 2), b3_dot),
     )
 
 
@@ -152,26 +157,21 @@ def filtered_direction(
 
 
 @kernel
-def filtered_attitude(
-    b1: FilterState, b3: FilterState, R_raw: Mat3, constants: FilterConstants
-) -> tuple[FilterState, FilterState, AttitudeCommand]:
-    """The attitude asked for, passed element by element through its filter, with rate and acceleration."""
-    b1_raw, b3_raw = column(R_raw, 0), column(R_raw, 2)
-    b1 = filter_step(b1, b1_raw, constants)
-    b3 = filter_step(b3, b3_raw, constants)
-    if norm(cross(b3.x1, b1.x1)) < _LEAST_LENGTH * _LEAST_LENGTH:
-        # the command has turned by nearly half a turn at once: begin again from it
-        b1 = filter_start(b1_raw, (0.0, 0.0, 0.0))
-        b3 = filter_start(b3_raw, (0.0, 0.0, 0.0))
-    command = attitude_from_axes(
-        b3.x1,
-        b3.x2,
-        filter_acceleration(b3, constants),
-        b1.x1,
-        b1.x2,
+def filtered_rates(
+    memory: ThesisMemory, R_c: Mat3, constants: FilterConstants
+) -> tuple[ThesisMemory, AttitudeCommand]:
+    """The attitude asked for, with the rate and acceleration that its filter gives, element by element."""
+    b1 = filter_step(memory.b1, column(R_c, 0), constants)
+    b2 = filter_step(memory.b2, column(R_c, 1), constants)
+    b3 = filter_step(memory.b3, column(R_c, 2), constants)
+    R_c_dot = from_columns(b1.x2, b2.x2, b3.x2)
+    R_c_ddot = from_columns(
         filter_acceleration(b1, constants),
+        filter_acceleration(b2, constants),
+        filter_acceleration(b3, constants),
     )
-    return b1, b3, command
+    memory = ThesisMemory(memory.reference, memory.direction, b1, b2, b3)
+    return memory, attitude_from_rates(R_c, R_c_dot, R_c_ddot)
 
 
 @kernel
@@ -181,11 +181,7 @@ def attitude_towards(F: Vec3, b1_d: Vec3, R: Mat3) -> Mat3:
     b3_c = scale(1.0 / n, F) if n > _LEAST_FORCE else column(R, 2)
     b1_c = heading_axis(b3_c, b1_d)
     b2_c = cross(b3_c, b1_c)
-    return (
-        (b1_c[0], b2_c[0], b3_c[0]),
-        (b1_c[1], b2_c[1], b3_c[1]),
-        (b1_c[2], b2_c[2], b3_c[2]),
-    )
+    return from_columns(b1_c, b2_c, b3_c)
 
 
 @kernel
@@ -202,7 +198,7 @@ def quad_attitude(
 
     Also the innermost loop of the other modes, which hand it their R_c: then this is (3-36).
     """
-    b1, b3, attitude = filtered_attitude(memory.b1, memory.b3, R_d, filters.attitude)
+    memory, attitude = filtered_rates(memory, R_d, filters.attitude)
     result = attitude_moment(
         state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, gains.epsilon, vehicle.inertia
     )
@@ -221,7 +217,7 @@ def quad_attitude(
         state.q_cable,
         attitude.R_c,
     )
-    return ThesisMemory(memory.reference, memory.direction, b1, b3), command
+    return memory, command
 
 
 @kernel
@@ -257,7 +253,7 @@ def load_attitude(
         vehicle.cable_length,
     )
     memory, command = quad_attitude(
-        ThesisMemory(memory.reference, direction_memory, memory.b1, memory.b3),
+        ThesisMemory(memory.reference, direction_memory, memory.b1, memory.b2, memory.b3),
         state,
         attitude_towards(direction.F, b1_d, state.R),
         thrust_along(direction.F, state.R),
@@ -312,7 +308,7 @@ def load_position(
         vehicle.cable_length,
     )
     memory, command = quad_attitude(
-        ThesisMemory(x, direction_memory, memory.b1, memory.b3),
+        ThesisMemory(x, direction_memory, memory.b1, memory.b2, memory.b3),
         state,
         attitude_towards(direction.F, reference.b1_d, state.R),
         thrust_along(direction.F, state.R),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from autopilot.vehicle.belief import Belief
 from autopilot.wire.parameters import Parameter, ParameterTable
 
-LAWS = ("thesis",)  # CTL_LAW is an index into this
+LAWS = ("thesis", "lqr")  # CTL_LAW is an index into this
 
 
 def autopilot_parameters(belief: Belief) -> ParameterTable:
@@ -90,6 +90,13 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("QP_KV", 1.8, 0.0, 1000.0, "N s/m", "Vehicle velocity gain, level, while the cable is slack"),
             p("QP_KZ", 6.4, 0.0, 1000.0, "N/m", "Vehicle height gain while the cable is slack"),
             p("QP_KVZ", 3.0, 0.0, 1000.0, "N s/m", "Vehicle climb gain while the cable is slack"),
+            p("LQR_Q_POS", 50000.0, 0.001, 1e7, "", "Weight of the vehicle position error, A-2"),
+            p("LQR_Q_TILT", 0.001, 1e-6, 1e7, "", "Weight of roll and pitch, A-2"),
+            p("LQR_Q_YAW", 1.0, 0.001, 1e7, "", "Weight of the yaw error, A-2"),
+            p("LQR_Q_SWING", 25000.0, 1e-6, 1e7, "", "Weight of the cable's angles, A-2"),
+            p("LQR_Q_RATE", 0.001, 1e-6, 1e7, "", "Weight of every rate, A-2"),
+            p("LQR_R_THRUST", 1000.0, 0.001, 1e7, "", "Weight of the thrust beyond hovering, A-2"),
+            p("LQR_R_MOMENT", 100.0, 0.001, 1e7, "", "Weight of the moments, A-2"),
             p("EST_GYRO_STD", 0.005, 1e-7, 1.0, "rad/s", "Believed noise of one gyro sample"),
             p("EST_ACC_STD", 0.05, 1e-7, 10.0, "m/s^2", "Believed noise of one accelerometer sample"),
             p("EST_GYRO_WALK", 1e-4, 0.0, 1.0, "rad/s", "Believed gyro bias walk in a second"),

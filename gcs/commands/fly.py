@@ -18,7 +18,7 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
 @click.argument("mission")
 @click.option(
     "--law",
-    type=click.Choice(["thesis"]),
+    type=click.Choice(["thesis", "lqr"]),
     default="thesis",
     show_default=True,
     help="Control law to fly with.",

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import linprog
 
 from autopilot.control.records import Reference, Vehicle
@@ -23,6 +24,7 @@ DIFFERENCE = (
     2e-6  # central differences with step 1e-4 on motions of a few rad/s: h^2/6 times a third derivative
 )
 STEP = 1e-4
+FILTERED = 1e-10  # two ways to the exponential of the filter, times omega_n^2
 PRINTED = 5e-7  # the oracle's moments are printed with six or more decimals
 FDCL_THRUST = 5e-5  # printed with four decimals
 SLACK = 1e-9  # what a linear programme may give up of an optimum found before: its own feasibility is 1e-7
@@ -124,7 +126,58 @@ def columns_turn_with_the_body(laws: SimpleNamespace, model: SimpleNamespace, ve
     for rng in motions(3):
         R, W = model.random_rotation(rng), rng.normal(size=3)
         R_dot = R @ model.hat(W)
-        close(laws.axis_rates(model.mat(R), model.vec(W)), [R_dot[:, 0], R_dot[:, 2]], EXACT)
+        close(laws.column_rates(model.mat(R), model.vec(W)), R_dot.T, EXACT)
+
+
+def rates_of_a_rotation_are_3_28(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """Of a turning rotation, R' = R hat(W), R'' = R hat(W)^2 + R hat(W'): W and W' come back."""
+    for rng in motions(9):
+        R, (W, W_dot) = model.random_rotation(rng), rng.normal(size=(2, 3)) * 3.0
+        R_dot = R @ model.hat(W)
+        R_ddot = R_dot @ model.hat(W) + R @ model.hat(W_dot)
+        command = laws.attitude_from_rates(*(model.mat(A) for A in (R, R_dot, R_ddot)))
+        close(command.R_c, R, EXACT)
+        close(command.Omega_c, W, EXACT)
+        close(command.Omega_c_dot, W_dot, EXACT)
+
+
+def filters_feed_rates_but_not_the_attitude(
+    laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
+) -> None:
+    """e_R is that of the attitude asked for, Omega_c and Omega_c' are those of an array filter of the
+    elements of R_c, stepped by SciPy's matrix exponential."""
+    omega_n, zeta, dt = 30.0, 0.98, 0.004
+    filters, gains = laws.thesis_filters(dt), laws.THESIS_GAINS
+    J, zero = np.array(vehicle.inertia), (0.0, 0.0, 0.0)
+    A = np.array([[0.0, 1.0, 0.0], [-(omega_n**2), -2.0 * zeta * omega_n, omega_n**2], [0.0, 0.0, 0.0]])
+    # the command runs straight: it is a third and, with its slope, a fourth state
+    A = np.block([[A, np.array([[0.0], [0.0], [1.0]])], [np.zeros((1, 4))]])
+    E = expm(A * dt)
+    for rng in motions(10):
+        R, W = model.random_rotation(rng), rng.normal(size=3)
+        turn = rng.normal(size=3)
+        state = model.state_of(model.pack(zero, zero, -E3, zero, R, W), vehicle)
+        memory = laws.start(state, zero, zero)
+        x1, x2, u = R, R @ model.hat(W), R
+        for k in range(1, 4):
+            R_c = R @ model.rodrigues(0.3 * k * turn)
+            slope = (R_c - u) / dt
+            x1, x2 = (sum(E[i, j] * p for j, p in enumerate((x1, x2, u, slope))) for i in (0, 1))
+            u = R_c
+            memory, command = laws.quad_attitude(memory, state, model.mat(R_c), 5.0, gains, filters, vehicle)
+        x3 = -2.0 * zeta * omega_n * x2 - omega_n**2 * (x1 - u)
+
+        def skew(S: np.ndarray) -> np.ndarray:
+            return 0.5 * np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]])
+
+        e_R = skew(R_c.T @ R)
+        W_c, W_c_dot = R.T @ R_c @ skew(R_c.T @ x2), R.T @ R_c @ skew(R_c.T @ x3)
+        e_Omega = W - W_c
+        moment = -0.9 * e_R - 0.1 * e_Omega + np.cross(W, J * W) - J * (np.cross(W, W_c) - W_c_dot)
+        close(command.R_c, R_c, EXACT)
+        close(command.e_R, e_R, EXACT)
+        close(command.e_Omega, e_Omega, FILTERED)
+        close(command.moment, moment, FILTERED)
 
 
 def computed_attitude_points_as_3_27(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -447,6 +500,8 @@ PROOFS: tuple[Any, ...] = (
     attitude_error_obeys_3_22,
     commanded_frame_is_differentiated,
     columns_turn_with_the_body,
+    rates_of_a_rotation_are_3_28,
+    filters_feed_rates_but_not_the_attitude,
     computed_attitude_points_as_3_27,
     published_se3_numbers,
     cable_error_obeys_3_33,

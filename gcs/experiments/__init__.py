@@ -1,0 +1,1 @@
+"""Published experiments, flown again: a plan of flights in, a table, figures and a page out."""

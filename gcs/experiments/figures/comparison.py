@@ -1,0 +1,132 @@
+"""NGC solid, LQR dash-dot: load position and error (4-10 ...), percentage (4-11), angles (4-12 ...)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
+from gcs.analysis.step import Step, find_step
+from gcs.experiments.figures.canvas import (
+    AXES,
+    DESIRED,
+    Scene,
+    heading,
+    least_range,
+    line,
+    panels,
+    span,
+    titled,
+)
+from gcs.experiments.flown import Flown
+from gcs.report.style import GREY, draw
+
+_TITLE = "Controller comparison. Solid: NGC, dash-dot: LQR"
+_VEHICLE_ANGLES = (r"\phi", r"\theta", r"\psi")
+_LOAD_ANGLES = (r"\phi_L", r"\theta_L")
+
+
+def position(number: str, scene: Scene) -> Any:
+    """(a) load position with the desired one, (b) load position error."""
+    figure, axes = panels(12.0, 6.6, 3, 2)
+    for flight, how in scene.pair:
+        s = flight.samples
+        origin = s.desired_m[flight.seen(s.time_s)][:1]
+        for i, axis in enumerate(AXES):
+            line(axes[i, 0], flight, s.time_s, (s.actual_m - origin)[:, i], **how)
+            line(axes[i, 1], flight, s.time_s, s.error_m[:, i], **how)
+            axes[i, 0].set_ylabel(f"$x_L$ {axis} (m)")
+            axes[i, 1].set_ylabel(f"$e_x$ {axis} (m)")
+    longest = max((scene.ngc, scene.lqr), key=lambda flight: flight.length_s)
+    s = longest.samples
+    desired = s.desired_m - s.desired_m[longest.seen(s.time_s)][:1]
+    for i in range(3):
+        line(axes[i, 0], longest, s.time_s, desired[:, i], **DESIRED)
+        least_range(axes[i, 0], 0.1)
+        least_range(axes[i, 1], 0.05)
+    titled(axes[0, 0], "(a) load position")
+    titled(axes[0, 1], "(b) load position error")
+    span(axes, (scene.ngc, scene.lqr))
+    heading(figure, number, _TITLE, scene.case, scene.vehicle, (scene.ngc, scene.lqr))
+    return figure
+
+
+def percentage(number: str, scene: Scene) -> Any:
+    """4-11: distance from the end of the step along its line, in percent of its height."""
+    figure, axes = panels(9.0, 5.0, 1, 1)
+    ax = axes[0, 0]
+    step = _step(scene)
+    for flight, how in scene.pair:
+        if step is not None:
+            draw(ax, *_percentage(flight, step), **how)
+    for level, text in ((10.0, "90 % of the step"), (5.0, "5 % bound")):
+        ax.axhline(level, color=GREY, linewidth=0.9, linestyle=":")
+        ax.annotate(
+            text,
+            (1.0, level),
+            xycoords=("axes fraction", "data"),
+            xytext=(-4, 2),
+            textcoords="offset points",
+            ha="right",
+            fontsize=8,
+            color=GREY,
+        )
+    ax.set_ylim(0.0, min(max(110.0, ax.get_ylim()[1]), 200.0))
+    ax.set_ylabel("load position error (% of the step)")
+    titled(ax, "")
+    span(axes, (scene.ngc, scene.lqr))
+    heading(
+        figure,
+        number,
+        "Load position error percentage. Solid: NGC, dash-dot: LQR",
+        scene.case,
+        scene.vehicle,
+        (scene.ngc, scene.lqr),
+    )
+    return figure
+
+
+def angles(number: str, scene: Scene) -> Any:
+    """(a) vehicle attitude, (b) load attitude, both with respect to the world."""
+    figure, axes = panels(12.0, 6.6, 3, 2)
+    for flight, how in scene.pair:
+        s = flight.samples
+        vehicle = np.degrees(roll_pitch_yaw(s.quat_wxyz))
+        load = np.degrees(cable_angles(flight.telemetry.load_truth.q_cable))
+        for i, symbol in enumerate(_VEHICLE_ANGLES):
+            line(axes[i, 0], flight, s.time_s, vehicle[:, i], **how)
+            axes[i, 0].set_ylabel(f"${symbol}$ (°)")
+        for i, symbol in enumerate(_LOAD_ANGLES):
+            line(axes[i, 1], flight, s.time_s, load[:, i], **how)
+            axes[i, 1].set_ylabel(f"${symbol}$ (°)")
+    for ax in axes.flat:
+        least_range(ax, 2.0)
+    axes[2, 1].set_visible(False)  # a direction has two angles
+    axes[1, 1].tick_params(labelbottom=True)
+    axes[1, 1].set_xlabel(axes[2, 0].get_xlabel())
+    titled(axes[0, 0], "(a) vehicle angles")
+    titled(axes[0, 1], "(b) load angles")
+    span(axes, (scene.ngc, scene.lqr))
+    heading(figure, number, _TITLE, scene.case, scene.vehicle, (scene.ngc, scene.lqr))
+    return figure
+
+
+def _step(scene: Scene) -> Step | None:
+    """The step that both were asked for, from a flight that saw the end of it."""
+    for flight in (scene.ngc, scene.lqr):
+        s = flight.samples
+        # half a second of rest before it: a step begins there
+        shown = (s.time_s >= flight.start_s - 0.5) & (s.time_s <= flight.end_s)
+        step = find_step(s.time_s[shown], s.desired_m[shown], s.desired_m_s[shown])
+        if step is not None:
+            return step
+    return None
+
+
+def _percentage(flight: Flown, step: Step) -> tuple[Floats, Floats]:
+    """Times from the beginning of the step, and the distance from its end along it, percent of its height."""
+    s = flight.samples
+    seen = flight.seen(s.time_s)
+    along = (s.actual_m[seen] - step.origin_m) @ step.direction
+    return flight.clock(s.time_s[seen]), 100.0 * np.abs(along / step.height_m - 1.0)

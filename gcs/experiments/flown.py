@@ -1,0 +1,86 @@
+"""One flown experiment, read from its telemetry, with the times that cut it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.axes import Floats
+from gcs.analysis.metrics import DIVERGED_M
+from gcs.analysis.record import FlightMeta
+from gcs.analysis.samples import CARRIED, MISSION, Samples, samples_of
+from gcs.analysis.telemetry import load_telemetry
+from gcs.analysis.tracks import Telemetry
+from gcs.experiments.plan import Experiment
+from gcs.experiments.reuse import TLOG_FILE
+from gcs.report.build import META_FILE, load_meta
+
+_AT_REST_M_S = 1e-6  # desired speeds are single precision
+
+
+@dataclass(frozen=True)
+class Flown:
+    """Times are the vehicle's clock; in figures they count from `start_s`."""
+
+    experiment: Experiment
+    meta: FlightMeta
+    telemetry: Telemetry
+    samples: Samples
+    start_s: float  # the signals begin
+    rest_s: float  # the reference moves no more
+    end_s: float  # the load is lowered, or the flight is lost
+    lost: bool  # the error left all bounds, or the autopilot gave up
+
+    def clock(self, time_s: Floats) -> Floats:
+        """Seconds since the signals began."""
+        return np.asarray(time_s - self.start_s)
+
+    def seen(self, time_s: Floats) -> slice:
+        """The samples from the beginning of the signals to the end."""
+        return slice(*np.searchsorted(time_s, (self.start_s, np.nextafter(self.end_s, np.inf))))
+
+    @property
+    def length_s(self) -> float:
+        """From the beginning of the signals to the end."""
+        return self.end_s - self.start_s
+
+
+def read_flown(directory: Path, experiment: Experiment) -> Flown:
+    """The flight in `directory`."""
+    telemetry = load_telemetry(directory / TLOG_FILE)
+    return flown_of(telemetry, experiment, load_meta(directory / META_FILE))
+
+
+def flown_of(telemetry: Telemetry, experiment: Experiment, meta: FlightMeta) -> Flown:
+    """The same from telemetry that has been read."""
+    samples = samples_of(telemetry)
+    setpoint = telemetry.setpoint
+    speed = np.linalg.norm(setpoint.velocity_m_s, axis=1)
+    in_mission = setpoint.phase == MISSION
+    moving = np.flatnonzero(in_mission & (speed > _AT_REST_M_S))
+    whole = telemetry.span_s or (0.0, 0.0)
+    if len(moving):
+        first = moving[0]
+        start = float(setpoint.time_s[first] - setpoint.elapsed_s[first])
+        after = min(int(moving[-1]) + 1, len(setpoint.time_s) - 1)
+        rest = float(setpoint.time_s[after])
+    else:
+        start, rest = whole
+    end, lost = _end(telemetry, samples, start, whole[1])
+    return Flown(experiment, meta, telemetry, samples, start, rest, end, lost)
+
+
+def _end(telemetry: Telemetry, samples: Samples, start_s: float, last_s: float) -> tuple[float, bool]:
+    """When the load is no longer carried, and whether that is because the flight was lost."""
+    setpoint = telemetry.setpoint
+    over = (setpoint.time_s >= start_s) & ~np.isin(setpoint.phase, CARRIED)
+    end = float(setpoint.time_s[int(np.argmax(over)) - 1]) if over.any() else last_s
+    gave_up = bool(over.any()) and setpoint.phase[int(np.argmax(over))] == mavlink.PLUMBLINE_PHASE_FAILSAFE
+    error = np.linalg.norm(samples.error_m, axis=1)
+    away = (samples.time_s >= start_s) & (samples.time_s <= end) & (error > DIVERGED_M)
+    if away.any():
+        return float(samples.time_s[int(np.argmax(away))]), True
+    return end, gave_up

@@ -1,0 +1,108 @@
+"""`gcs experiments thesis`: fly what is missing, read it, and write results, tables, figures and the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+from gcs.analysis.record import Record
+from gcs.errors import GcsError
+from gcs.experiments.figures.canvas import Scene
+from gcs.experiments.figures.catalogue import Drawn, draw_figures, wanted
+from gcs.experiments.flown import read_flown
+from gcs.experiments.page import PAGE_FILE, render_page
+from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, in_reading_order
+from gcs.experiments.results import RESULTS_FILE, result, write_results
+from gcs.experiments.table import markdown
+
+FLIGHTS = "flights"
+FIGURES = "figures"
+TABLE_FILE = "table.md"
+
+# figures drawn, figures in all, the one that is next
+Tell = Callable[[int, int, str], None]
+
+
+class Report(NamedTuple):
+    """What lies in the output directory."""
+
+    records: tuple[Record, ...]
+    drawn: tuple[Drawn, ...]
+
+
+def write_report(out: Path, code: str, tell: Tell) -> Report:
+    """From the flights in `out`/flights, all of them, to everything else in `out`."""
+    scenes = [(case, vehicle) for case in CASES for vehicle in VEHICLES]
+    total = sum(1 for case, vehicle in scenes for _ in wanted(case, vehicle))
+    records: list[Record] = []
+    drawn: list[Drawn] = []
+
+    def count(figure: Drawn) -> None:
+        drawn.append(figure)
+        tell(len(drawn), total, figure.file)
+
+    tell(0, total, "")
+    for case, vehicle in scenes:
+        flown = {}
+        for law in LAWS:
+            experiment = Experiment(case, law, vehicle)
+            flown[law] = read_flown(out / FLIGHTS / experiment.name, experiment)
+            records.append(result(flown[law], f"{FLIGHTS}/{experiment.name}"))
+        draw_figures(Scene(case, vehicle, *(flown[law] for law in LAWS)), out / FIGURES, count)
+    ordered = tuple(sorted(records, key=_order))
+    write_results(out / RESULTS_FILE, ordered)
+    (out / TABLE_FILE).write_text(markdown(ordered), encoding="utf-8")
+    page = render_page(ordered, drawn, FIGURES, version("plumbline"), code)
+    (out / PAGE_FILE).write_text(page, encoding="utf-8")
+    return Report(ordered, tuple(drawn))
+
+
+def _order(record: Record) -> tuple[int, int, int]:
+    return in_reading_order(Experiment(record["case"], record["law"], record["vehicle"]))
+
+
+def make_directory(out: Path) -> None:
+    """`out`, or one line on why not."""
+    try:
+        (out / FLIGHTS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GcsError(f"--out {out}: {error.strerror}") from None
+
+
+BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
+KEY_FIGURES = (
+    "fig-4-07-tracking-case-a.png",
+    "fig-4-09-psi-case-a.png",
+    "fig-4-10-comparison-case-a.png",
+    "fig-4-11-percentage-case-a.png",
+    "fig-4-12-angles-case-a.png",
+    "fig-4-16-comparison-case-b.png",
+    "fig-4-19-comparison-case-b-extended.png",
+    "fig-4-24-comparison-case-c.png",
+    "fig-4-25-angles-case-c.png",
+    "fig-4-24-comparison-case-c-bebop.png",
+)
+_COLOURS = 192  # of a line drawing: half the bytes, and the eye sees no difference
+
+
+def write_docs(page: Path, out: Path, records: Sequence[Record]) -> None:
+    """Put the tables between the markers of `page`, and the key figures into images/thesis beside it."""
+    from PIL import Image
+
+    try:
+        text = page.read_text(encoding="utf-8")
+    except OSError as error:
+        raise GcsError(f"--docs {page}: {error.strerror}") from None
+    head, begin, rest = text.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not begin or not end:
+        raise GcsError(f"--docs {page}: must hold the lines {BEGIN} and {END}")
+    page.write_text(f"{head}{BEGIN}\n\n{markdown(records)}\n{END}{tail}", encoding="utf-8")
+    images = page.parent / "images" / "thesis"
+    images.mkdir(parents=True, exist_ok=True)
+    for file in KEY_FIGURES:
+        with Image.open(out / FIGURES / file) as picture:
+            small = picture.convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
+            small.save(images / file, optimize=True)

@@ -1,0 +1,34 @@
+"""When a load that is lowered counts as being on the ground."""
+
+from __future__ import annotations
+
+import io
+from math import nan
+
+import pytest
+
+from autopilot.wire.tlog import TlogWriter, read_tlog
+from gcs.closed_loop import Conditions, fly
+from missions.model import Land, Mission, Takeoff
+from sitl.truth import load_truth
+
+SIMULATOR = 26  # component of its truth telemetry
+RESTING = 2e-3  # m, by which the ground may give way under the load, and an exchange of telemetry
+
+
+def test_a_load_that_lags_is_not_taken_for_one_on_the_ground() -> None:
+    """The linear regulator keeps 75 mm behind a setpoint that sinks at 0.2 m/s, more than the 50 mm that
+    tell a load which is stopped."""
+    mission = Mission("down", "Down", "", (), (Takeoff(0.3), Land()))
+    log = io.BytesIO()
+    outcome = fly(mission, Conditions("thesis", "ideal", settings={"CTL_LAW": 1.0}), TlogWriter(log))
+    assert outcome.name == "completed"
+    height, noted = nan, []
+    for _, received in read_tlog(io.BytesIO(log.getvalue())):
+        message = received.message
+        if message.get_type() == "LOAD_STATE" and received.component == SIMULATOR:
+            height = -message.z
+        if message.get_type() == "STATUSTEXT" and "Load on the ground" in message.text:
+            noted.append(height)
+    assert len(noted) == 1
+    assert noted[0] == pytest.approx(load_truth("thesis").load_radius, abs=RESTING)
