@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: help install fly test lint types bench clean
+.PHONY: help install fly test lint types thesis bench clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -30,9 +30,13 @@ lint: $(STAMP) ## ruff: lint and format
 types: $(STAMP) ## mypy, strict
 	$(BIN)/mypy
 
+thesis: $(STAMP) ## repeat the thesis's experiments and renew docs/thesis.md
+	$(BIN)/gcs experiments thesis --docs docs/thesis.md
+
 bench: $(STAMP) ## measure this machine
 	$(BIN)/python benchmarks/plant_convergence.py
 	$(BIN)/python benchmarks/cascade_margin.py
+	$(BIN)/python benchmarks/thesis_assumptions.py
 	$(BIN)/python benchmarks/lockstep.py
 
 clean: ## remove what was made here
