@@ -19,7 +19,7 @@ from autopilot.flight import (
     View,
 )
 from autopilot.geometry.linear import Vec3, norm, sub
-from autopilot.guidance import LOAD_POSITION, Hold, transfer_leg
+from autopilot.guidance import Hold, carry_leg
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
@@ -143,13 +143,15 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
 
 
 def _start_mission(flight: Flight, request: StartMission, view: View, settings: Settings) -> Decision:
+    before = flight
     if request.first is not None:
         flight, verdict = _set_current(flight, SetCurrent(request.first), view, settings)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
-            return flight, verdict
+            return before, verdict
     if flight.on_mission and flight.phase not in ON_GROUND and flight.phase != Phase.HOLD:
         return flight, ACCEPTED
-    return _begin_mission(flight, view, settings)
+    begun, verdict = _begin_mission(flight, view, settings)
+    return (begun if verdict.result == mavlink.MAV_RESULT_ACCEPTED else before), verdict
 
 
 def _set_current(flight: Flight, request: SetCurrent, view: View, settings: Settings) -> Decision:
@@ -241,7 +243,7 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
         return flight, _denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
-    go = transfer_leg(here, there, flight.speed_m_s, settings.accel_m_s2, LOAD_POSITION)
+    go = carry_leg(here, there, flight.speed_m_s, settings.accel_m_s2, settings.least_move_s)
     return replace(held, legs=(*held.legs[:-1], go, Hold(there))), ACCEPTED
 
 

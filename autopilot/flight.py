@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.guidance import Leg
+from autopilot.guidance import Leg, least_move_s
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterTable
 from missions.model import Step
@@ -101,6 +101,7 @@ class Settings:
     tilt_limit_rad: float
     sensor_age_limit_s: float
     gravity_m_s2: float
+    least_move_s: float
     ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
 
 
@@ -137,6 +138,7 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         tilt_limit_rad=table["FS_TILT_DEG"] * (3.141592653589793 / 180.0),
         sensor_age_limit_s=table["FS_SENSOR_S"],
         gravity_m_s2=table["VEH_GRAVITY"],
+        least_move_s=least_move_s(table["VEH_CABLE_LEN"], table["VEH_GRAVITY"]),
         ramp_lag_s=ramp_lag_s,
     )
 

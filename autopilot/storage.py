@@ -42,7 +42,10 @@ class Storage:
         mission = deserialise(data, home)
         if isinstance(mission, CorruptMission):
             aside = path.with_suffix(".corrupt")
-            path.replace(aside)
+            try:
+                path.replace(aside)
+            except OSError as error:
+                return None, f"{path}: {mission.reason}; {error.strerror}, starting without a mission"
             return None, f"{path}: {mission.reason}; moved to {aside.name}, starting without a mission"
         return mission, ""
 

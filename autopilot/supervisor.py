@@ -26,6 +26,7 @@ from autopilot.flight import (
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance import (
+    CALM_SHARE,
     LOAD_ATTITUDE,
     LOAD_POSITION,
     QUAD_ATTITUDE,
@@ -37,6 +38,7 @@ from autopilot.guidance import (
     Run,
     Swing,
     brake_leg,
+    carry_leg,
     transfer_leg,
 )
 from autopilot.wire.dialect import plumbline as mavlink
@@ -113,7 +115,7 @@ def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Fligh
     """The flight in `phase`, with the legs with which the phase begins."""
     legs: tuple[Leg, ...]
     if phase in CARRYING and flight.phase in CARRYING and flight.legs and _swings(flight.legs[0]):
-        legs = (_calm(flight.legs[0], view, ends_step=False),)
+        legs = (_calm(flight.legs[0], view, settings, ends_step=False),)
     else:
         legs = _ENTRY[phase](flight, view, settings) if phase in _ENTRY else ()
     return replace(
@@ -151,14 +153,15 @@ def _swings(leg: Leg) -> bool:
     return isinstance(leg, Swing | Calm)
 
 
-def _calm(leg: Leg, view: View, ends_step: bool) -> Calm:
+def _calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
     """What must come between a leg that left the position alone and one that asks for it."""
     cable = sub(view.x_quad, view.x_load)
     length = norm(cable)
     lean = scale(1.0 / length, cable)
     rate = scale(1.0 / length, tangent(lean, sub(view.v_quad, view.v_load)))
     anchor = leg.jet(0.0)[0]
-    return Calm(anchor, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), ends_step)
+    duration = CALM_SHARE * settings.least_move_s
+    return Calm(anchor, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration)
 
 
 def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
@@ -166,7 +169,7 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     x, v, a = load_motion(flight, view, settings)
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
-    brake = brake_leg(x, v, a, settings.accel_m_s2)
+    brake = brake_leg(x, v, a, settings.accel_m_s2, settings.least_move_s)
     return (brake,), brake.end
 
 
@@ -230,7 +233,7 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
 
 
 def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings) -> Leg:
-    return transfer_leg(begin, end, speed, settings.accel_m_s2, LOAD_POSITION)
+    return carry_leg(begin, end, speed, settings.accel_m_s2, settings.least_move_s)
 
 
 def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -298,7 +301,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         if view.taut:
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
         if flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(flight, settings):
-            text = "Cable never came taut, landing; is VEH_CABLE_LEN longer than the cable?"
+            text = "Cable never taut, landing; check VEH_CABLE_LEN"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
     if flight.phase in (P.LOWER, P.SET_DOWN):
         flight = _watch_touchdown(flight, view, settings)
@@ -370,7 +373,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     following = plan.steps[flight.step + 1] if flight.step + 1 < len(plan.steps) else None
     swung = flight.legs[0] if flight.legs else None
     if isinstance(swung, Swing) and not isinstance(following, AttitudeRun):
-        calm = _calm(swung, view, ends_step=True)
+        calm = _calm(swung, view, settings, ends_step=True)
         return replace(flight, legs=(calm,), leg_start_us=view.now_us), Report()
     if isinstance(swung, Calm):
         legs, here = stop(flight, view, settings)

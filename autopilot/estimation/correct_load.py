@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from autopilot.estimation.correct_pose import REJECTIONS_BEFORE_RESET, gate
-from autopilot.estimation.history import look_back, shift
-from autopilot.estimation.predict import remember
+from autopilot.estimation.history import look_back, renew, shift
 from autopilot.estimation.records import (
     Q_CABLE,
     X_LOAD,
@@ -22,15 +21,14 @@ from autopilot.geometry.s2 import normalise, tangent
 
 
 @kernel
-def update2(cov: Covariance2, row: int, variance: float) -> tuple[float, float, Covariance2]:
-    """Gains of a scalar measurement of the value (row 0) or its rate (row 1), and the covariance after it."""
+def update2(
+    cov: Covariance2, h_value: float, h_rate: float, variance: float
+) -> tuple[float, float, Covariance2]:
+    """Gains of a scalar measurement of h_value value + h_rate rate, and the covariance after it."""
     aa, ab, bb = cov
-    if row == 0:
-        s = 1.0 / (aa + variance)
-        ha, hb = aa, ab
-    else:
-        s = 1.0 / (bb + variance)
-        ha, hb = ab, bb
+    ha = aa * h_value + ab * h_rate
+    hb = ab * h_value + bb * h_rate
+    s = 1.0 / (h_value * ha + h_rate * hb + variance)
     ka, kb = s * ha, s * hb
     return ka, kb, (aa - ka * ha, ab - ka * hb, bb - kb * hb)
 
@@ -80,30 +78,36 @@ def correct_load(
     at = look_back(state.head, history, since, X_LOAD)
     innovation = sub(reading.x_load, (at[0], at[1], at[2]))
     starting = load.age_s == float("inf")
-    if not starting and not gate(innovation, load.covariance[0] + position_var, tuning.gate_sigma):
+    age = reading.age_s
+    aa, ab, bb = load.covariance
+    past_var = aa - 2.0 * age * ab + age * age * bb
+    if not starting and not gate(innovation, past_var + position_var, tuning.gate_sigma):
         if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
             return with_load(state, refuse_load(load), state.resets)
         starting = True
     if starting:
         v_load = reading.v_load if measured else (0.0, 0.0, 0.0)
+        rate_var = velocity_var if measured else 1.0
+        turn_var = rate_var / (distance * distance)
+        direction_var = position_var / (distance * distance)
         started = LoadEstimate(
             reading.x_load,
             v_load,
             direction,
             tangent(direction, scale(1.0 / distance, sub(v_load, vehicle.v_quad))),
-            (position_var, 0.0, velocity_var if measured else 1.0),
-            (position_var / (distance * distance), 0.0, 1.0),
+            (position_var + age * age * rate_var, age * rate_var, rate_var),
+            (direction_var + age * age * turn_var, age * turn_var, turn_var),
             load.taut,
             0.0,
             reading.age_s,
             0.0,
         )
-        renewed = with_load(state, started, state.resets + 1.0)
-        remember(renewed, history)
-        return renewed
+        renew(history, X_LOAD, reading.x_load)
+        renew(history, Q_CABLE, direction)
+        return with_load(state, started, state.resets + 1.0)
 
-    ka, kb, cov_load = update2(load.covariance, 0, position_var)
-    moved = scale(ka, innovation)
+    ka, kb, cov_load = update2(load.covariance, 1.0, -age, position_var)
+    moved, faster = scale(ka, innovation), scale(kb, innovation)
     x_load = add(load.x_load, moved)
     v_load = axpy(kb, innovation, load.v_load)
 
@@ -111,25 +115,25 @@ def correct_load(
     past_q = normalise((at[0], at[1], at[2]))
     off = tangent(past_q, direction)
     direction_var = (position_var + vehicle.covariance[0]) / (distance * distance)
-    ka, kb, cov_cable = update2(load.cable_covariance, 0, direction_var)
-    turned = scale(ka, off)
+    ka, kb, cov_cable = update2(load.cable_covariance, 1.0, -age, direction_var)
+    turned, turning = scale(ka, off), scale(kb, off)
     q_cable = normalise(add(load.q_cable, turned))
     q_cable_dot = tangent(q_cable, axpy(kb, off, load.q_cable_dot))
     if measured:
         difference = sub(reading.v_load, v_load)
-        ka, kb, cov_load = update2(cov_load, 1, velocity_var)
-        moved = axpy(ka, difference, moved)
+        ka, kb, cov_load = update2(cov_load, 0.0, 1.0, velocity_var)
+        moved, faster = axpy(ka, difference, moved), axpy(kb, difference, faster)
         x_load = axpy(ka, difference, x_load)
         v_load = axpy(kb, difference, v_load)
         rate = tangent(q_cable, scale(1.0 / distance, sub(reading.v_load, vehicle.v_quad)))
         off = sub(rate, q_cable_dot)
         rate_var = (velocity_var + vehicle.covariance[3]) / (distance * distance)
-        ka, kb, cov_cable = update2(cov_cable, 1, rate_var)
-        turned = axpy(ka, off, turned)
+        ka, kb, cov_cable = update2(cov_cable, 0.0, 1.0, rate_var)
+        turned, turning = axpy(ka, off, turned), axpy(kb, off, turning)
         q_cable = normalise(axpy(ka, off, q_cable))
         q_cable_dot = tangent(q_cable, axpy(kb, off, q_cable_dot))
-    shift(state.head, history, since, X_LOAD, moved)
-    shift(state.head, history, since, Q_CABLE, turned)
+    shift(state.head, history, since, X_LOAD, moved, faster)
+    shift(state.head, history, since, Q_CABLE, turned, turning)
     corrected = LoadEstimate(
         x_load,
         v_load,

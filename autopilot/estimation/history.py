@@ -23,7 +23,7 @@ def row_before(head: int, history: History, time_s: float) -> tuple[int, float]:
         if history[earlier, 0] == -float("inf") or history[earlier, 0] > history[row, 0]:
             return row, 0.0
         row = earlier
-    if row == head:
+    if row == head or history[row, 0] > time_s:
         return row, 0.0
     later = (row + 1) % HISTORY_LENGTH
     return row, (time_s - history[row, 0]) / (history[later, 0] - history[row, 0])
@@ -44,27 +44,37 @@ def look_back(head: int, history: History, time_s: float, first: int) -> Quat:
 
 
 @kernel
-def shift(head: int, history: History, since_s: float, first: int, value: Vec3) -> None:
-    """Add `value` to columns first ... first+2 of every row from `since_s` on."""
+def shift(head: int, history: History, since_s: float, first: int, value: Vec3, rate: Vec3) -> None:
+    """Add `value` - tau `rate` to columns first ... first+2 of every row from the one at or before `since_s`
+    on, tau being the row's age: the past of a present that moves by `value` and is faster by `rate`."""
+    now = history[head, 0]
     row = head
     for _ in range(HISTORY_LENGTH - 1):
-        if history[row, 0] < since_s:
-            break
+        tau = now - history[row, 0]
         for i in range(3):
-            history[row, first + i] += value[i]
+            history[row, first + i] += value[i] - tau * rate[i]
         earlier = (row - 1) % HISTORY_LENGTH
-        if history[earlier, 0] > history[row, 0]:
+        if history[row, 0] <= since_s or not -float("inf") < history[earlier, 0] <= history[row, 0]:
             break
         row = earlier
 
 
 @kernel
+def renew(history: History, first: int, value: Vec3) -> None:
+    """Set columns first ... first+2 of every row: all that was thought before a new start is forgotten.
+
+    Else readings older than the start would be held against it, for as long as the tracker's latency.
+    """
+    for row in range(HISTORY_LENGTH):
+        for i in range(3):
+            history[row, first + i] = value[i]
+
+
+@kernel
 def turn(head: int, history: History, since_s: float, turned: Quat) -> None:
-    """Turn the attitude of every row from `since_s` on by `turned` (body frame)."""
+    """Turn the attitude of every row from the one at or before `since_s` on by `turned` (body frame)."""
     row = head
     for _ in range(HISTORY_LENGTH - 1):
-        if history[row, 0] < since_s:
-            break
         quat = quat_multiply(
             (history[row, QUAT], history[row, QUAT + 1], history[row, QUAT + 2], history[row, QUAT + 3]),
             turned,
@@ -72,6 +82,6 @@ def turn(head: int, history: History, since_s: float, turned: Quat) -> None:
         for i in range(4):
             history[row, QUAT + i] = quat[i]
         earlier = (row - 1) % HISTORY_LENGTH
-        if history[earlier, 0] > history[row, 0]:
+        if history[row, 0] <= since_s or not -float("inf") < history[earlier, 0] <= history[row, 0]:
             break
         row = earlier

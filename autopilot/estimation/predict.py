@@ -131,7 +131,7 @@ def predict_load(
     if distance > TAUT_ABOVE * tuning.cable_length:
         taut = 1.0
     elif distance < SLACK_BELOW * tuning.cable_length:
-        taut = 0.0
+        taut, tension = 0.0, 0.0
     return LoadEstimate(
         x_load,
         axpy(dt, accel_load, load.v_load),

@@ -115,7 +115,9 @@ class EstimatorState(NamedTuple):
 
 def new_history() -> History:
     """An empty ring of past states; `predict` writes it in place."""
-    return np.full((HISTORY_LENGTH, HISTORY_COLUMNS), -np.inf)
+    history = np.zeros((HISTORY_LENGTH, HISTORY_COLUMNS))
+    history[:, 0] = -np.inf  # the time: long ago
+    return history
 
 
 def blank_state() -> EstimatorState:

@@ -1,0 +1,164 @@
+"""Legs: each jet is its own derivative, joins do not jump, and what must end at rest does."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from autopilot.geometry.linear import Vec3, norm
+from autopilot.guidance import (
+    LOAD_ATTITUDE,
+    LOAD_POSITION,
+    QUAD_ATTITUDE,
+    QUAD_POSITION,
+    STEEPEST_LEAN,
+    Brake,
+    Calm,
+    Creep,
+    Hold,
+    Leg,
+    Run,
+    Swing,
+    brake_leg,
+    carry_leg,
+    least_move_s,
+    transfer_leg,
+)
+from missions.model import Sine, Term
+from missions.signals import signal_table
+
+HERE, THERE = (1.0, -2.0, 3.0), (2.0, 1.0, 2.5)
+TABLE = signal_table((Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
+BRAKE = Brake(HERE, (1.2, -0.4, 0.1), (-0.5, 0.8, 0.2), 2.4)
+LEGS: dict[str, Leg] = {
+    "hold": Hold(HERE, 5.0),
+    "transfer": transfer_leg(HERE, THERE, 1.5, 1.5, LOAD_POSITION),
+    "brake": BRAKE,
+    "creep": Creep(HERE, (0.0, 0.0, -0.2), QUAD_POSITION),
+    "run": Run(HERE, TABLE, 4.0),
+    "swing": Swing(HERE, 0.1, 0.2, 1.5, QUAD_ATTITUDE),
+    "calm": Calm(HERE, (0.2, 0.1, 0.0), (1.0, -0.5, 0.0), False, 1.2),
+}
+LEAST_S = least_move_s(0.7, 9.81)
+STEP_S = 1e-4
+# central differences over 0.1 ms: second order, against derivatives that grow by up to 1e2 with each order
+DIFFERENCE = 1e-5
+# of the polynomial of degree 15, whose coefficients reach 24024
+ROUNDING = 1e-10
+
+vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
+
+
+@pytest.mark.parametrize("name", LEGS)
+def test_each_jet_holds_its_own_derivatives(name: str) -> None:
+    leg = LEGS[name]
+    for t in (0.15, 0.65, 1.1, 1.9):
+        before, now, after = (np.array(leg.jet(s)) for s in (t - STEP_S, t, t + STEP_S))
+        slope = (after - before) / (2.0 * STEP_S)
+        size = np.abs(now[1:]).max(axis=1) + np.abs(now).max() * 1e-3 + 1.0
+        assert (np.abs(slope[:-1] - now[1:]).max(axis=1) < DIFFERENCE * size).all(), t
+
+
+def test_a_brake_is_the_integral_of_its_fading_velocity() -> None:
+    u, T = sp.Symbol("u"), sp.Rational(12, 5)
+    slope = u**6 * (1 - u) ** 6
+    s = sp.integrate(sp.expand(slope / sp.integrate(slope, (u, 0, 1))), u)
+    for axis in range(3):
+        x0, v0, a0 = (
+            sp.nsimplify(value[axis]) for value in (BRAKE.begin, BRAKE.velocity, BRAKE.acceleration)
+        )
+        velocity = sp.expand((v0 + a0 * T * u) * (1 - s))
+        position = x0 + T * sp.integrate(velocity, u)
+        expressions = [position] + [sp.diff(velocity, u, n) / T**n for n in range(6)]
+        for k in (0, 3, 7, 10):
+            jet = BRAKE.jet(2.4 * k / 10)
+            for n, expression in enumerate(expressions):
+                exact = float(expression.subs(u, sp.Rational(k, 10)))
+                assert jet[n][axis] == pytest.approx(exact, abs=ROUNDING * 10.0**n), (axis, k, n)
+
+
+@given(begin=vectors, velocity=vectors, acceleration=vectors, limit=st.floats(0.2, 5.0))
+def test_a_brake_takes_motion_over_and_ends_it(
+    begin: Vec3, velocity: Vec3, acceleration: Vec3, limit: float
+) -> None:
+    leg = brake_leg(begin, velocity, acceleration, limit, LEAST_S)
+    start = leg.jet(0.0)
+    assert start[0] == begin
+    assert start[1] == pytest.approx(velocity, abs=ROUNDING)
+    assert start[2] == pytest.approx(acceleration, abs=ROUNDING)
+    end = leg.jet(leg.duration_s)
+    assert end[0] == leg.end
+    assert all(derivative == (0.0, 0.0, 0.0) for derivative in end[1:])
+    assert leg.jet(leg.duration_s * (1.0 - 1e-9))[0] == pytest.approx(leg.end, abs=1e-6)
+    assert leg.duration_s >= LEAST_S
+
+
+@given(velocity=vectors, limit=st.floats(0.2, 5.0))
+def test_a_brake_out_of_steady_motion_keeps_to_its_limit_and_never_turns_back(
+    velocity: Vec3, limit: float
+) -> None:
+    leg = brake_leg(HERE, velocity, (0.0, 0.0, 0.0), limit, LEAST_S)
+    along = [leg.jet(leg.duration_s * k / 50) for k in range(51)]
+    assert max(norm(jet[2]) for jet in along) <= limit * (1.0 + 1e-9) or leg.duration_s == LEAST_S
+    for jet in along:
+        for v, v0 in zip(jet[1], velocity, strict=True):
+            assert v * v0 >= -ROUNDING
+
+
+@given(lean=st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)), rate=vectors)
+def test_calming_goes_on_from_the_lean_and_ends_upright(lean: tuple[float, float], rate: Vec3) -> None:
+    leg = Calm(HERE, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), False, 1.2)
+    up = leg.upward(0.0)
+    assert up == pytest.approx((lean[0], lean[1], sqrt(1.0 - lean[0] ** 2 - lean[1] ** 2)))
+    soon = leg.upward(STEP_S)
+    assert (soon[0] - up[0]) / STEP_S == pytest.approx(rate[0], abs=0.01)
+    assert leg.upward(leg.duration_s) == (0.0, 0.0, 1.0)
+    for k in range(20):
+        direction = leg.upward(leg.duration_s * k / 20)
+        assert norm(direction) == pytest.approx(1.0, abs=1e-12)
+        assert sqrt(1.0 - direction[2] ** 2) <= STEEPEST_LEAN + 1e-9
+    assert leg.control_mode == LOAD_ATTITUDE
+
+
+def test_a_swing_leans_where_it_is_told_and_comes_back() -> None:
+    leg = LEGS["swing"]
+    assert isinstance(leg, Swing)
+    assert leg.upward(0.0) == leg.upward(leg.duration_s) == (0.0, 0.0, 1.0)
+    middle = leg.upward(0.75)
+    assert middle[0] > 0.0, "east"
+    assert middle[1] > 0.0, "north"
+
+
+def test_signals_start_where_the_load_hangs() -> None:
+    assert LEGS["run"].jet(0.0)[0] == HERE
+    assert LEGS["run"].jet(0.9)[0][0] == HERE[0]
+    assert LEGS["run"].jet(0.9)[0][1] != HERE[1]
+
+
+def test_a_transfer_keeps_to_its_limits() -> None:
+    leg = transfer_leg(HERE, THERE, 1.5, 0.7, LOAD_POSITION)
+    along = [leg.jet(leg.duration_s * k / 200) for k in range(201)]
+    assert max(norm(jet[1]) for jet in along) <= 1.5 * (1.0 + 1e-9)
+    assert max(norm(jet[2]) for jet in along) == pytest.approx(0.7, rel=1e-3)
+
+
+@given(end=vectors, speed=st.floats(0.1, 5.0), accel=st.floats(0.1, 5.0))
+def test_carrying_is_never_quicker_than_the_pendulum_and_else_as_quick_as_it_may(
+    end: Vec3, speed: float, accel: float
+) -> None:
+    leg = carry_leg((0.0, 0.0, 0.0), end, speed, accel, LEAST_S)
+    bare = transfer_leg((0.0, 0.0, 0.0), end, speed, accel, LOAD_POSITION)
+    if norm(end) == 0.0:
+        assert leg.duration_s == 0.0
+    else:
+        assert leg.duration_s == max(LEAST_S, bare.duration_s)
+
+
+def test_the_least_duration_of_a_move_at_the_cable_of_table_4_1() -> None:
+    assert least_move_s(0.7, 9.81) == pytest.approx(2.0, abs=0.03)
+    assert least_move_s(2.8, 9.81) == pytest.approx(2.0 * least_move_s(0.7, 9.81))

@@ -1,0 +1,134 @@
+"""What outlives the process: missions and parameters come back, and a bad file is said and set aside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from autopilot.services.mission_store import StoredMission
+from autopilot.storage import MISSION_FILE, PARAMETER_FILE, Storage, StorageError
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.convert import Home
+from autopilot.wire.mission_items import encode_steps, located_steps
+from autopilot.wire.parameters import ParameterTable
+from missions.fileformat import load_mission, shipped
+
+HOME = Home()
+
+
+def table() -> ParameterTable:
+    return autopilot_parameters(load_belief("bebop"))
+
+
+def stored(name: str) -> StoredMission:
+    items = encode_steps(load_mission(name).steps, HOME)
+    return StoredMission(items, located_steps(items, HOME))
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_mission_comes_back_as_it_was(tmp_path: Path, name: str) -> None:
+    Storage(tmp_path).keep_mission(stored(name))
+    assert Storage(tmp_path).load_mission(HOME) == (stored(name), "")
+    assert [p.name for p in tmp_path.iterdir()] == [MISSION_FILE], "nothing half written stays"
+
+
+def test_no_mission_and_an_empty_one_are_the_same(tmp_path: Path) -> None:
+    storage = Storage(tmp_path / "new" / "deep")
+    assert storage.load_mission(HOME) == (None, "")
+    storage.keep_mission(stored("hover"))
+    storage.keep_mission(StoredMission())
+    assert storage.load_mission(HOME) == (None, "")
+    storage.keep_mission(StoredMission())
+
+
+@pytest.mark.parametrize("damage", ["cut", "bit", "empty", "other"])
+def test_a_corrupt_mission_is_set_aside_and_said(tmp_path: Path, damage: str) -> None:
+    storage = Storage(tmp_path)
+    storage.keep_mission(stored("hover"))
+    path = tmp_path / MISSION_FILE
+    data = path.read_bytes()
+    bad = {
+        "cut": data[:-7],
+        "bit": data[:20] + bytes([data[20] ^ 4]) + data[21:],
+        "empty": b"",
+        "other": b"x" * 99,
+    }
+    path.write_bytes(bad[damage])
+    mission, trouble = storage.load_mission(HOME)
+    assert mission is None
+    assert str(path) in trouble
+    assert "moved to mission.corrupt" in trouble
+    assert (tmp_path / "mission.corrupt").read_bytes() == bad[damage]
+    assert storage.load_mission(HOME) == (None, ""), "it troubles but once"
+
+
+def test_a_corrupt_mission_that_cannot_be_set_aside_is_said_too(tmp_path: Path) -> None:
+    storage = Storage(tmp_path)
+    (tmp_path / MISSION_FILE).write_bytes(b"rubbish")
+    (tmp_path / "mission.corrupt").mkdir()
+    mission, trouble = storage.load_mission(HOME)
+    assert mission is None
+    assert "starting without a mission" in trouble
+
+
+def test_parameters_come_back_and_only_those_that_were_set(tmp_path: Path) -> None:
+    storage = Storage(tmp_path)
+    storage.keep_parameter("NGC_KX", 5.123456789012345)
+    storage.keep_parameter("MIS_SPEED", 0.7)
+    storage.keep_parameter("NGC_KX", 5.25)
+    again = table()
+    assert Storage(tmp_path).load_parameters(again) == []
+    assert again.changed() == {"NGC_KX": 5.25, "MIS_SPEED": 0.7}
+    assert [p.name for p in tmp_path.iterdir()] == [PARAMETER_FILE]
+
+
+def test_a_parameter_is_stored_beside_those_of_earlier_runs(tmp_path: Path) -> None:
+    Storage(tmp_path).keep_parameter("NGC_KX", 5.0)
+    later = Storage(tmp_path)
+    later.load_parameters(table())
+    later.keep_parameter("NGC_KV", 2.0)
+    again = table()
+    Storage(tmp_path).load_parameters(again)
+    assert again.changed() == {"NGC_KX": 5.0, "NGC_KV": 2.0}
+
+
+def test_what_no_longer_fits_is_left_out_and_said(tmp_path: Path) -> None:
+    (tmp_path / PARAMETER_FILE).write_text("NGC_KX 5.0\nOLD_NAME 1.0\nMIS_SPEED 900\n")
+    again = table()
+    troubles = Storage(tmp_path).load_parameters(again)
+    assert again.changed() == {"NGC_KX": 5.0}
+    assert len(troubles) == 2
+    assert all("left out" in trouble for trouble in troubles)
+    assert any("OLD_NAME" in trouble for trouble in troubles)
+    assert any("MIS_SPEED = 900" in trouble for trouble in troubles)
+
+
+@pytest.mark.parametrize("text", [b"\xff\xfe\x00", b"NGC_KX five\n"])
+def test_a_file_that_is_none_is_said_and_changes_nothing(tmp_path: Path, text: bytes) -> None:
+    (tmp_path / PARAMETER_FILE).write_bytes(text)
+    again = table()
+    troubles = Storage(tmp_path).load_parameters(again)
+    assert len(troubles) == 1
+    assert "starting with the defaults" in troubles[0]
+    assert again.changed() == {}
+
+
+def test_a_directory_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    for bad in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(StorageError, match=r"--storage .*name a directory that can be made") as caught:
+            Storage(bad)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
+    storage = Storage(tmp_path)
+    storage.keep_parameter("NGC_KX", 5.0)
+    (tmp_path / "parameters.new").mkdir()  # as good as a full or read-only disk, also for root
+    with pytest.raises(OSError, match=r"parameters\.new"):
+        storage.keep_parameter("NGC_KX", 7.0)
+    again = table()
+    Storage(tmp_path).load_parameters(again)
+    assert again["NGC_KX"] == 5.0
