@@ -37,7 +37,7 @@ _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _GROUND_RESEND_S = 1.0
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
-_STALE_TICKS = 3  # ticks from the past in a row: the simulator has started again
+_RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
 _LARGEST_DATAGRAM = 65535
 _PR_SET_TIMERSLACK = 29
@@ -233,7 +233,7 @@ class Program:
                     silent = False
                     self._say(f"flying with the simulator at {_shown(self._simulator)}")
                 heard = time.monotonic()
-            elif self.onboard.stale >= _STALE_TICKS:
+            elif self.onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
                 self.onboard = self._build(self.onboard.endpoint.mission)
                 self._ground.join(self.onboard)

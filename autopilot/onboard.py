@@ -39,6 +39,7 @@ from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import WorldParameters
 
 GROUND_WINDOW_US = 20_000
+LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
 
 
 class Onboard:
@@ -61,7 +62,7 @@ class Onboard:
         self._gps: HilGps | None = None
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
-        self.stale = 0  # ticks in a row that lay in the past
+        self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
@@ -78,10 +79,10 @@ class Onboard:
         tick = read_tick(datagram, self._options.home)
         if tick is None:
             return None
-        if tick.now_us < self.now_us:
-            self.stale += 1
+        if tick.now_us < self.now_us or (self.tick >= 0 and tick.now_us > self.now_us + LEAP_US):
+            self.out_of_time += 1
             return None
-        self.stale = 0
+        self.out_of_time = 0
         if tick.now_us == self.now_us and self.tick >= 0:
             return self._answer
         self._run(tick)

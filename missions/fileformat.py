@@ -149,8 +149,8 @@ def _place(location: Sequence[str | int], spec: type[Spec], at: str) -> tuple[st
             owner = owner.nested.get(key, owner)
             key = ""
         else:
-            path += f".{part}" if path else part
-            key = part
+            key = part if part.isprintable() else repr(part)  # a message is one line
+            path += f".{key}" if path else key
     return path, key, owner
 
 
