@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import gc
-import select
 import signal
 import socket
 import struct
@@ -35,7 +34,8 @@ Address = tuple[str, int]
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
 _SILENCE_S = 3.0  # of the simulator, until it is said
-_GROUND_RESEND_S = 1.0
+_GROUND_RESEND_S = 0.5
+_MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
@@ -45,6 +45,33 @@ _PR_SET_TIMERSLACK = 29
 
 class Stop(BaseException):
     """SIGTERM or SIGINT."""
+
+
+class StopRequest:
+    """Notes a signal; the loops look at it where nothing is half done.
+
+    An exception raised by the handler itself could land within a kernel's call, whose machine code is not
+    made for it.
+    """
+
+    asked = False
+
+    def __enter__(self) -> StopRequest:
+        signal.signal(signal.SIGTERM, self._note)
+        signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def _note(self, _signal: int, _frame: object) -> None:
+        self.asked = True
+
+    def check(self) -> None:
+        """Raise Stop if a signal came."""
+        if self.asked:
+            raise Stop
 
 
 class AutopilotError(Exception):
@@ -96,10 +123,10 @@ class GroundStations:
         for link in self._links:
             onboard.add_link(link)
 
-    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None]) -> None:
+    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
         """Hand over what came and send what is due."""
         for i, sock in enumerate(self._sockets):
-            while True:
+            for _ in range(_MOST_AT_ONCE):
                 arrived = _receive(sock, socket.MSG_DONTWAIT)
                 if arrived is None:
                     break
@@ -113,10 +140,6 @@ class GroundStations:
             i, address = link  # type: ignore[misc]
             with suppress(OSError):  # nobody listens there yet, or the network is full: lost
                 self._sockets[i].sendto(datagram, address)  # type: ignore[has-type]
-
-    def wait(self, other: socket.socket, seconds: float) -> None:
-        """Until anything arrives, here or on `other`."""
-        select.select([other, *self._sockets], [], [], seconds)
 
     def close(self) -> None:
         for sock in self._sockets:
@@ -135,7 +158,7 @@ class GroundInStep:
         onboard.add_link(_GROUND_LINK)
         _set_timeout(self._socket, _GROUND_RESEND_S)
 
-    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None]) -> None:
+    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
         """Send what is due; at the end of a window wait for the ground station's word on it."""
         for _, datagram in onboard.ground_datagrams():
             self._send(datagram)
@@ -146,6 +169,7 @@ class GroundInStep:
         stamp = onboard.now_us * 1000
         asked = time.monotonic()
         while True:
+            stop.check()
             arrived = _receive(self._socket)
             if arrived is None:
                 if time.monotonic() - asked > _GROUND_GONE_S:
@@ -162,10 +186,6 @@ class GroundInStep:
     def _send(self, datagram: bytes) -> None:
         with suppress(OSError):
             self._socket.sendto(datagram, self._address)
-
-    def wait(self, other: socket.socket, seconds: float) -> None:
-        """Until something arrives on `other`: the ground station has nothing to say out of turn."""
-        select.select([other], [], [], seconds)
 
     def close(self) -> None:
         self._socket.close()
@@ -201,7 +221,7 @@ class Program:
         self.onboard = build(mission)
         self._ground.join(self.onboard)
 
-    def run(self) -> None:
+    def run(self, stop: StopRequest) -> None:
         """Tick for ever."""
         _set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
@@ -209,6 +229,7 @@ class Program:
         self._say(f"looking for the simulator at {_shown(self._simulator)}")
         self._greet()
         while True:
+            stop.check()
             arrived = _receive(self._socket)
             if arrived is None:
                 now = time.monotonic()
@@ -219,7 +240,7 @@ class Program:
                     self._greet()
                 # the clock stands, but questions are answered
                 if isinstance(self._ground, GroundStations):
-                    self._ground.exchange(self.onboard, self._keep)
+                    self._ground.exchange(self.onboard, self._keep, stop)
                 continue
             datagram, sender = arrived
             if sender != self._simulator:
@@ -228,7 +249,7 @@ class Program:
             answer = self.onboard.receive_sensors(datagram)
             if answer is not None:
                 with suppress(OSError):
-                    self._answer(answer, (self.onboard.now_us, self.onboard.tick) != before)
+                    self._answer(answer, stop, (self.onboard.now_us, self.onboard.tick) != before)
                 if silent:
                     silent = False
                     self._say(f"flying with the simulator at {_shown(self._simulator)}")
@@ -238,15 +259,15 @@ class Program:
                 self.onboard = self._build(self.onboard.endpoint.mission)
                 self._ground.join(self.onboard)
 
-    def _answer(self, answer: bytes, new: bool) -> None:
+    def _answer(self, answer: bytes, stop: StopRequest, new: bool) -> None:
         """Exchange with the ground before the answer where the ground shares our clock, else after it."""
         if isinstance(self._ground, GroundInStep):
             if new:
-                self._ground.exchange(self.onboard, self._keep)
+                self._ground.exchange(self.onboard, self._keep, stop)
             self._socket.sendto(answer, self._simulator)
         else:
             self._socket.sendto(answer, self._simulator)
-            self._ground.exchange(self.onboard, self._keep)
+            self._ground.exchange(self.onboard, self._keep, stop)
         if new and self.onboard.fault and self.onboard.tick == 1:
             raise AutopilotError(self.onboard.fault)
 
@@ -390,8 +411,7 @@ def main(
         if not quiet:
             print(f"autopilot: {text}", flush=True)
 
-    signal.signal(signal.SIGTERM, _stop)
-    signal.signal(signal.SIGINT, _stop)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop runs, there is nothing to bring to an end
     program: Program | None = None
     place = home or Home()
     in_step = ground_lockstep is not None
@@ -416,7 +436,8 @@ def main(
         program = Program(build, mission, kept, sim, ground, say)
         program.onboard.rehearse()
         _prepare_process()
-        program.run()
+        with StopRequest() as stop:
+            program.run(stop)
     except (AutopilotError, BeliefError, ParameterError, StorageError) as error:
         print(f"autopilot: {error}", file=sys.stderr)
         sys.exit(1)
@@ -427,12 +448,6 @@ def main(
             program.close()
     if program is not None:
         say(f"stopped at t = {program.onboard.now_us / 1e6:.3f} s")
-
-
-def _stop(_signal: int, _frame: object) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    raise Stop
 
 
 if __name__ == "__main__":

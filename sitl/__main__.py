@@ -25,6 +25,7 @@ Address = tuple[str, int]
 
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 1.0
+_LOOK_S = 0.2  # between two looks at a request to stop, while nothing comes
 _LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
 _SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
 _STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
@@ -34,6 +35,33 @@ _LARGEST_DATAGRAM = 65535
 
 class Stop(BaseException):
     """SIGTERM or SIGINT."""
+
+
+class StopRequest:
+    """Notes a signal; the loops look at it where nothing is half done.
+
+    An exception raised by the handler itself could land within a kernel's call, whose machine code is not
+    made for it.
+    """
+
+    asked = False
+
+    def __enter__(self) -> StopRequest:
+        signal.signal(signal.SIGTERM, self._note)
+        signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def _note(self, _signal: int, _frame: object) -> None:
+        self.asked = True
+
+    def check(self) -> None:
+        """Raise Stop if a signal came."""
+        if self.asked:
+            raise Stop
 
 
 class Link:
@@ -127,26 +155,29 @@ class Watch:
             )
 
 
-def meet(link: Link, simulator: HilSimulator, say: Callable[[str], None]) -> None:
+def meet(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[str], None]) -> None:
     """Wait until an autopilot speaks."""
-    link.timeout(0.0)
+    link.timeout(_LOOK_S)
     while link.peer is None:
+        stop.check()
         arrived = link.receive()
         if arrived:
             link.take(*arrived, simulator)
     say(f"serving the autopilot at {_shown(link.peer)}")
 
 
-def run_lockstep(link: Link, simulator: HilSimulator, say: Callable[[str], None]) -> None:
+def run_lockstep(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[str], None]) -> None:
     """Tick for ever, each tick as soon as the one before is answered."""
     watch = Watch(say)
     while True:
+        stop.check()
         link.send_truth(simulator)
         link.send(simulator)
         began = sent = time.monotonic()
         silence_s = _RESEND_FIRST_S
         link.timeout(silence_s)
         while not simulator.answered:
+            stop.check()
             arrived = link.receive()
             greeted = arrived is not None and link.take(*arrived, simulator)
             if simulator.answered:
@@ -164,7 +195,12 @@ def run_lockstep(link: Link, simulator: HilSimulator, say: Callable[[str], None]
 
 
 def run_real_time(
-    link: Link, simulator: HilSimulator, speed: float, pacing: Pacing, say: Callable[[str], None]
+    link: Link,
+    simulator: HilSimulator,
+    speed: float,
+    pacing: Pacing,
+    stop: StopRequest,
+    say: Callable[[str], None],
 ) -> None:
     """Tick for ever on an absolute schedule; a command that comes too late is missed, and counted."""
     watch = Watch(say)
@@ -174,6 +210,7 @@ def run_real_time(
     start = time.perf_counter_ns()
     tick = 0
     while True:
+        stop.check()
         due = start + round(tick * period_ns)
         now = _sleep_until(due)
         link.send(simulator)
@@ -341,8 +378,7 @@ def main(
         if not quiet:
             print(f"sitl: {text}", flush=True)
 
-    signal.signal(signal.SIGTERM, _stop)
-    signal.signal(signal.SIGINT, _stop)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to bring to an end
     link: Link | None = None
     factor = 1.0 if speed is None else speed
     pacing = Pacing(factor)
@@ -364,12 +400,13 @@ def main(
             f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
             f"waiting for an autopilot on {_shown(listen)}"
         )
-        meet(link, simulator, say)
-        began = time.monotonic()
-        if lockstep:
-            run_lockstep(link, simulator, say)
-        else:
-            run_real_time(link, simulator, factor, pacing, say)
+        with StopRequest() as stop:
+            meet(link, simulator, stop, say)
+            began = time.monotonic()
+            if lockstep:
+                run_lockstep(link, simulator, stop, say)
+            else:
+                run_real_time(link, simulator, factor, pacing, stop, say)
     except ValueError as error:
         print(f"sitl: {error}", file=sys.stderr)
         sys.exit(1)
@@ -380,12 +417,6 @@ def main(
             link.close()
     if simulator is not None:
         say(_summary(simulator, lockstep, pacing, time.monotonic() - began))
-
-
-def _stop(_signal: int, _frame: object) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    raise Stop
 
 
 def _summary(simulator: HilSimulator, lockstep: bool, pacing: Pacing, wall_s: float) -> str:
