@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
-import gc
 import signal
 import socket
-import struct
 import sys
 import time
 from collections.abc import Callable
@@ -25,11 +22,23 @@ from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import BeliefError, load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import Home, home_from_text
+from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterError, ParameterTable
-
-Address = tuple[str, int]
+from autopilot.wire.shell import (
+    Address,
+    Stop,
+    StopRequest,
+    address_option,
+    be_punctual,
+    datagram_socket,
+    home_option,
+    reason,
+    receive,
+    set_timeout,
+    setting_option,
+    shown,
+)
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
@@ -39,68 +48,19 @@ _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a f
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
-_LARGEST_DATAGRAM = 65535
-_PR_SET_TIMERSLACK = 29
-
-
-class Stop(BaseException):
-    """SIGTERM or SIGINT."""
-
-
-class StopRequest:
-    """Notes a signal; the loops look at it where nothing is half done.
-
-    An exception raised by the handler itself could land within a kernel's call, whose machine code is not
-    made for it.
-    """
-
-    asked = False
-
-    def __enter__(self) -> StopRequest:
-        signal.signal(signal.SIGTERM, self._note)
-        signal.signal(signal.SIGINT, self._note)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def _note(self, _signal: int, _frame: object) -> None:
-        self.asked = True
-
-    def check(self) -> None:
-        """Raise Stop if a signal came."""
-        if self.asked:
-            raise Stop
 
 
 class AutopilotError(Exception):
     """What ends the program with one line."""
 
 
-def _receive(sock: socket.socket, flags: int = 0) -> tuple[bytes, Address] | None:
-    """The next datagram and its sender; None after the socket's timeout, or if one of ours found nobody."""
-    try:
-        return sock.recvfrom(_LARGEST_DATAGRAM, flags)
-    except OSError:
-        return None
-
-
-def _set_timeout(sock: socket.socket, seconds: float) -> None:
-    """By SO_RCVTIMEO, which costs nothing per datagram."""
-    whole = int(seconds)
-    value = struct.pack("ll", whole, round((seconds - whole) * 1e6))
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
-
-
 def _open(address: Address, what: str) -> socket.socket:
     try:
-        family = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0][0]
-        sock = socket.socket(family, socket.SOCK_DGRAM)
+        sock = datagram_socket(address)
         # no traffic but to where we are pointed, and answers to it
         sock.bind(("127.0.0.1" if _is_loopback(address[0]) else "", 0))
     except OSError as error:
-        raise AutopilotError(f"{what} {address[0]}:{address[1]}: {error.strerror or error}") from None
+        raise AutopilotError(f"{what} {shown(address)}: {reason(error)}") from None
     return sock
 
 
@@ -127,7 +87,7 @@ class GroundStations:
         """Hand over what came and send what is due."""
         for i, sock in enumerate(self._sockets):
             for _ in range(_MOST_AT_ONCE):
-                arrived = _receive(sock, socket.MSG_DONTWAIT)
+                arrived = receive(sock, socket.MSG_DONTWAIT)
                 if arrived is None:
                     break
                 datagram, sender = arrived
@@ -156,7 +116,7 @@ class GroundInStep:
     def join(self, onboard: Onboard) -> None:
         """Serve the link from now on."""
         onboard.add_link(_GROUND_LINK)
-        _set_timeout(self._socket, _GROUND_RESEND_S)
+        set_timeout(self._socket, _GROUND_RESEND_S)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
         """Send what is due; at the end of a window wait for the ground station's word on it."""
@@ -170,7 +130,7 @@ class GroundInStep:
         asked = time.monotonic()
         while True:
             stop.check()
-            arrived = _receive(self._socket)
+            arrived = receive(self._socket)
             if arrived is None:
                 if time.monotonic() - asked > _GROUND_GONE_S:
                     raise AutopilotError(f"the ground station was silent for {_GROUND_GONE_S:g} s; stopping")
@@ -223,14 +183,14 @@ class Program:
 
     def run(self, stop: StopRequest) -> None:
         """Tick for ever."""
-        _set_timeout(self._socket, _GREETING_S)
+        set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
         silent = True
-        self._say(f"looking for the simulator at {_shown(self._simulator)}")
+        self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         while True:
             stop.check()
-            arrived = _receive(self._socket)
+            arrived = receive(self._socket)
             if arrived is None:
                 now = time.monotonic()
                 if not silent and now - heard > _SILENCE_S:
@@ -252,7 +212,7 @@ class Program:
                     self._answer(answer, stop, (self.onboard.now_us, self.onboard.tick) != before)
                 if silent:
                     silent = False
-                    self._say(f"flying with the simulator at {_shown(self._simulator)}")
+                    self._say(f"flying with the simulator at {shown(self._simulator)}")
                 heard = time.monotonic()
             elif self.onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
@@ -293,46 +253,9 @@ class Program:
         self._ground.close()
 
 
-def _shown(address: Address) -> str:
-    return f"{address[0]}:{address[1]}"
-
-
-def _prepare_process() -> None:
-    """What the operating system may do for punctuality; none of it is needed."""
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    gc.collect()
-    gc.freeze()
-
-
-def _address(text: str) -> Address:
-    """HOST:PORT."""
-    host, _, port = text.rpartition(":")
-    if not (host and port.isdecimal() and 0 < int(port) < 65536):
-        raise click.BadParameter(f"{text!r}; must be HOST:PORT with a port of 1 ... 65535")
-    return host.strip("[]"), int(port)
-
-
 def _address_or_none(text: str) -> Address | None:
     """HOST:PORT or `none`."""
-    return None if text == "none" else _address(text)
-
-
-def _home(text: str) -> Home:
-    """LAT,LON,ALT."""
-    try:
-        return home_from_text(text)
-    except ValueError as error:
-        raise click.BadParameter(str(error)) from None
-
-
-def _setting(text: str) -> tuple[str, float]:
-    """NAME=VALUE."""
-    name, _, value = text.partition("=")
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
+    return None if text == "none" else address_option(text)
 
 
 def _apply(table: ParameterTable, settings: tuple[tuple[str, float], ...]) -> None:
@@ -345,7 +268,7 @@ def _apply(table: ParameterTable, settings: tuple[tuple[str, float], ...]) -> No
 @click.command()
 @click.option(
     "--sim",
-    type=_address,
+    type=address_option,
     metavar="HOST:PORT",
     default="127.0.0.1:4560",
     show_default=True,
@@ -370,7 +293,7 @@ def _apply(table: ParameterTable, settings: tuple[tuple[str, float], ...]) -> No
 )
 @click.option(
     "--ground-lockstep",
-    type=_address,
+    type=address_option,
     metavar="HOST:PORT",
     help="One ground station that shares our clock, in place of --gcs and --api.",
 )
@@ -380,12 +303,12 @@ def _apply(table: ParameterTable, settings: tuple[tuple[str, float], ...]) -> No
 @click.option(
     "--set",
     "settings",
-    type=_setting,
+    type=setting_option,
     metavar="NAME=VALUE",
     multiple=True,
     help="Set a parameter; repeatable. SIM_ parameters of the simulator are passed over.",
 )
-@click.option("--home", type=_home, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(
     "--storage",
     type=click.Path(file_okay=False, path_type=Path),
@@ -435,7 +358,7 @@ def main(
         ground = GroundInStep(ground_lockstep) if ground_lockstep else GroundStations(tuple(stations))
         program = Program(build, mission, kept, sim, ground, say)
         program.onboard.rehearse()
-        _prepare_process()
+        be_punctual()
         with StopRequest() as stop:
             program.run(stop)
     except (AutopilotError, BeliefError, ParameterError, StorageError) as error:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes
 import errno
-import gc
 import os
 import select
 import signal
 import socket
-import struct
 import sys
 import time
 from collections.abc import Callable
@@ -17,11 +14,23 @@ from contextlib import suppress
 
 import click
 
-from autopilot.wire.convert import Home, home_from_text
+from autopilot.wire.convert import Home
+from autopilot.wire.shell import (
+    Address,
+    Stop,
+    StopRequest,
+    address_option,
+    be_punctual,
+    datagram_socket,
+    home_option,
+    reason,
+    receive,
+    set_timeout,
+    setting_option,
+    shown,
+)
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing
-
-Address = tuple[str, int]
 
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 1.0
@@ -29,39 +38,6 @@ _LOOK_S = 0.2  # between two looks at a request to stop, while nothing comes
 _LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
 _SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
 _STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
-_PR_SET_TIMERSLACK = 29
-_LARGEST_DATAGRAM = 65535
-
-
-class Stop(BaseException):
-    """SIGTERM or SIGINT."""
-
-
-class StopRequest:
-    """Notes a signal; the loops look at it where nothing is half done.
-
-    An exception raised by the handler itself could land within a kernel's call, whose machine code is not
-    made for it.
-    """
-
-    asked = False
-
-    def __enter__(self) -> StopRequest:
-        signal.signal(signal.SIGTERM, self._note)
-        signal.signal(signal.SIGINT, self._note)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def _note(self, _signal: int, _frame: object) -> None:
-        self.asked = True
-
-    def check(self) -> None:
-        """Raise Stop if a signal came."""
-        if self.asked:
-            raise Stop
 
 
 class Link:
@@ -69,18 +45,18 @@ class Link:
 
     def __init__(self, listen: Address, truth: Address) -> None:
         try:
-            self._socket = _datagram_socket(listen)
+            self._socket = datagram_socket(listen)
             self._socket.bind(listen)
         except OSError as error:
             busy = "is another sitl running? " if error.errno == errno.EADDRINUSE else ""
             raise ValueError(
-                f"cannot listen on {_shown(listen)}: {_reason(error)}; {busy}choose another with --listen"
+                f"cannot listen on {shown(listen)}: {reason(error)}; {busy}choose another with --listen"
             ) from None
         try:
-            self._truth_socket = _datagram_socket(truth)
+            self._truth_socket = datagram_socket(truth)
         except OSError as error:
             raise ValueError(
-                f"cannot send truth to {_shown(truth)}: {_reason(error)}; choose another with --truth"
+                f"cannot send truth to {shown(truth)}: {reason(error)}; choose another with --truth"
             ) from None
         self._truth = truth
         self._timeout_s = 0.0
@@ -93,9 +69,7 @@ class Link:
     def timeout(self, seconds: float) -> None:
         """How long `receive` waits; 0: for ever. By SO_RCVTIMEO, which costs nothing per datagram."""
         if seconds != self._timeout_s:
-            whole = int(seconds)
-            value = struct.pack("ll", whole, round((seconds - whole) * 1e6))
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
+            set_timeout(self._socket, seconds)
             self._timeout_s = seconds
 
     def wait(self, seconds: float) -> None:
@@ -104,10 +78,7 @@ class Link:
 
     def receive(self, flags: int = 0) -> tuple[bytes, Address] | None:
         """The next datagram and its sender, None after the timeout."""
-        try:
-            return self._socket.recvfrom(_LARGEST_DATAGRAM, flags)
-        except OSError:  # nothing came, or a datagram of ours found no listener: the same to us
-            return None
+        return receive(self._socket, flags)
 
     def send(self, simulator: HilSimulator) -> None:
         """The sensors of the present tick to the autopilot. What cannot be sent counts as lost on the way."""
@@ -143,14 +114,14 @@ class Watch:
         """An answer came."""
         if self._lost:
             self._lost = False
-            self._say(f"autopilot at {_shown(link.peer)} answers again")
+            self._say(f"autopilot at {shown(link.peer)} answers again")
 
     def silence(self, since: float, link: Link, simulator: HilSimulator) -> None:
         """No answer since that time of the monotonic clock."""
         if not self._lost and time.monotonic() - since > _LOST_S:
             self._lost = True
             self._say(
-                f"no answer from the autopilot at {_shown(link.peer)} for {_LOST_S:g} s "
+                f"no answer from the autopilot at {shown(link.peer)} for {_LOST_S:g} s "
                 f"(t = {simulator.now_us / 1e6:.3f} s); waiting for it"
             )
 
@@ -163,7 +134,7 @@ def meet(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[
         arrived = link.receive()
         if arrived:
             link.take(*arrived, simulator)
-    say(f"serving the autopilot at {_shown(link.peer)}")
+    say(f"serving the autopilot at {shown(link.peer)}")
 
 
 def run_lockstep(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[str], None]) -> None:
@@ -254,55 +225,11 @@ def _sleep_until(due_ns: int) -> int:
             return now
 
 
-def _datagram_socket(address: Address) -> socket.socket:
-    family = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0][0]
-    return socket.socket(family, socket.SOCK_DGRAM)
-
-
-def _reason(error: OSError) -> str:
-    return error.strerror.lower() if error.strerror else str(error)
-
-
-def _shown(address: Address | None) -> str:
-    return f"{address[0]}:{address[1]}" if address else "nowhere"
-
-
-def _prepare_process(cpu: int | None) -> None:
-    """What the operating system may do for punctuality; none of it is needed."""
-    if cpu is not None:
-        try:
-            os.sched_setaffinity(0, {cpu})
-        except (AttributeError, OSError):
-            raise ValueError(f"cannot run on core {cpu}; leave --cpu out, or name another core") from None
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    gc.collect()
-    gc.freeze()
-
-
-def _address(text: str) -> Address:
-    """HOST:PORT."""
-    host, _, port = text.rpartition(":")
-    if not (host and port.isdecimal() and 0 < int(port) < 65536):
-        raise click.BadParameter(f"{text!r}; must be HOST:PORT with a port of 1 ... 65535")
-    return host.strip("[]"), int(port)
-
-
-def _home(text: str) -> Home:
-    """LAT,LON,ALT."""
+def _run_on(cpu: int) -> None:
     try:
-        return home_from_text(text)
-    except ValueError as error:
-        raise click.BadParameter(str(error)) from None
-
-
-def _setting(text: str) -> tuple[str, float]:
-    """NAME=VALUE."""
-    name, _, value = text.partition("=")
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
+        os.sched_setaffinity(0, {cpu})
+    except (AttributeError, OSError):
+        raise ValueError(f"cannot run on core {cpu}; leave --cpu out, or name another core") from None
 
 
 @click.command()
@@ -319,7 +246,7 @@ def _setting(text: str) -> tuple[str, float]:
 )
 @click.option(
     "--listen",
-    type=_address,
+    type=address_option,
     metavar="HOST:PORT",
     default="127.0.0.1:4560",
     show_default=True,
@@ -327,7 +254,7 @@ def _setting(text: str) -> tuple[str, float]:
 )
 @click.option(
     "--truth",
-    type=_address,
+    type=address_option,
     metavar="HOST:PORT",
     default="127.0.0.1:14560",
     show_default=True,
@@ -344,12 +271,12 @@ def _setting(text: str) -> tuple[str, float]:
 @click.option(
     "--set",
     "settings",
-    type=_setting,
+    type=setting_option,
     metavar="NAME=VALUE",
     multiple=True,
     help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are passed over.",
 )
-@click.option("--home", type=_home, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option("--cpu", type=click.IntRange(0), metavar="N", help="Run on this processor core only.")
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 @click.version_option(package_name="plumbline", message="sitl (Plumbline) %(version)s")
@@ -394,11 +321,13 @@ def main(
         warm.truth_datagram()
         warm.advance()
         simulator = build()
-        _prepare_process(cpu)
+        if cpu is not None:
+            _run_on(cpu)
+        be_punctual()
         mode = "in lockstep" if lockstep else f"at {factor:g} x real time"
         say(
             f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
-            f"waiting for an autopilot on {_shown(listen)}"
+            f"waiting for an autopilot on {shown(listen)}"
         )
         with StopRequest() as stop:
             meet(link, simulator, stop, say)

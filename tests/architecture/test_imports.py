@@ -52,6 +52,7 @@ WORLD = {"socket", "selectors", "time", "random", "logging", "threading", "async
 SHELLS = (
     "autopilot.__main__",
     "sitl.__main__",
+    "autopilot.wire.shell",  # what these two have in common
     "gcs.__main__",
     "gcs.commands",
     "gcs.display",

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from gcs.link import LOOPBACK, free_port
+
 if TYPE_CHECKING:
     from conftest import Program
 
@@ -17,26 +19,23 @@ pytestmark = pytest.mark.processes
 Start = Callable[..., "Program"]
 Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
 
-SIM = "127.0.0.1:24560"
-GROUND = "127.0.0.1:24550"
-API = "127.0.0.1:24540"
-
-
-def autopilot(start: Start, storage: Path) -> Program:
-    return start("autopilot", "--sim", SIM, "--gcs", GROUND, "--api", API, "--storage", str(storage))
-
 
 def test_mission_and_parameters_outlive_a_killed_autopilot(start: Start, gcs: Gcs, tmp_path: Path) -> None:
     """As by kill -9 in the middle of a mission."""
-    storage = tmp_path / "storage"
-    start("sitl", "--listen", SIM, "--truth", "127.0.0.1:24561", "--speed", "2", "--sensors", "ideal")
-    first = autopilot(start, storage)
-    connect = ("--connect", GROUND)
+    sim, truth, ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
+    storage = str(tmp_path / "storage")
+
+    def autopilot() -> Program:
+        return start("autopilot", "--sim", sim, "--gcs", ground, "--api", "none", "--storage", storage)
+
+    start("sitl", "--listen", sim, "--truth", truth, "--sensors", "ideal")
+    first = autopilot()
+    connect = ("--connect", ground)
     for command in (
         ("upload", "square"),
         ("param", "set", "NGC_KX", "6.5"),
-        ("arm",),
         ("start",),
+        ("arm",),
     ):
         done = gcs(*command, *connect)
         assert done.returncode == 0, f"{command}: {done.stderr}"
@@ -45,7 +44,7 @@ def test_mission_and_parameters_outlive_a_killed_autopilot(start: Start, gcs: Gc
     assert status["armed"] is True
     first.kill()
 
-    autopilot(start, storage)
+    autopilot()
     value = gcs("param", "get", "NGC_KX", *connect)
     assert value.returncode == 0, value.stderr
     assert "6.5" in value.stdout

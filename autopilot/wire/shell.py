@@ -1,0 +1,114 @@
+"""What the shells of `sitl` and `autopilot` have in common: how they stop, wait, and read their options."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import signal
+import socket
+import struct
+from contextlib import suppress
+
+import click
+
+from autopilot.wire.convert import Home, home_from_text
+
+Address = tuple[str, int]
+
+LARGEST_DATAGRAM = 65535
+_PR_SET_TIMERSLACK = 29
+
+
+class Stop(BaseException):
+    """SIGTERM or SIGINT."""
+
+
+class StopRequest:
+    """Notes a signal; the loops look at it where nothing is half done.
+
+    An exception raised by the handler itself could land within a kernel's call, whose machine code is not
+    made for it.
+    """
+
+    asked = False
+
+    def __enter__(self) -> StopRequest:
+        signal.signal(signal.SIGTERM, self._note)
+        signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def _note(self, _signal: int, _frame: object) -> None:
+        self.asked = True
+
+    def check(self) -> None:
+        """Raise Stop if a signal came."""
+        if self.asked:
+            raise Stop
+
+
+def set_timeout(sock: socket.socket, seconds: float) -> None:
+    """How long a receive waits; 0: for ever. By SO_RCVTIMEO, which costs nothing per datagram."""
+    whole = int(seconds)
+    value = struct.pack("ll", whole, round((seconds - whole) * 1e6))
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
+
+
+def receive(sock: socket.socket, flags: int = 0) -> tuple[bytes, Address] | None:
+    """The next datagram and its sender; None after the timeout, or if one of ours found no listener."""
+    try:
+        return sock.recvfrom(LARGEST_DATAGRAM, flags)
+    except OSError:
+        return None
+
+
+def datagram_socket(address: Address) -> socket.socket:
+    """A UDP socket of the family of `address`."""
+    family = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0][0]
+    return socket.socket(family, socket.SOCK_DGRAM)
+
+
+def reason(error: OSError) -> str:
+    """What the system says of an error, in words."""
+    return error.strerror.lower() if error.strerror else str(error)
+
+
+def shown(address: Address | None) -> str:
+    """An address for a person."""
+    return f"{address[0]}:{address[1]}" if address else "nowhere"
+
+
+def be_punctual() -> None:
+    """Ask the system and the interpreter for short delays; none of it is needed."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    gc.collect()
+    gc.freeze()
+
+
+def address_option(text: str) -> Address:
+    """HOST:PORT."""
+    host, _, port = text.rpartition(":")
+    if not (host and port.isdecimal() and 0 < int(port) < 65536):
+        raise click.BadParameter(f"{text!r}; must be HOST:PORT with a port of 1 ... 65535")
+    return host.strip("[]"), int(port)
+
+
+def home_option(text: str) -> Home:
+    """LAT,LON,ALT."""
+    try:
+        return home_from_text(text)
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from None
+
+
+def setting_option(text: str) -> tuple[str, float]:
+    """NAME=VALUE."""
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
