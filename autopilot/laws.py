@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from autopilot.control import lqr, quad_position, thesis
+from autopilot.control import lqr, plumbline, quad_position, thesis
+from autopilot.control.command_filter import FilterConstants, filter_constants
+from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
-from autopilot.geometry.linear import Mat3, Vec3, axpy
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, axpy
+from autopilot.rotor_lag import LagConstants, Rotating, hasten, lag_constants
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.parameters import ParameterTable
 
@@ -162,9 +165,94 @@ class LqrLaw(NamedTuple):
         return self.other_modes.quad_position(memory, state, reference)
 
 
+class PlumblineMemory(NamedTuple):
+    """What the law remembers: of load position, of the other modes, and of the rotors."""
+
+    position: plumbline.PlumblineMemory
+    other_modes: Memory
+    rotors: Rotating
+
+
+class PlumblineLaw(NamedTuple):
+    """Load position with exact derivatives and rotors hastened by their believed lag.
+
+    The other modes, which are flown for moments only, are the loops of the thesis's cascade with its
+    parameters.
+    """
+
+    gains: plumbline.PlumblineGains
+    force_filter: FilterConstants
+    drag: Drag
+    lag: LagConstants
+    limited: float
+    vehicle: Vehicle
+    other_modes: ThesisLaw
+
+    @classmethod
+    def build(cls, table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
+        """Gains, filter, drag and lag from the PLB_ parameters, the other modes from NGC_ and QP_."""
+        gains = plumbline.PlumblineGains(
+            k_R=_diagonal(table["PLB_KR"]),
+            k_Omega=_diagonal(table["PLB_KOMEGA"]),
+            k_q=table["PLB_KQ"],
+            k_omega=table["PLB_KW"],
+            k_x=_diagonal(table["PLB_KX"]),
+            k_v=_diagonal(table["PLB_KV"]),
+        )
+        period = 1.0 / table["CTL_RATE_HZ"]
+        force_filter = filter_constants(table["PLB_WN_F"], plumbline.ZETA, period)
+        drag = Drag(table["PLB_DRAG"], table["PLB_DRAG_2"])
+        lag = lag_constants(1e-3 * table["PLB_LAG_MS"], 1e-3 * table["PLB_LAG_TO_MS"], period)
+        other_modes = ThesisLaw.build(table, vehicle)
+        return cls(gains, force_filter, drag, lag, table["VEH_ROTOR_LIM"], vehicle, other_modes)
+
+    @property
+    def ramp_lag_s(self) -> float:
+        # the reference's velocity is fed forward: nothing is left behind on a ramp
+        return 0.0
+
+    def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
+        hover = (self.vehicle.quad_mass + self.vehicle.load_mass) * self.vehicle.gravity
+        return PlumblineMemory(
+            plumbline.start(), self.other_modes.start(state, x_d, v_d), Rotating(hover, ZERO)
+        )
+
+    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
+        other, command = self.other_modes.quad_attitude(memory.other_modes, state, R_d, thrust)
+        return memory._replace(other_modes=other), command
+
+    def load_attitude(
+        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+    ) -> tuple[Memory, Command]:
+        other, command = self.other_modes.load_attitude(memory.other_modes, state, q_d, b1_d, pull)
+        return memory._replace(other_modes=other), command
+
+    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        position, wanted = plumbline.load_position(
+            memory.position,
+            state,
+            reference,
+            memory.rotors.thrust,
+            self.gains,
+            self.force_filter,
+            self.drag,
+            self.vehicle,
+        )
+        rotors, thrust, moment = hasten(
+            memory.rotors, wanted.thrust, wanted.moment, self.lag, self.vehicle, self.limited
+        )
+        command = wanted._replace(thrust=thrust, moment=moment)
+        return PlumblineMemory(position, memory.other_modes, rotors), command
+
+    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+        other, command = self.other_modes.quad_position(memory.other_modes, state, reference)
+        return memory._replace(other_modes=other), command
+
+
 _BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {
     "thesis": ThesisLaw.build,
     "lqr": LqrLaw.build,
+    "plumbline": PlumblineLaw.build,
 }
 
 

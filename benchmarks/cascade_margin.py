@@ -1,4 +1,4 @@
-"""How much gain and delay the thesis's cascade can lose: margins against rotor lag, control rate and delay.
+"""How much gain and delay a cascade can lose: margins against rotor lag, control rate and delay.
 
 The loop is linearised numerically about hover: the vehicle from (2-30)-(2-35) with first-order rotors, the
 laws from the very functions that fly, filters and all, sampled with a zero-order hold of the commands. The
@@ -11,7 +11,10 @@ circle, all commands delayed alike.
 `delay` is all that passes between a motion and the command that answers it, besides the hold: sensor latency,
 computation, transport.
 
-    python benchmarks/cascade_margin.py [--loop attitude|position|vehicle] [--set k_R=0.45 ...]
+The law `plumbline` knows the rotors' lag, unless told otherwise by `believed_tau`; its force filter is
+`omega_force`, the lag it makes the rotors show `wanted_tau`.
+
+    python benchmarks/cascade_margin.py [--loop attitude|position|vehicle|plumbline] [--set k_R=0.45 ...]
 """
 
 from __future__ import annotations
@@ -27,10 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
-from autopilot.control import thesis
-from autopilot.control.command_filter import FilterState
+from autopilot.control import plumbline, thesis
+from autopilot.control.command_filter import FilterState, filter_constants
+from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Reference, State, Vehicle
+from autopilot.rotor_lag import Rotating, hasten, lag_constants
 
 Array = NDArray[np.float64]
 
@@ -41,8 +46,19 @@ HOVER = 0.25 * (BEBOP.quad_mass + BEBOP.load_mass) * BEBOP.gravity  # N, each ro
 HEADING = (1.0, 0.0, 0.0)
 # central differences: truncation and rounding both below 1e-9
 STEP = 1e-5
-# the innermost loop, the load position cascade, the vehicle position law with the load hanging
-LOOPS = ("attitude", "position", "vehicle")
+# the innermost loop, the load position cascade, the vehicle position law with the load hanging, and the load
+# position of the law `plumbline`
+LOOPS = ("attitude", "position", "vehicle", "plumbline")
+WANTED_TAU = 0.010  # s, PLB_LAG_TO_MS
+FILTERS = (
+    "omega_attitude",
+    "omega_direction",
+    "omega_reference",
+    "zeta",
+    "omega_force",
+    "believed_tau",
+    "wanted_tau",
+)
 GREATEST_DELAY = 0.2  # s; more is reported as this
 GREATEST_GAIN = 101.0
 LOST = 1.0 + 1e-9  # spectral radius
@@ -178,10 +194,59 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     return tick
 
 
+def plumbline_law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
+    """As `law`; its memory is the force filter, the thrust's rate, and what the rotors give."""
+    options = {
+        "omega_force": plumbline.OMEGA_FORCE,
+        "believed_tau": settings.rotor_tau,
+        "wanted_tau": WANTED_TAU,
+        **settings.filters,
+    }
+    gains = plumbline.PlumblineGains(
+        **{n: getattr(settings.gains, n) for n in plumbline.PlumblineGains._fields}
+    )
+    force_filter = filter_constants(options["omega_force"], plumbline.ZETA, settings.period)
+    lag = lag_constants(options["believed_tau"], options["wanted_tau"], settings.period)
+    reference = Reference((ZERO,) * 7, HEADING)
+
+    def tick(numbers: Array) -> Array:
+        state = state_at(numbers[-MOTION:], vehicle)
+        filtered = FilterState(_vec(numbers[0:3]), _vec(numbers[3:6]), _vec(numbers[6:9]))
+        rotors = Rotating(float(numbers[10]), _vec(numbers[11:14]))
+        memory, wanted = plumbline.load_position(
+            plumbline.PlumblineMemory(filtered, float(numbers[9]), 1.0),
+            state,
+            reference,
+            rotors.thrust,
+            gains,
+            force_filter,
+            Drag(0.0, 0.0),
+            vehicle,
+        )
+        after, thrust, moment = hasten(rotors, wanted.thrust, wanted.moment, lag, vehicle, 0.0)
+        return np.array(
+            [
+                *(number for vector in memory.force for number in vector),
+                memory.thrust_rate,
+                after.thrust,
+                *after.moment,
+                thrust,
+                *moment,
+            ]
+        )
+
+    return tick
+
+
 def linearised_law(settings: Settings, vehicle: Vehicle) -> tuple[Array, Array, Array, Array]:
     """(A, B, C, D) of the law at hover: memory, motion in; memory, (f, M) out."""
-    tick = law(settings, vehicle)
-    hover = _flat(thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO))
+    if settings.loop == "plumbline":
+        tick = plumbline_law(settings, vehicle)
+        hover = np.zeros(14)
+        hover[10] = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    else:
+        tick = law(settings, vehicle)
+        hover = _flat(thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO))
     n = len(hover)
     at = np.concatenate([hover, np.zeros(MOTION)])
     jacobian = np.empty((n + 4, n + MOTION))
@@ -365,12 +430,11 @@ def parsed(pairs: Iterable[str]) -> tuple[thesis.ThesisGains, dict[str, float]]:
         if name in thesis.ThesisGains._fields:
             is_vector = isinstance(getattr(thesis.THESIS_GAINS, name), tuple)
             gains[name] = (value,) * 3 if is_vector else value
-        elif name in ("omega_attitude", "omega_direction", "omega_reference", "zeta"):
+        elif name in FILTERS:
             filters[name] = value
         else:
             raise SystemExit(
-                f"--set {pair}: unknown name; allowed: {', '.join(thesis.ThesisGains._fields)},"
-                " omega_attitude, omega_direction, omega_reference, zeta"
+                f"--set {pair}: unknown name; allowed: {', '.join((*thesis.ThesisGains._fields, *FILTERS))}"
             )
     return thesis.THESIS_GAINS._replace(**gains), filters
 
@@ -394,10 +458,16 @@ def main() -> None:
             )
         ]
         print(table(grid))
-    if "position" not in loops:
-        return
-    print("\nrotor command, standard deviation, for noise white from tick to tick; 250 Hz, rotor lag 20 ms")
-    settings = Settings(0.02, 0.004, 0.0, "position", gains, filters)
+    for loop in loops:
+        if loop in ("position", "plumbline"):
+            print(f"\n{loop} loop: {NOISE_TITLE}")
+            print_noise(Settings(0.02, 0.004, 0.0, loop, gains, filters))
+
+
+NOISE_TITLE = "rotor command, standard deviation, for noise white from tick to tick; 250 Hz, rotor lag 20 ms"
+
+
+def print_noise(settings: Settings) -> None:
     if not margin(settings).stable:
         print("  none: the loop is lost")
         return

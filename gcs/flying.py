@@ -37,7 +37,7 @@ from gcs.stopping import StopRequest
 from missions.legs import expected_duration_s
 from missions.model import Mission
 
-LAWS = {"thesis": 0, "lqr": 1}  # the value of CTL_LAW
+LAWS = {"thesis": 0, "lqr": 1, "plumbline": 2}  # the value of CTL_LAW
 TRUTH_PORT = 14560
 WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 _EXIT = {

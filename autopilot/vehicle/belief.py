@@ -21,7 +21,10 @@ class BeliefError(ValueError):
 
 @dataclass(frozen=True)
 class Belief:
-    """Mass, geometry and rotor limits, SI; `limited` is False where the file knows no greatest force."""
+    """Mass, geometry, rotors and drag, SI; `limited` is False where the file knows no greatest force.
+
+    Rotor lag and drag may be left out of the file: then there are none.
+    """
 
     quad_mass_kg: float
     load_mass_kg: float
@@ -33,6 +36,9 @@ class Belief:
     rotor_max_n: float
     limited: bool
     torque_ratio_m: float
+    rotor_tau_s: float
+    quad_drag_n_s_m: float
+    quad_drag_quadratic_n_s2_m2: float
 
 
 def shipped_vehicles() -> tuple[str, ...]:
@@ -72,6 +78,9 @@ def load_belief(name_or_path: str) -> Belief:
         rotor_max_n=_positive(where, data, "rotor_max_n") if limited else ROTOR_FMAX,
         limited=limited,
         torque_ratio_m=_positive(where, data, "torque_ratio_m"),
+        rotor_tau_s=_none_or_more(where, data, "rotor_tau_s"),
+        quad_drag_n_s_m=_none_or_more(where, data, "quad_drag_n_s_m"),
+        quad_drag_quadratic_n_s2_m2=_none_or_more(where, data, "quad_drag_quadratic_n_s2_m2"),
     )
 
 
@@ -90,6 +99,13 @@ def _positive(where: str, data: dict[str, Any], key: str) -> float:
     value = _number(where, data, key)
     if value <= 0.0:
         raise BeliefError(f"{where}: {key} = {value}; must be > 0")
+    return value
+
+
+def _none_or_more(where: str, data: dict[str, Any], key: str) -> float:
+    value = _number(where, {key: 0.0, **data}, key)
+    if value < 0.0:
+        raise BeliefError(f"{where}: {key} = {value}; must be >= 0")
     return value
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from autopilot.vehicle.belief import Belief
 from autopilot.wire.parameters import Parameter, ParameterTable
 
-LAWS = ("thesis", "lqr")  # CTL_LAW is an index into this
+LAWS = ("thesis", "lqr", "plumbline")  # CTL_LAW is an index into this
 
 
 def autopilot_parameters(belief: Belief) -> ParameterTable:
@@ -97,6 +97,38 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("LQR_Q_RATE", 0.001, 1e-6, 1e7, "", "Weight of every rate, A-2"),
             p("LQR_R_THRUST", 1000.0, 0.001, 1e7, "", "Weight of the thrust beyond hovering, A-2"),
             p("LQR_R_MOMENT", 100.0, 0.001, 1e7, "", "Weight of the moments, A-2"),
+            p("PLB_KR", 0.9, 0.0, 1000.0, "N m", "Plumbline's gain of the vehicle attitude error"),
+            p("PLB_KOMEGA", 0.1, 0.0, 100.0, "N m s", "Plumbline's gain of the vehicle rate error"),
+            p("PLB_KQ", 3.9, 0.0, 1000.0, "N", "Plumbline's gain of the load attitude error"),
+            p("PLB_KW", 2.0, 0.0, 1000.0, "N s", "Plumbline's gain of the load attitude rate error"),
+            p("PLB_KX", 6.0, 0.0, 1000.0, "N/m", "Plumbline's gain of the load position error"),
+            p("PLB_KV", 2.75, 0.0, 1000.0, "N s/m", "Plumbline's gain of the load velocity error"),
+            p("PLB_WN_F", 25.0, 1.0, 1000.0, "rad/s", "Command filter of the force's deviation"),
+            p(
+                "PLB_LAG_MS",
+                1e3 * belief.rotor_tau_s,
+                0.0,
+                500.0,
+                "ms",
+                "Believed first-order lag of the rotors",
+            ),
+            p("PLB_DRAG", belief.quad_drag_n_s_m, 0.0, 100.0, "N s/m", "Believed linear drag of the vehicle"),
+            p(
+                "PLB_DRAG_2",
+                belief.quad_drag_quadratic_n_s2_m2,
+                0.0,
+                100.0,
+                "N s^2/m^2",
+                "Believed quadratic drag of the vehicle",
+            ),
+            p(
+                "PLB_LAG_TO_MS",
+                10.0,
+                0.0,
+                500.0,
+                "ms",
+                "Lag that the rotors are made to show; no less than PLB_LAG_MS leaves them as they are",
+            ),
             p("EST_GYRO_STD", 0.005, 1e-7, 1.0, "rad/s", "Believed noise of one gyro sample"),
             p("EST_ACC_STD", 0.05, 1e-7, 10.0, "m/s^2", "Believed noise of one accelerometer sample"),
             p("EST_GYRO_WALK", 1e-4, 0.0, 1.0, "rad/s", "Believed gyro bias walk in a second"),

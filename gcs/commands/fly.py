@@ -18,7 +18,7 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
 @click.argument("mission")
 @click.option(
     "--law",
-    type=click.Choice(["thesis", "lqr"]),
+    type=click.Choice(["thesis", "lqr", "plumbline"]),
     default="thesis",
     show_default=True,
     help="Control law to fly with.",

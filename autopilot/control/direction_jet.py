@@ -1,0 +1,91 @@
+"""The commanded cable direction with its exact derivatives: (3-42), (3-43) differentiated along the model.
+
+| symbol       | code name          | frame | unit          | equation |
+|--------------|--------------------|-------|---------------|----------|
+| A, A', A''   | A, A_dot, A_ddot   | I     | N, N/s, N/s^2 | (3-43)   |
+| e_x, e_v     | e_x, e_v           | I     | m, m/s        | (3-12), (3-13) |
+| e_a, e_j     | e_a, e_j           | I     | m/s^2, m/s^3  | e_v', e_v'' |
+| x_d .. x_d'''' | jet[0] .. jet[4] | I     | m .. m/s^4    | (3-12)   |
+| k_x, k_v     | k_x, k_v           | I     | N/m, N s/m    | (3-43)   |
+| s            | s                  |       | 1/s^2         | q' . q'  |
+| q_c          | q_c                | I     |               | (3-42)   |
+
+    A   = -k_x e_x - k_v e_v + m (x_d'' + g e_3) + m_Q L s q
+    A'  = -k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
+    A'' = -k_x e_a - k_v e_j + m x_d''''         + m_Q L (s'' q + 2 s' q' + s q'')
+
+e_a = x_L'' - x_d'' and e_j = x_L''' - x_d''' are what the model says of the load (`load_motion`), not
+differences of what was measured; s' = 2 q'.q'', s'' = 2 (q''.q'' + q'.q'''). The derivatives of q_c = -A/|A|
+follow exactly. The thesis passes q_c through a filter for them; and to take the derivatives of the reference
+alone, leaving out those of the errors, makes the cascade unstable with its gains.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.control.load_attitude import DirectionCommand
+from autopilot.control.load_motion import LoadMotion
+from autopilot.control.load_position import load_position_force
+from autopilot.control.records import Jet, State, Vehicle
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, add, add3, dot, norm, scale, sub, times
+from autopilot.geometry.s2 import unit_derivatives
+
+# N; a shorter A has no direction to follow
+_LEAST_FORCE = 1e-3
+
+
+class PositionJet(NamedTuple):
+    """The force A of (3-43) with two derivatives, and the errors that it closes; world frame."""
+
+    A: Vec3  # N
+    A_dot: Vec3  # N/s
+    A_ddot: Vec3  # N/s^2
+    e_x: Vec3  # m
+    e_v: Vec3  # m/s
+
+
+@kernel
+def position_jet(
+    state: State, motion: LoadMotion, jet: Jet, k_x: Vec3, k_v: Vec3, vehicle: Vehicle
+) -> PositionJet:
+    """A, A', A'' along the motion of the model; the gains are diagonals in the world frame."""
+    q, q_dot = state.q_cable, state.q_cable_dot
+    at = load_position_force(
+        state.x_load,
+        state.v_load,
+        q,
+        q_dot,
+        jet[0],
+        jet[1],
+        jet[2],
+        k_x,
+        k_v,
+        vehicle.quad_mass,
+        vehicle.load_mass,
+        vehicle.cable_length,
+        vehicle.gravity,
+    )
+    mass = vehicle.quad_mass + vehicle.load_mass
+    reach = vehicle.quad_mass * vehicle.cable_length
+    e_a = sub(motion.a_load, jet[2])
+    e_j = sub(motion.j_load, jet[3])
+    s = dot(q_dot, q_dot)
+    s_dot = 2.0 * dot(q_dot, motion.q_ddot)
+    s_ddot = 2.0 * (dot(motion.q_ddot, motion.q_ddot) + dot(q_dot, motion.q_dddot))
+    swing_dot = add(scale(s_dot, q), scale(s, q_dot))
+    swing_ddot = add3(scale(s_ddot, q), scale(2.0 * s_dot, q_dot), scale(s, motion.q_ddot))
+    A_dot = sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), add(times(k_x, at.e_v), times(k_v, e_a)))
+    A_ddot = sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), add(times(k_x, e_a), times(k_v, e_j)))
+    return PositionJet(at.A, A_dot, A_ddot, at.e_x, at.e_v)
+
+
+@kernel
+def direction_jet(position: PositionJet, state: State) -> DirectionCommand:
+    """q_c = -A/|A| with q_c' and q_c''; the present direction at rest where A vanishes."""
+    if norm(position.A) < _LEAST_FORCE:
+        zero: Vec3 = (0.0, 0.0, 0.0)
+        return DirectionCommand(state.q_cable, zero, zero)
+    u, u_dot, u_ddot = unit_derivatives(position.A, position.A_dot, position.A_ddot)
+    return DirectionCommand(scale(-1.0, u), scale(-1.0, u_dot), scale(-1.0, u_ddot))

@@ -1,0 +1,80 @@
+"""How the load and its cable move under the present thrust: what (2-31) and (2-36) say, and once more
+differentiated.
+
+| symbol       | code name                | frame | unit    | equation |
+|--------------|--------------------------|-------|---------|----------|
+| f, f'        | thrust, thrust_rate      |       | N, N/s  | (3-35)   |
+| D            | air                      | I     | N       | drag of the vehicle |
+| F, F'        | F, F_dot                 | I     | N, N/s  | f R e_3 + D |
+| W            | W                        | I     | rad/s   | R Omega  |
+| q .. q'''    | q_cable .. q_dddot       | I     | , 1/s .. 1/s^3 | (2-36) |
+| x_L'', x_L'''| a_load, j_load           | I     | m/s^2, m/s^3 | (2-31) |
+| s            | s                        |       | 1/s^2   | q' . q'  |
+| p            | p                        |       | N       | q . F    |
+| T            | T                        |       | N       | p - m_Q L s |
+| m            | mass                     |       | kg      | m_Q + m_L |
+| m_Q L        | reach                    |       | kg m    |          |
+
+F is all that acts on the vehicle besides weight and cable. With R' = R hat(Omega) (2-34), and D' left out,
+which is a hundredth of the rest, F' = f' R e_3 + W x f R e_3. Then
+
+    (2-31)    m (x_L'' + g e_3) = T q           m x_L''' = T' q + T q'
+    (2-36)    m_Q L q'' = p q - F - m_Q L s q   m_Q L q''' = p' q + p q' - F' - m_Q L (s' q + s q')
+
+with p' = q'.F + q.F', s' = 2 q'.q'', T' = p' - m_Q L s'. Model: the cable is massless, inextensible, taut and
+attached at the centre of mass; the air is at rest and does not hold the load.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.control.records import State, Vehicle
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, add, apply, axpy, column, cross, dot, norm, scale, sub
+
+
+class Drag(NamedTuple):
+    """Drag of the vehicle, -(linear + quadratic |v|) v."""
+
+    linear: float  # N s/m
+    quadratic: float  # N s^2/m^2
+
+
+class LoadMotion(NamedTuple):
+    """Derivatives that are no part of the state, world frame."""
+
+    a_load: Vec3  # m/s^2
+    j_load: Vec3  # m/s^3
+    q_ddot: Vec3  # 1/s^2
+    q_dddot: Vec3  # 1/s^3
+
+
+@kernel
+def air_force(v_quad: Vec3, drag: Drag) -> Vec3:
+    """D, N, world frame, of a vehicle at v_quad (m/s) in air at rest."""
+    return scale(-(drag.linear + drag.quadratic * norm(v_quad)), v_quad)
+
+
+@kernel
+def load_motion(state: State, thrust: float, thrust_rate: float, air: Vec3, vehicle: Vehicle) -> LoadMotion:
+    """The motion that the thrust f (N), changing by f' (N/s) while the body turns, gives load and cable."""
+    q, q_dot, b3 = state.q_cable, state.q_cable_dot, column(state.R, 2)
+    reach = vehicle.quad_mass * vehicle.cable_length
+    mass = vehicle.quad_mass + vehicle.load_mass
+    lift = scale(thrust, b3)
+    F = add(lift, air)
+    F_dot = axpy(thrust_rate, b3, cross(apply(state.R, state.omega_body), lift))
+
+    s = dot(q_dot, q_dot)
+    p = dot(q, F)
+    T = p - reach * s
+    a_load = sub(scale(T / mass, q), (0.0, 0.0, vehicle.gravity))
+    q_ddot = scale(1.0 / reach, sub(scale(T, q), F))
+
+    s_dot = 2.0 * dot(q_dot, q_ddot)
+    T_dot = dot(q_dot, F) + dot(q, F_dot) - reach * s_dot
+    turned = add(scale(T_dot, q), scale(T, q_dot))
+    j_load = scale(1.0 / mass, turned)
+    q_dddot = scale(1.0 / reach, sub(turned, F_dot))
+    return LoadMotion(a_load, j_load, q_ddot, q_dddot)
