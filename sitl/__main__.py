@@ -35,6 +35,7 @@ from sitl.pacing import Pacing
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 1.0
 _LOOK_S = 0.2  # between two looks at a request to stop, while nothing comes
+_TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another may take its place
 _LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
 _SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
 _STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
@@ -43,7 +44,7 @@ _STALL_NS = 200_000_000  # later than this the schedule is moved instead of caug
 class Link:
     """The socket that autopilots speak to, the one that is served, and where truth goes."""
 
-    def __init__(self, listen: Address, truth: Address) -> None:
+    def __init__(self, listen: Address, truth: Address, say: Callable[[str], None]) -> None:
         try:
             self._socket = datagram_socket(listen)
             self._socket.bind(listen)
@@ -60,6 +61,9 @@ class Link:
             ) from None
         self._truth = truth
         self._timeout_s = 0.0
+        self._say = say
+        self._heard = 0.0  # when the peer last answered, monotonic clock
+        self._turned_away: set[Address] = set()
         self.peer: Address | None = None
 
     def close(self) -> None:
@@ -94,13 +98,25 @@ class Link:
                 self._truth_socket.sendto(truth, self._truth)
 
     def take(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
-        """Hand a datagram on. True if it is a heartbeat: its sender is served from now on."""
+        """Hand a datagram on. True if it is a heartbeat whose sender is served from now on.
+
+        While one autopilot answers, no other takes its place.
+        """
         if sender == self.peer and simulator.receive(datagram):
+            self._heard = time.monotonic()
             return False
-        if simulator.greets(datagram):
+        if not simulator.greets(datagram):
+            return False
+        if sender != self.peer:
+            if self.peer is not None and time.monotonic() - self._heard < _TAKE_OVER_S:
+                if sender not in self._turned_away:
+                    self._turned_away.add(sender)
+                    served = shown(self.peer)
+                    self._say(f"the autopilot at {shown(sender)} is not served: that at {served} answers")
+                return False
+            self._say(f"serving the autopilot at {shown(sender)}")
             self.peer = sender
-            return True
-        return False
+        return True
 
 
 class Watch:
@@ -126,7 +142,7 @@ class Watch:
             )
 
 
-def meet(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[str], None]) -> None:
+def meet(link: Link, simulator: HilSimulator, stop: StopRequest) -> None:
     """Wait until an autopilot speaks."""
     link.timeout(_LOOK_S)
     while link.peer is None:
@@ -134,7 +150,6 @@ def meet(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[
         arrived = link.receive()
         if arrived:
             link.take(*arrived, simulator)
-    say(f"serving the autopilot at {shown(link.peer)}")
 
 
 def run_lockstep(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[str], None]) -> None:
@@ -312,7 +327,8 @@ def main(
     simulator: HilSimulator | None = None
     began = time.monotonic()
     try:
-        link = Link(listen, truth)  # first, so that nothing is said into the void while kernels are compiled
+        # first, so that nothing is said into the void while kernels are compiled
+        link = Link(listen, truth, say)
 
         def build() -> HilSimulator:
             return HilSimulator.build(vehicle, sensors, seed, dict(settings), home, lockstep, truth_every)
@@ -330,7 +346,7 @@ def main(
             f"waiting for an autopilot on {shown(listen)}"
         )
         with StopRequest() as stop:
-            meet(link, simulator, stop, say)
+            meet(link, simulator, stop)
             began = time.monotonic()
             if lockstep:
                 run_lockstep(link, simulator, stop, say)

@@ -161,7 +161,7 @@ def clock_numbers(telemetry: Telemetry) -> Numbers:
         "late_p50_us": worst(status.late_p50_us),
         "late_p99_us": worst(status.late_p99_us),
         "late_max_us": worst(status.late_max_us),
-        "missed_ticks": int(status.missed.max()) if len(status.missed) else None,
+        "missed_ticks": int(status.missed.max() - status.missed.min()) if len(status.missed) else None,
     }
 
 

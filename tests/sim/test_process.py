@@ -82,6 +82,8 @@ def test_lockstep_over_udp(port: int, lockstep_sitl: subprocess.Popen[str]) -> N
         _, time_us = first.sensors(after_us=time_us)
         assert time_us == tick * 4000
         first.answer(time_us)
+        if tick == 10:
+            Pilot(port).greet()  # another autopilot, started by accident: not while the first one answers
     unanswered, time_us = first.sensors(after_us=time_us)
     assert first.sensors() == (unanswered, time_us)  # silence: it comes again
 
@@ -90,6 +92,8 @@ def test_lockstep_over_udp(port: int, lockstep_sitl: subprocess.Popen[str]) -> N
     stranger.answer(time_us)  # no heartbeat: not taken for the autopilot
     assert first.sensors() == (unanswered, time_us)
 
+    for _ in range(2):  # sent again after 50, 100, 200 and 400 ms: the first one counts as gone
+        assert first.sensors() == (unanswered, time_us)
     second = Pilot(port)  # the autopilot was restarted: served from the present tick
     second.greet()
     assert second.sensors() == (unanswered, time_us)
@@ -101,6 +105,8 @@ def test_lockstep_over_udp(port: int, lockstep_sitl: subprocess.Popen[str]) -> N
     assert lockstep_sitl.returncode == 0
     assert errors == ""
     assert f"stopped at t = {(time_us + 4000) / 1e6:.3f} s" in output
+    assert output.count("is not served") == 1
+    assert output.count("serving the autopilot at") == 2
 
 
 def test_real_time_over_udp(port: int) -> None:
