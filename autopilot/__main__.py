@@ -20,11 +20,11 @@ from autopilot.services.records import Event, Link, MissionChanged, ParameterCha
 from autopilot.storage import Storage, StorageError
 from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import BeliefError, load_belief
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import ParameterError, ParameterTable
+from autopilot.wire.parameters import ParameterError
 from autopilot.wire.shell import (
     Address,
     Stop,
@@ -258,13 +258,6 @@ def _address_or_none(text: str) -> Address | None:
     return None if text == "none" else address_option(text)
 
 
-def _apply(table: ParameterTable, settings: tuple[tuple[str, float], ...]) -> None:
-    """Set what is the autopilot's; SIM_ parameters that it does not know belong to the simulator."""
-    for name, value in settings:
-        if name in table or not name.startswith("SIM_"):
-            table.set(name, value)
-
-
 @click.command()
 @click.option(
     "--sim",
@@ -343,7 +336,7 @@ def main(
         kept = Storage(storage or user_state_path("plumbline"))
         for trouble in kept.load_parameters(table):
             print(f"autopilot: {trouble}", file=sys.stderr)
-        _apply(table, settings)
+        apply_settings(table, settings)
         table.freeze()
         mission, trouble = kept.load_mission(place)
         if trouble:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from math import radians
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import Vec3
 from autopilot.guidance import Leg, least_move_s
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterTable
@@ -135,7 +136,7 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         lift_speed_m_s=table["MIS_LIFT_SPEED"],
         taut_speed_m_s=table["MIS_TAUT_SPEED"],
         load_error_limit_m=table["FS_LOAD_ERR"],
-        tilt_limit_rad=table["FS_TILT_DEG"] * (3.141592653589793 / 180.0),
+        tilt_limit_rad=radians(table["FS_TILT_DEG"]),
         sensor_age_limit_s=table["FS_SENSOR_S"],
         gravity_m_s2=table["VEH_GRAVITY"],
         least_move_s=least_move_s(table["VEH_CABLE_LEN"], table["VEH_GRAVITY"]),
@@ -153,8 +154,3 @@ def setpoint(flight: Flight, now_us: int) -> Jet | None:
     if not flight.legs:
         return None
     return flight.legs[0].jet(leg_time_s(flight, now_us))
-
-
-def at_rest(position: Vec3) -> Jet:
-    """A jet that stays."""
-    return (position, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
-from autopilot.decisions import arming_complaints
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
 from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, leg_time_s
@@ -20,6 +19,7 @@ from autopilot.mixer import MixerResult, mix
 from autopilot.scheduler import is_due
 from autopilot.supervisor import advance
 
+HEIGHT_GAIN, CLIMB_GAIN = 6.0, 2.75  # N/m, N s/m: k_x and k_v of Table 4-3
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
 NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, neg(E3), IDENTITY)
 STOPPED = MixerResult((0.0, 0.0, 0.0, 0.0), 0, 0.0, ZERO)
@@ -123,12 +123,3 @@ def held_height(setup: Setup, state: State, anchor: Vec3) -> float:
     vehicle = setup.vehicle
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     return vertical_force(state.x_load[2] - anchor[2], state.v_load[2], HEIGHT_GAIN, CLIMB_GAIN, weight)
-
-
-def ready_to_arm(state: FlightState, setup: Setup, now_us: int) -> tuple[str, ...]:
-    """What keeps the vehicle from being armed; empty if nothing does."""
-    control = control_state(state.estimator)
-    return arming_complaints(state.flight, view_of(state.estimator, control, setup.settings, now_us))
-
-
-HEIGHT_GAIN, CLIMB_GAIN = 6.0, 2.75  # N/m, N s/m: k_x and k_v of Table 4-3

@@ -14,7 +14,7 @@ from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import load_belief
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.mission_items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
@@ -40,9 +40,7 @@ class Conditions:
 def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
     """An autopilot under these conditions."""
     table = autopilot_parameters(load_belief(conditions.vehicle))
-    for name, value in conditions.settings.items():
-        if name in table or not name.startswith("SIM_"):
-            table.set(name, value)
+    apply_settings(table, conditions.settings.items())
     table.freeze()
     return Onboard(table, Identity(), Options(home, LOCKSTEP_BOOT_UNIX_US), mission)
 

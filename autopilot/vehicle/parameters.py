@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from autopilot.vehicle.belief import Belief
 from autopilot.wire.parameters import Parameter, ParameterTable
 
 LAWS = ("thesis", "lqr", "plumbline")  # CTL_LAW is an index into this
+
+
+def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]]) -> None:
+    """Set what is the autopilot's; SIM_ parameters that it does not know belong to the simulator."""
+    for name, value in settings:
+        if name in table or not name.startswith("SIM_"):
+            table.set(name, value)
 
 
 def autopilot_parameters(belief: Belief) -> ParameterTable:
