@@ -224,8 +224,9 @@ class _Flight:
         """The tick that is estimated but not controlled, by the functions that fly."""
         now_us = self.world.now_us
         if is_due(self.world.tick, self.every):
+            phase = self.state.flight.phase
             self.state, report = control(self.state, self.setup, now_us)
-            self._hear(report.texts)
+            self._hear(report.texts, phase)
             flight = self.state.flight
             if self._counts(flight):
                 target = np.ravel(flight.legs[0].jet(leg_time_s(flight, now_us))[0])
@@ -269,11 +270,12 @@ class _Flight:
 
     # ---- how it ends
 
-    def _hear(self, texts: tuple[tuple[int, str], ...]) -> None:
+    def _hear(self, texts: tuple[tuple[int, str], ...], phase: Phase) -> None:
         for severity, text in texts:
             self.flown.texts.append(text)
             if severity <= mavlink.MAV_SEVERITY_CRITICAL and self.airborne_us >= 0:
                 self.flown.outcome, self.flown.reason = "diverged", text
+                self.flown.lost_phase = phase.name.lower()
 
     def _judge(self, now_us: int) -> None:
         flown, flight = self.flown, self.state.flight
@@ -283,7 +285,7 @@ class _Flight:
             flown.outcome = "completed" if flight.mission_done else "interrupted"
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.limit_us:
             where = self.state.flight.phase.name.lower()
-            flown.outcome = "timeout"
+            flown.outcome, flown.lost_phase = "timeout", where
             flown.reason = f"not landed after {self.limit_us * 1e-6:.0f} s of flight: still in phase {where}"
 
     def _conclude(self) -> None:
