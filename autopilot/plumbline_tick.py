@@ -13,8 +13,8 @@ from autopilot.control.command_filter import FilterConstants
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.observer import Observed, loaded
-from autopilot.prediction import Ahead, predict
+from autopilot.observer import Observed, loaded, standing
+from autopilot.prediction import Ahead, predict, stay
 from autopilot.rotor_lag import hasten
 
 
@@ -39,6 +39,8 @@ def ahead_of(
     constants: PlumblineConstants,
 ) -> Ahead:
     """State and rotors at the instant at which the command of this tick comes into force."""
+    if standing(observed, constants.vehicle):
+        return stay(state, actuation, constants.actuation)
     return predict(
         state,
         taut,
