@@ -11,8 +11,8 @@ circle, all commands delayed alike.
 `delay` is all that passes between a motion and the command that answers it, besides the hold: sensor latency,
 computation, transport.
 
-The law `plumbline` knows the rotors' lag, unless told otherwise by `believed_tau`; its force filter is
-`omega_force`, the lag it makes the rotors show `wanted_tau`.
+The law `plumbline` knows delay and lag of the rotors, unless told otherwise by `believed_delay` and
+`believed_tau`; its force filter is `omega_force`, the lag it makes the rotors show `wanted_tau`.
 
     python benchmarks/cascade_margin.py [--loop attitude|position|vehicle|plumbline] [--set k_R=0.45 ...]
 """
@@ -30,12 +30,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
+from autopilot.actuation import Actuation, actuation_constants, advance
 from autopilot.control import plumbline, thesis
 from autopilot.control.command_filter import FilterState, filter_constants
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Reference, State, Vehicle
-from autopilot.rotor_lag import Rotating, hasten, lag_constants
+from autopilot.observer import nominal
+from autopilot.plumbline_tick import PlumblineConstants, load_position_tick
+from autopilot.rotor_lag import lag_gain
 
 Array = NDArray[np.float64]
 
@@ -57,6 +60,7 @@ FILTERS = (
     "zeta",
     "omega_force",
     "believed_tau",
+    "believed_delay",
     "wanted_tau",
 )
 GREATEST_DELAY = 0.2  # s; more is reported as this
@@ -194,56 +198,81 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     return tick
 
 
-def plumbline_law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
-    """As `law`; its memory is the force filter, the thrust's rate, and what the rotors give."""
-    options = {
+def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConstants:
+    """What the law is told: the delay and lag of the settings, unless others are believed."""
+    told = {
         "omega_force": plumbline.OMEGA_FORCE,
         "believed_tau": settings.rotor_tau,
+        "believed_delay": settings.delay,
         "wanted_tau": WANTED_TAU,
         **settings.filters,
     }
     gains = plumbline.PlumblineGains(
         **{n: getattr(settings.gains, n) for n in plumbline.PlumblineGains._fields}
     )
-    force_filter = filter_constants(options["omega_force"], plumbline.ZETA, settings.period)
-    lag = lag_constants(options["believed_tau"], options["wanted_tau"], settings.period)
+    return PlumblineConstants(
+        gains,
+        filter_constants(told["omega_force"], plumbline.ZETA, settings.period),
+        Drag(0.0, 0.0),
+        actuation_constants(told["believed_delay"], told["believed_tau"], settings.period),
+        lag_gain(told["believed_tau"], told["wanted_tau"], settings.period),
+        settings.period,
+        vehicle,
+    )
+
+
+LAW_MEMORY = 14  # force filter, thrust rate, thrust and moment of the rotors; then the commands on their way
+
+
+def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array], Array], Array]:
+    """As `law`, and its memory at hover: force filter, thrust's rate, rotors, commands on their way.
+
+    Mass and wind are not observed here: across the cable what is observed does not depend on the rotors, and
+    along it the mass is learned slowly.
+    """
+    constants = plumbline_constants(settings, vehicle)
     reference = Reference((ZERO,) * 7, HEADING)
+    observed = nominal(vehicle)._replace(support=0.0)
+    rows = constants.actuation.whole + 1
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def tick(numbers: Array) -> Array:
         state = state_at(numbers[-MOTION:], vehicle)
         filtered = FilterState(_vec(numbers[0:3]), _vec(numbers[3:6]), _vec(numbers[6:9]))
-        rotors = Rotating(float(numbers[10]), _vec(numbers[11:14]))
-        memory, wanted = plumbline.load_position(
+        queue = np.zeros((rows + 1, 4))
+        queue[:rows] = numbers[LAW_MEMORY:-MOTION].reshape(rows, 4)
+        actuation = Actuation(queue, float(numbers[10]), _vec(numbers[11:14]))
+        memory, command = load_position_tick(
             plumbline.PlumblineMemory(filtered, float(numbers[9]), 1.0),
             state,
             reference,
-            rotors.thrust,
-            gains,
-            force_filter,
-            Drag(0.0, 0.0),
-            vehicle,
+            actuation,
+            observed,
+            constants,
         )
-        after, thrust, moment = hasten(rotors, wanted.thrust, wanted.moment, lag, vehicle, 0.0)
+        after = advance(actuation, command.thrust, command.moment, constants.actuation)
         return np.array(
             [
                 *(number for vector in memory.force for number in vector),
                 memory.thrust_rate,
                 after.thrust,
                 *after.moment,
-                thrust,
-                *moment,
+                *after.queue[:rows].ravel(),
+                command.thrust,
+                *command.moment,
             ]
         )
 
-    return tick
+    hover = np.zeros(LAW_MEMORY + 4 * rows)
+    hover[10] = weight
+    hover[LAW_MEMORY::4] = weight
+    return tick, hover
 
 
 def linearised_law(settings: Settings, vehicle: Vehicle) -> tuple[Array, Array, Array, Array]:
     """(A, B, C, D) of the law at hover: memory, motion in; memory, (f, M) out."""
     if settings.loop == "plumbline":
-        tick = plumbline_law(settings, vehicle)
-        hover = np.zeros(14)
-        hover[10] = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+        tick, hover = plumbline_law(settings, vehicle)
     else:
         tick = law(settings, vehicle)
         hover = _flat(thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO))

@@ -22,6 +22,7 @@ from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, leg_time_s
 from autopilot.flight_core import FlightState, Setup, control, initial_state, view_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Creep
+from autopilot.observer import nominal
 from autopilot.onboard import build_setup, plan_of
 from autopilot.scheduler import divider, is_due
 from autopilot.services.mission_store import StoredMission
@@ -153,7 +154,15 @@ class _Flight:
         self.model = k.AutopilotModel(
             link_model(profile, settings.noise_scale),
             self.setup.tuning,
-            PilotModel(self.setup.law, self.setup.vehicle, self.setup.limited),
+            PilotModel(
+                self.setup.law,
+                self.setup.vehicle,
+                self.setup.limited,
+                self.setup.actuation,
+                self.setup.observer,
+                self.setup.drag,
+                nominal(self.setup.vehicle),
+            ),
             self.every,
             self.setup.settings.sensor_age_limit_s,
             self.setup.settings.tilt_limit_rad,
@@ -190,13 +199,14 @@ class _Flight:
         if stretch.flown != k.GROUND:
             n = stretch.stop_tick - self.world.tick + 1
             times = (now_us - flight.leg_start_us + self.tick_us * np.arange(n)) * 1e-6
+            preview_s = self.setup.law.preview_s
             targets = references = jets(flight.legs[0], times)
-        memory = self.no_memory if state.memory is None else state.memory
-        pilot = Pilot(memory, state.command, state.mixed)
+            if preview_s != 0.0:
+                references = jets(flight.legs[0], times + preview_s)
         slack_before = self.world.plant.slack_events
         self.world, after, self.figures = k.fly_stretch(
             self.world,
-            k.Autopilot(state.estimator, self.inertial, pilot),
+            k.Autopilot(state.estimator, self.inertial, self._pilot()),
             self.figures,
             decided,
             stretch,
@@ -214,11 +224,23 @@ class _Flight:
             memory=None if state.memory is None else after.pilot.memory,
             command=after.pilot.command,
             mixed=after.pilot.mixed,
+            actuation=after.pilot.actuation,
+            observed=after.pilot.observed,
         )
         if flight.phase in _LOAD_CARRIED:
             self.flown.slack_events += int(self.world.plant.slack_events - slack_before)
         if flight.phase == Phase.MISSION:
             self.mission_us += self.world.now_us - now_us
+
+    def _pilot(self) -> Pilot:
+        state = self.state
+        return Pilot(
+            self.no_memory if state.memory is None else state.memory,
+            state.command,
+            state.mixed,
+            state.actuation,
+            self.model.pilot.nominal if state.observed is None else state.observed,
+        )
 
     def _decide(self) -> None:
         """The tick that is estimated but not controlled, by the functions that fly."""
@@ -230,12 +252,11 @@ class _Flight:
             flight = self.state.flight
             if self._counts(flight):
                 target = np.ravel(flight.legs[0].jet(leg_time_s(flight, now_us))[0])
-                pilot = Pilot(self.state.memory, self.state.command, self.state.mixed)
                 self.figures = k.counted(
                     self.figures,
                     self.world.plant,
                     self.state.estimator,
-                    pilot,
+                    self._pilot(),
                     (float(target[0]), float(target[1]), float(target[2])),
                 )
         self._ground_turn(now_us)

@@ -16,7 +16,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import E1, Vec3, norm, sub
 from autopilot.geometry.so3 import rotation_from_quat, tilt_angle
 from gcs.sweep.link import LinkModel, estimate, settled, wire_forces
-from gcs.sweep.pilot import Pilot, PilotModel, pilot_tick
+from gcs.sweep.pilot import Pilot, PilotModel, air_tick, ground_tick
 from gcs.sweep.world import Buffers, Floats, World, WorldModel, tick
 from sitl.plant.records import PlantState
 
@@ -91,6 +91,7 @@ def control_state(state: EstimatorState) -> State:
         vehicle.v_quad,
         rotation_from_quat(vehicle.quat_wxyz),
         vehicle.omega_body,
+        vehicle.accel_quad,
     )
 
 
@@ -120,8 +121,6 @@ def reference_of(row: Floats) -> Reference:
 @kernel
 def may_decide(estimator: EstimatorState, state: State, target: Vec3, model: AutopilotModel, at: Stretch) -> bool:
     """Whether the supervisor could do anything at this tick but let the time go by."""
-    if at.flown == GROUND:
-        return False
     finite = (
         isfinite(norm(state.x_quad))
         and isfinite(norm(state.v_quad))
@@ -209,16 +208,18 @@ def fly_stretch(
         )
         if world.tick >= stretch.stop_tick:
             break
-        if stretch.flown != GROUND and world.tick % model.control_every == 0:
-            at = world.tick - first
-            state = control_state(estimator)
-            target = vector(targets[at], 0)
-            if may_decide(estimator, state, target, model, stretch):
-                break
-            pilot = pilot_tick(
-                pilot, state, reference_of(references[at]), stretch.flown == CARRYING, model.pilot
-            )
-            if stretch.counts:
-                figures = counted(figures, world.plant, estimator, pilot, target)
+        if world.tick % model.control_every == 0:
+            state, taut = control_state(estimator), estimator.load.taut
+            if stretch.flown == GROUND:
+                pilot = ground_tick(pilot, state, taut, model.pilot)
+            else:
+                at = world.tick - first
+                target = vector(targets[at], 0)
+                if may_decide(estimator, state, target, model, stretch):
+                    break
+                reference = reference_of(references[at])
+                pilot = air_tick(pilot, state, taut, reference, stretch.flown == CARRYING, model.pilot)
+                if stretch.counts:
+                    figures = counted(figures, world.plant, estimator, pilot, target)
         world = tick(world, wire_forces(pilot.mixed.forces), world_model, buffers)
     return world, Autopilot(estimator, inertial, pilot), figures

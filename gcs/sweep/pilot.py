@@ -1,4 +1,4 @@
-"""The control half of a tick in machine code: law and mixer, as `autopilot.flight_core.control` runs them.
+"""The control half of a tick in machine code: observer, law, mixer, as `autopilot.flight_core.control` runs them.
 
 `load_position` and `quad_position` are the laws' methods of those names; which law it is, the compiler sees by
 the type of its record. A law that is not among them flies through `flight_core.control` tick by tick.
@@ -10,12 +10,16 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload
 
-from autopilot.control import lqr, plumbline, quad_position, thesis
+from autopilot.actuation import Actuation, ActuationConstants
+from autopilot.actuation import advance as actuate
+from autopilot.control import lqr, quad_position, thesis
+from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.laws import Law, LqrLaw, Memory, PlumblineLaw, PlumblineMemory, ThesisLaw
 from autopilot.mixer import MixerResult, mix
-from autopilot.rotor_lag import hasten
+from autopilot.observer import Observed, ObserverConstants, observe
+from autopilot.plumbline_tick import ahead_of, hastened, load_position_tick
 
 FUSED_LAWS = (ThesisLaw, LqrLaw, PlumblineLaw)
 
@@ -26,24 +30,34 @@ class PilotModel(NamedTuple):
     law: Any
     vehicle: Vehicle
     limited: float
+    actuation: ActuationConstants
+    observer: ObserverConstants
+    drag: Drag
+    nominal: Observed  # nothing observed yet
 
 
 class Pilot(NamedTuple):
-    """What law and mixer carry from tick to tick, of `flight_core.FlightState`."""
+    """What the control half carries from tick to tick, of `flight_core.FlightState`."""
 
     memory: Any
     command: Command
     mixed: MixerResult
+    actuation: Actuation
+    observed: Observed
 
 
-def law_load_position(law: Law, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+def law_load_position(
+    law: Law, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+) -> tuple[Memory, Command]:
     """`law.load_position`."""
-    return law.load_position(memory, state, reference)
+    return law.load_position(memory, state, reference, actuation, observed)
 
 
-def law_quad_position(law: Law, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+def law_quad_position(
+    law: Law, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+) -> tuple[Memory, Command]:
     """`law.quad_position`."""
-    return law.quad_position(memory, state, reference)
+    return law.quad_position(memory, state, reference, actuation, observed)
 
 
 @kernel
@@ -61,80 +75,101 @@ def _is(law: Any, kind: type) -> bool:
 
 
 @overload(law_load_position)
-def _compiled_load_position(law: Any, memory: Any, state: Any, reference: Any) -> Any:
+def _load_position(law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any) -> Any:
     if _is(law, ThesisLaw):
 
-        def of_thesis(law: Any, memory: Any, state: Any, reference: Any) -> Any:
+        def of_thesis(
+            law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any
+        ) -> Any:
             return thesis.load_position(memory, state, reference, law.gains, law.filters, law.vehicle)
 
         return of_thesis
     if _is(law, LqrLaw):
 
-        def of_lqr(law: Any, memory: Any, state: Any, reference: Any) -> Any:
+        def of_lqr(law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any) -> Any:
             return memory, lqr.load_position(state, reference, law.regulator)
 
         return of_lqr
     if _is(law, PlumblineLaw):
 
-        def of_plumbline(law: Any, memory: Any, state: Any, reference: Any) -> Any:
-            position, wanted = plumbline.load_position(
-                memory.position,
-                state,
-                reference,
-                memory.rotors.thrust,
-                law.gains,
-                law.force_filter,
-                law.drag,
-                law.vehicle,
+        def of_plumbline(
+            law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any
+        ) -> Any:
+            position, command = load_position_tick(
+                memory.position, state, reference, actuation, observed, law.constants
             )
-            rotors, thrust, moment = hasten(
-                memory.rotors, wanted.thrust, wanted.moment, law.lag, law.vehicle, law.limited
-            )
-            return PlumblineMemory(position, memory.other_modes, rotors), with_demand(wanted, thrust, moment)
+            return PlumblineMemory(position, memory.other_modes), command
 
         return of_plumbline
     return None
 
 
 @overload(law_quad_position)
-def _compiled_quad_position(law: Any, memory: Any, state: Any, reference: Any) -> Any:
+def _quad_position(law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any) -> Any:
     if _is(law, ThesisLaw):
 
-        def of_thesis(law: Any, memory: Any, state: Any, reference: Any) -> Any:
+        def of_thesis(
+            law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any
+        ) -> Any:
             return thesis_quad_position(law, memory, state, reference)
 
         return of_thesis
     if _is(law, LqrLaw):
 
-        def of_lqr(law: Any, memory: Any, state: Any, reference: Any) -> Any:
+        def of_lqr(law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any) -> Any:
             return thesis_quad_position(law.other_modes, memory, state, reference)
 
         return of_lqr
     if _is(law, PlumblineLaw):
 
-        def of_plumbline(law: Any, memory: Any, state: Any, reference: Any) -> Any:
-            other, command = thesis_quad_position(law.other_modes, memory.other_modes, state, reference)
-            return PlumblineMemory(memory.position, other, memory.rotors), command
+        def of_plumbline(
+            law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any
+        ) -> Any:
+            ahead = ahead_of(state, 0.0, actuation, observed, law.constants)
+            other, wanted = thesis_quad_position(
+                law.other_modes, memory.other_modes, ahead.state, reference
+            )
+            return PlumblineMemory(memory.position, other), hastened(wanted, ahead, law.constants)
 
         return of_plumbline
     return None
 
 
 @kernel
-def with_demand(c: Command, thrust: float, moment: tuple[float, float, float]) -> Command:
-    """The command with another demand on the rotors."""
-    return Command(
-        thrust, moment, c.e_x, c.e_v, c.e_q, c.e_q_dot, c.e_R, c.e_Omega, c.psi_R, c.psi_q, c.q_c, c.R_c
+def look(pilot: Pilot, state: State, taut: float, model: PilotModel) -> Observed:
+    """What is observed at this tick."""
+    return observe(
+        pilot.observed, state, taut, pilot.actuation.thrust, model.observer, model.drag, model.vehicle
     )
 
 
 @kernel
-def pilot_tick(
-    pilot: Pilot, state: State, reference: Reference, carries: bool, model: PilotModel
+def ground_tick(pilot: Pilot, state: State, taut: float, model: PilotModel) -> Pilot:
+    """One tick on the ground: the rotors go on as they are; of what is observed only the ground is kept."""
+    seen, mixed, n = look(pilot, state, taut, model), pilot.mixed, model.nominal
+    return Pilot(
+        pilot.memory,
+        pilot.command,
+        mixed,
+        actuate(pilot.actuation, mixed.thrust_done, mixed.moment_done, model.actuation),
+        Observed(n.load_mass, n.push, n.correlation, n.square, seen.support, seen.load_ground),
+    )
+
+
+@kernel
+def air_tick(
+    pilot: Pilot, state: State, taut: float, reference: Reference, carries: bool, model: PilotModel
 ) -> Pilot:
     """One tick of law and mixer; `carries`: the load's position is tracked, else the vehicle's."""
+    seen = look(pilot, state, taut, model)
     if carries:
-        memory, command = law_load_position(model.law, pilot.memory, state, reference)
+        memory, command = law_load_position(
+            model.law, pilot.memory, state, reference, pilot.actuation, seen
+        )
     else:
-        memory, command = law_quad_position(model.law, pilot.memory, state, reference)
-    return Pilot(memory, command, mix(command.thrust, command.moment, model.vehicle, model.limited))
+        memory, command = law_quad_position(
+            model.law, pilot.memory, state, reference, pilot.actuation, seen
+        )
+    mixed = mix(command.thrust, command.moment, model.vehicle, model.limited)
+    actuation = actuate(pilot.actuation, mixed.thrust_done, mixed.moment_done, model.actuation)
+    return Pilot(memory, command, mixed, actuation, seen)
