@@ -108,9 +108,7 @@ def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState
         setup.drag,
         setup.vehicle,
     )
-    after = before._replace(
-        flight=flight, slack_events=slack_events, was_taut=taut, observed=observed
-    )
+    after = before._replace(flight=flight, slack_events=slack_events, was_taut=taut, observed=observed)
     if flight.phase not in IN_AIR:
         idle = IDLE if flight.phase == Phase.ARMED else STOPPED
         actuation = actuate(after.actuation, idle.thrust_done, idle.moment_done, setup.actuation)

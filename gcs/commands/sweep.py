@@ -82,10 +82,10 @@ def sweep_command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Fly a mission thousands of times, and report where it succeeds and how well.
+    """Fly a mission thousands of times under varied conditions.
 
-    The flights are those of gcs fly --lockstep, but for the wire, which is left out: some ten a second on each
-    core. Every parameter of the simulator and of the autopilot can be varied. The directory then holds
+    The flights are those of gcs fly --lockstep, but for the wire, which is left out: some ten a second on
+    each core. Every parameter of the simulator and of the autopilot can be varied. The directory then holds
     flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that was
     stopped goes on when the same command is given again.
 
@@ -118,9 +118,7 @@ def sweep_command(
     directory = out or Path("sweeps") / Path(mission).stem
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(jobs)))
     with StopRequest("stopping; what is flown is kept, the same command goes on from there") as stop:
-        done = sweep(
-            plan, directory, shlex.join(sys.argv), version("plumbline"), workers, stop, quiet, fresh
-        )
+        done = sweep(plan, directory, shlex.join(sys.argv), version("plumbline"), workers, stop, quiet, fresh)
         page = write_report(directory, plan)
     if as_json:
         print_json(

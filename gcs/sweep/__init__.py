@@ -1,1 +1,1 @@
-"""Many flights without the wire: the same cores fused into one kernel, and what becomes of thousands of them."""
+"""Thousands of flights without the wire: the same cores fused into one kernel, and what becomes of them."""

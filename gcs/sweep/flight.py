@@ -7,7 +7,6 @@ ground station's part is known beforehand: the two instants at which it arms and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import floor, inf, nan, sqrt
@@ -18,12 +17,12 @@ from autopilot.decisions import arming_complaints, decide, with_plan
 from autopilot.estimation.filter import control_state
 from autopilot.estimation.records import ImuReading, new_history
 from autopilot.flight import CARRYING as CARRYING_PHASES
-from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, leg_time_s
+from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, View, leg_time_s
 from autopilot.flight_core import FlightState, Setup, control, initial_state, view_of
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import ZERO
 from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Creep
 from autopilot.observer import nominal
-from autopilot.onboard import build_setup, plan_of
+from autopilot.onboard import Onboard, build_setup, plan_of
 from autopilot.scheduler import divider, is_due
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.requests import Arm, StartMission
@@ -41,7 +40,6 @@ from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import encode_mission
-from gcs.clients.capture import FrameLog
 from gcs.clients.flight import READY_LIMIT_US, TIME_FACTOR, TIME_MARGIN_S
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
@@ -49,9 +47,11 @@ from gcs.sweep import kernel as k
 from gcs.sweep.legs import COLUMNS, jets
 from gcs.sweep.link import link_model
 from gcs.sweep.pilot import FUSED_LAWS, Pilot, PilotModel
-from gcs.sweep.world import Floats, World, new_world
+from gcs.sweep.plan import simulated
+from gcs.sweep.world import Floats, new_world
 from missions.legs import expected_duration_s
 from missions.model import Mission
+from sitl.hil import HilSimulator
 from sitl.sensors.files import load_profile
 from sitl.sensors.profile import Profile
 from sitl.sim_core import settings_of
@@ -107,13 +107,11 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
     """When the real ground station would arm and start: from the real dialogue, flown until then."""
     times: dict[Phase, int] = {}
 
-    def watch(onboard: object, _: object) -> bool:
-        phase: Phase = onboard.phase  # type: ignore[attr-defined]
-        times.setdefault(phase, onboard.now_us)  # type: ignore[attr-defined]
-        return phase not in IN_AIR
+    def watch(onboard: Onboard, _: HilSimulator) -> bool:
+        times.setdefault(onboard.phase, onboard.now_us)
+        return onboard.phase not in IN_AIR
 
-    log: FrameLog = _NoLog()  # type: ignore[assignment]
-    outcome = fly_with_wire(mission, conditions, log, watch)
+    outcome = fly_with_wire(mission, conditions, _NoLog(), watch)
     if Phase.TAUTEN not in times:
         raise ValueError(f"{mission.name} does not start under the conditions of the sweep: {outcome.reason}")
     return Boarding(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
@@ -135,7 +133,7 @@ class _Flight:
         apply_settings(table, conditions.settings.items())
         truth = load_truth(conditions.vehicle)
         sim_table = sim_parameters(truth)
-        for name, value in _simulated(conditions.settings).items():
+        for name, value in simulated(conditions.settings).items():
             sim_table.set(name, value)
         settings = settings_of(sim_table)
         profile = _profile(conditions.sensors)
@@ -198,7 +196,8 @@ class _Flight:
         flight = state.flight
         if stretch.flown != k.GROUND:
             n = stretch.stop_tick - self.world.tick + 1
-            times = (now_us - flight.leg_start_us + self.tick_us * np.arange(n)) * 1e-6
+            since_us = now_us - flight.leg_start_us
+            times: Floats = np.asarray((since_us + self.tick_us * np.arange(n)) * 1e-6, np.float64)
             preview_s = self.setup.law.preview_s
             targets = references = jets(flight.legs[0], times)
             if preview_s != 0.0:
@@ -283,9 +282,9 @@ class _Flight:
         flight, verdict = decide(self.state.flight, request, self._view(now_us), self.setup.settings)
         self.state = self.state._replace(flight=flight)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
-            self.flown.outcome, self.flown.reason = "refused", verdict.text
+            self.flown.outcome, self.flown.reason = "refused", verdict.text or ""
 
-    def _view(self, now_us: int):  # type: ignore[no-untyped-def]
+    def _view(self, now_us: int) -> View:
         state = self.state
         return view_of(state.estimator, control_state(state.estimator), self.setup.settings, now_us)
 
@@ -305,7 +304,7 @@ class _Flight:
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
             flown.outcome = "completed" if flight.mission_done else "interrupted"
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.limit_us:
-            where = self.state.flight.phase.name.lower()
+            where: str = flight.phase.name.lower()
             flown.outcome, flown.lost_phase = "timeout", where
             flown.reason = f"not landed after {self.limit_us * 1e-6:.0f} s of flight: still in phase {where}"
 
@@ -397,17 +396,7 @@ def _taut_by(leg: object, cable_length_m: float) -> float:
     return leg.begin[2] + (TAUT_LATEST - CLEARANCE) * cable_length_m
 
 
-def _simulated(settings: Mapping[str, float]) -> dict[str, float]:
-    return {
-        name: value
-        for name, value in settings.items()
-        if name.startswith("SIM_") and name != "SIM_LOSS_PCT"
-    }
-
-
-def fly(
-    mission: Mission, conditions: Conditions, boarding: Boarding, trace: Floats | None = None
-) -> Flown:
+def fly(mission: Mission, conditions: Conditions, boarding: Boarding, trace: Floats | None = None) -> Flown:
     """Fly a mission from take-off to landing under these conditions.
 
     `trace` (ticks, TRACE_COLUMNS) receives the true state at each tick, for tests: x_load, x_quad, quat_wxyz,

@@ -1,8 +1,8 @@
 """A stretch of flight in one call of machine code: world, estimator, law and mixer, tick after tick.
 
-It ends where the supervisor may have something to decide: at a tick given beforehand, or at the first at which
-`autopilot.supervisor.advance` could see more than the time going by. There Python runs that tick, with the
-very functions that fly.
+It ends where the supervisor may have something to decide: at a tick given beforehand, or at the first at
+which `autopilot.supervisor.advance` could see more than the time going by. There Python runs that tick, with
+the very functions that fly.
 """
 
 from __future__ import annotations
@@ -119,7 +119,9 @@ def reference_of(row: Floats) -> Reference:
 
 
 @kernel
-def may_decide(estimator: EstimatorState, state: State, target: Vec3, model: AutopilotModel, at: Stretch) -> bool:
+def may_decide(
+    estimator: EstimatorState, state: State, target: Vec3, model: AutopilotModel, at: Stretch
+) -> bool:
     """Whether the supervisor could do anything at this tick but let the time go by."""
     finite = (
         isfinite(norm(state.x_quad))
@@ -158,8 +160,8 @@ def counted(f: Figures, plant: PlantState, estimator: EstimatorState, pilot: Pil
         min(f.tension_min, plant.tension),
         max(f.tension_max, plant.tension),
         max(f.estimator_error_max, norm(sub(plant.x_load, estimator.load.x_load))),
-        min(f.rotor_min, min(min(force[0], force[1]), min(force[2], force[3]))),
-        max(f.rotor_max, max(max(force[0], force[1]), max(force[2], force[3]))),
+        min(f.rotor_min, force[0], force[1], force[2], force[3]),
+        max(f.rotor_max, force[0], force[1], force[2], force[3]),
     )
 
 
@@ -193,8 +195,8 @@ def fly_stretch(
     """Fly until the supervisor is to be asked: then the tick is estimated, but not controlled.
 
     `decided`: the present tick is controlled already. `targets` and `references` (ticks, 21) hold what load
-    or vehicle is asked for now and what the law is told, from the present tick on. `trace` (ticks, 14) receives
-    the true state, as long as it lasts.
+    or vehicle is asked for now and what the law is told, from the present tick on. `trace` (ticks, 14)
+    receives the true state, as long as it lasts.
     """
     estimator, inertial, pilot = onboard.estimator, onboard.inertial, onboard.pilot
     first = world.tick

@@ -41,7 +41,7 @@ from sitl.sensors.profile import Profile, stated_of
 
 
 class LinkModel(NamedTuple):
-    """The deviations that the trackers state, as they arrive; the velocities' are negative if not measured."""
+    """The deviations that the trackers state, as they arrive; negative for velocities not measured."""
 
     pose_position_std: float
     pose_attitude_std: float
@@ -79,9 +79,7 @@ def wire_forces(forces: Rotors) -> Rotors:
 
 @kernel
 def _pose(row: Floats, age_s: float, link: LinkModel) -> PoseReading:
-    sent = quat_ned_frd_from_enu_flu(
-        (row[READING + 3], row[READING + 4], row[READING + 5], row[READING + 6])
-    )
+    sent = quat_ned_frd_from_enu_flu((row[READING + 3], row[READING + 4], row[READING + 5], row[READING + 6]))
     quat = quat_enu_flu_from_ned_frd((single(sent[0]), single(sent[1]), single(sent[2]), single(sent[3])))
     v_quad = (0.0, 0.0, 0.0)
     if link.pose_velocity_std >= 0.0:
@@ -102,9 +100,7 @@ def _load(row: Floats, age_s: float, link: LinkModel) -> LoadReading:
     v_load = (0.0, 0.0, 0.0)
     if link.load_velocity_std >= 0.0:
         v_load = _single3(row, READING + 3)
-    return LoadReading(
-        age_s, _single3(row, READING), v_load, link.load_position_std, link.load_velocity_std
-    )
+    return LoadReading(age_s, _single3(row, READING), v_load, link.load_position_std, link.load_velocity_std)
 
 
 @kernel

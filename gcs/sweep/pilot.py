@@ -1,7 +1,7 @@
-"""The control half of a tick in machine code: observer, law, mixer, as `autopilot.flight_core.control` runs them.
+"""The control half of a tick in machine code: observer, law and mixer, as `flight_core.control` runs them.
 
-`load_position` and `quad_position` are the laws' methods of those names; which law it is, the compiler sees by
-the type of its record. A law that is not among them flies through `flight_core.control` tick by tick.
+`law_load_position` and `law_quad_position` are the laws' methods; which law it is, the compiler sees by the
+type of its record. A law that is not among them flies through `flight_core.control` tick by tick.
 """
 
 from __future__ import annotations
@@ -126,9 +126,7 @@ def _quad_position(law: Any, memory: Any, state: Any, reference: Any, actuation:
             law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any
         ) -> Any:
             ahead = ahead_of(state, 0.0, actuation, observed, law.constants)
-            other, wanted = thesis_quad_position(
-                law.other_modes, memory.other_modes, ahead.state, reference
-            )
+            other, wanted = thesis_quad_position(law.other_modes, memory.other_modes, ahead.state, reference)
             return PlumblineMemory(memory.position, other), hastened(wanted, ahead, law.constants)
 
         return of_plumbline
@@ -163,13 +161,9 @@ def air_tick(
     """One tick of law and mixer; `carries`: the load's position is tracked, else the vehicle's."""
     seen = look(pilot, state, taut, model)
     if carries:
-        memory, command = law_load_position(
-            model.law, pilot.memory, state, reference, pilot.actuation, seen
-        )
+        memory, command = law_load_position(model.law, pilot.memory, state, reference, pilot.actuation, seen)
     else:
-        memory, command = law_quad_position(
-            model.law, pilot.memory, state, reference, pilot.actuation, seen
-        )
+        memory, command = law_quad_position(model.law, pilot.memory, state, reference, pilot.actuation, seen)
     mixed = mix(command.thrust, command.moment, model.vehicle, model.limited)
     actuation = actuate(pilot.actuation, mixed.thrust_done, mixed.moment_done, model.actuation)
     return Pilot(memory, command, mixed, actuation, seen)

@@ -31,6 +31,11 @@ _MOST_VALUES = 10_000
 _DRAW_SEED = 1  # of the settings of `--sample`: part of the plan's meaning
 
 
+def simulated(settings: Mapping[str, float]) -> dict[str, float]:
+    """Of settings by name those that the simulator takes."""
+    return {n: v for n, v in settings.items() if n.startswith("SIM_") and n != "SIM_LOSS_PCT"}
+
+
 class PlanError(GcsError):
     """A sweep that cannot be."""
 
@@ -39,8 +44,8 @@ class PlanError(GcsError):
 
 @dataclass(frozen=True)
 class Varied:
-    """A parameter and what it takes on: on a grid each of `values`, drawn any number between the least and the
-    greatest if `continuous`."""
+    """A parameter and what it takes on: on a grid each of `values`; drawn, if `continuous`, any number
+    between the least and the greatest."""
 
     name: str
     values: tuple[float, ...]
@@ -117,9 +122,7 @@ def from_json(values: Mapping[str, Any]) -> Plan:
         sensors=values["sensors"],
         laws=tuple(values["laws"]),
         seeds=tuple(values["seeds"]),
-        varied=tuple(
-            Varied(v["name"], tuple(v["values"]), bool(v["continuous"])) for v in values["varied"]
-        ),
+        varied=tuple(Varied(v["name"], tuple(v["values"]), bool(v["continuous"])) for v in values["varied"]),
         settings=tuple((name, float(value)) for name, value in values["settings"]),
         sample=int(values["sample"]),
     )
@@ -218,7 +221,9 @@ def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
         raise PlanError(str(error)) from None
     for name, value in values:
         if name == "SIM_LOSS_PCT":
-            raise PlanError("SIM_LOSS_PCT acts on the ground link, and a sweep flies without one; leave it out")
+            raise PlanError(
+                "SIM_LOSS_PCT acts on the ground link, and a sweep flies without one; leave it out"
+            )
         if name == "CTL_LAW":
             raise PlanError("CTL_LAW is what --law says; give --law instead")
         holder = simulated if name.startswith("SIM_") and name in simulated else table

@@ -25,8 +25,20 @@ def draw_map(path: Path, flights: Flights, plan: Plan, names: tuple[str, str], u
     success = LinearSegmentedColormap.from_list("success", [RED, "#f6e3c5", BLUE])
     panels: tuple[tuple[str, Floats, Any, Any, float], ...] = (
         ("flights completed (%)", 100.0 * found.success, Normalize(0.0, 100.0), success, 1.0),
-        ("greatest load error, median (mm)", found.error_median_m, LogNorm(*_ERROR_LIMITS_MM), "viridis_r", 1e3),
-        ("greatest load error, worst (mm)", found.error_worst_m, LogNorm(*_ERROR_LIMITS_MM), "viridis_r", 1e3),
+        (
+            "greatest load error, median (mm)",
+            found.error_median_m,
+            LogNorm(*_ERROR_LIMITS_MM),
+            "viridis_r",
+            1e3,
+        ),
+        (
+            "greatest load error, worst (mm)",
+            found.error_worst_m,
+            LogNorm(*_ERROR_LIMITS_MM),
+            "viridis_r",
+            1e3,
+        ),
     )
     with style():
         figure = new_figure(14.4, 4.3)
@@ -46,7 +58,10 @@ def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) 
     ax.grid(False)
     ax.set_facecolor(PALE)
     image = ax.imshow(shown, origin="lower", aspect="auto", norm=norm, cmap=colours, interpolation="nearest")
-    for ticks, labels, centres in ((ax.set_xticks, ax.set_xticklabels, x), (ax.set_yticks, ax.set_yticklabels, y)):
+    for ticks, labels, centres in (
+        (ax.set_xticks, ax.set_xticklabels, x),
+        (ax.set_yticks, ax.set_yticklabels, y),
+    ):
         stride = max(1, -(-len(centres) // 12))
         ticks(range(0, len(centres), stride))
         labels([f"{value:.4g}" for value in centres[::stride]])
@@ -74,7 +89,12 @@ def draw_curve(path: Path, laws: list[Flights], plan: Plan, name: str, units: di
             x = found.axes[0]
             left.plot(x, 100.0 * found.success, "o-", color=colour, markersize=4, label=flights.law)
             right.plot(
-                x, 1e3 * found.error_median_m, "o-", color=colour, markersize=4, label=f"{flights.law}, median"
+                x,
+                1e3 * found.error_median_m,
+                "o-",
+                color=colour,
+                markersize=4,
+                label=f"{flights.law}, median",
             )
             right.plot(x, 1e3 * found.error_worst_m, "--", color=colour, linewidth=1.0, label="worst")
         left.set_ylim(-4.0, 104.0)

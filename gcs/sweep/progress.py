@@ -16,7 +16,7 @@ _REFRESH_S = 0.2
 
 
 class SweepDisplay:
-    """How many flights are flown, how many of them completed, how fast it goes and how long it still takes."""
+    """How many flights are flown, what share of them completed, how fast it goes and how long it takes."""
 
     def __init__(self, done: int, total: int, quiet: bool) -> None:
         self._before, self._done, self._total = done, done, total

@@ -13,8 +13,8 @@ from typing import Any
 
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.parameters import ParameterTable
-from gcs.sweep.margin import linear_margin
+from autopilot.wire.parameters import Parameter, ParameterTable
+from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import PLAN_FILE, Plan
 from gcs.sweep.plots import draw_curve, draw_map
 from gcs.sweep.results import Flights, flights_of, reach
@@ -33,7 +33,7 @@ def write_report(directory: Path, plan: Plan) -> Path:
 
     laws = [flights for flights in flights_of(Store(directory, plan).read(), plan) if flights.outcome]
     tables = _tables(plan)
-    units = {v.name: _parameter(tables, v.name)[1] for v in plan.varied}
+    units = {v.name: _parameter(tables, v.name).unit for v in plan.varied}
     names = [v.name for v in plan.varied if len(set(v.values)) > 1]
     curves, maps = [], []
     for name in names if laws else []:
@@ -72,10 +72,11 @@ def margins(plan: Plan, laws: list[Flights], tables: tuple[ParameterTable, ...])
     rows = []
     for flights in laws:
         for varied in plan.varied:
-            nominal, unit = _parameter(tables, varied.name)
-            nominal = dict(plan.settings).get(varied.name, nominal)
+            parameter = _parameter(tables, varied.name)
+            nominal, unit = parameter.default, parameter.unit
             found = reach(flights, plan, varied.name, nominal)
-            limit = linear_margin(plan, flights.law, varied.name)
+            least, most = min(*varied.values, nominal), max(*varied.values, nominal)
+            limits = (max(parameter.low, least), min(parameter.high, nominal + 2.0 * (most - nominal)))
             rows.append(
                 {
                     "law": flights.law,
@@ -85,7 +86,7 @@ def margins(plan: Plan, laws: list[Flights], tables: tuple[ParameterTable, ...])
                     "every": _range(found.all_from, found.all_to),
                     "some": _range(found.some_from, found.some_to),
                     "flown": _range(min(varied.values), max(varied.values)),
-                    "linear": "" if limit is None else f"{limit:.4g}",
+                    "linear": linear_range(plan, flights.law, varied.name, nominal, limits),
                 }
             )
     return rows
@@ -115,11 +116,8 @@ def _tables(plan: Plan) -> tuple[ParameterTable, ...]:
     return (sim_parameters(load_truth(plan.vehicle)), autopilot_parameters(load_belief(plan.vehicle)))
 
 
-def _parameter(tables: tuple[ParameterTable, ...], name: str) -> tuple[float, str]:
-    """Default and unit."""
-    table = next(table for table in tables if name in table)
-    parameter = table.describe(name)
-    return parameter.default, parameter.unit
+def _parameter(tables: tuple[ParameterTable, ...], name: str) -> Parameter:
+    return next(table for table in tables if name in table).describe(name)
 
 
 def _picture(path: Path, caption: str) -> dict[str, str]:

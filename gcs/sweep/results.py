@@ -33,7 +33,7 @@ class Flights:
 
 @dataclass(frozen=True)
 class Cells:
-    """Figures over one or two parameters; NaN where nothing was flown, errors also where nothing completed."""
+    """Figures over one or two parameters; NaN where nothing was flown, errors also where none completed."""
 
     axes: tuple[Floats, ...]  # centres, one array for each parameter
     flown: Floats  # flights
@@ -121,8 +121,12 @@ def reach(flights: Flights, plan: Plan, name: str, nominal: float) -> Reach:
     centres = levels(plan, name)
     level = _nearest(flights.values[name], centres)
     rest = [other.name for other in plan.varied if other.name != name]
-    settings = np.stack([flights.values[other] for other in rest], axis=1) if rest else np.zeros((len(level), 1))
-    every = np.array([flights.completed[level == i].all() and (level == i).any() for i in range(len(centres))])
+    settings = (
+        np.stack([flights.values[other] for other in rest], axis=1) if rest else np.zeros((len(level), 1))
+    )
+    every = np.array(
+        [flights.completed[level == i].all() and (level == i).any() for i in range(len(centres))]
+    )
     some = np.zeros(len(centres), dtype=np.bool_)
     for i in range(len(centres)):
         here = level == i

@@ -89,7 +89,9 @@ class Store:
         folder = self._directory / PARTS
         folder.mkdir(parents=True, exist_ok=True)
         first = min(row["index"] for row in rows)
-        self._write(folder / f"{first:09d}-{len(rows)}.parquet", pa.Table.from_pylist(list(rows), self._schema))
+        self._write(
+            folder / f"{first:09d}-{len(rows)}.parquet", pa.Table.from_pylist(list(rows), self._schema)
+        )
 
     def merge(self) -> pyarrow.Table:
         """One table of all that is stored, in the order of the flights; the parts go when it is on disk."""

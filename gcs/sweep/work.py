@@ -32,8 +32,8 @@ class Work:
 def prepare(plan: Plan) -> Work:
     """The work of a plan; flies the beginning of one flight for each law, which also compiles its kernels.
 
-    The instants of arming and starting are those of the settings that all flights share. A vehicle that is not
-    ready at them, under what is varied, is asked again.
+    The instants of arming and starting are those of the settings that all flights share. A vehicle that is
+    not ready at them, under what is varied, is asked again.
     """
     mission = load_mission(plan.mission)
     cases = {law: Case(0, law, plan.seeds[0], ()) for law in plan.laws}

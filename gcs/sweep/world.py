@@ -7,7 +7,7 @@ machine code. A test holds the two against each other, bit for bit.
 from __future__ import annotations
 
 from math import log
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,12 +104,12 @@ def _get3(row: Floats, first: int) -> Vec3:
 
 
 @kernel
-def _sample(sensor: int, plant: PlantState, error: Floats, row: Floats, model: WorldModel, noise: Noise) -> None:
+def _sample(
+    sensor: int, plant: PlantState, error: Floats, row: Floats, model: WorldModel, noise: Noise
+) -> None:
     """Measure: the reading goes into `row`, the sensor's drift into `error`."""
     if sensor == IMU:
-        inertial, biases = imu.sample(
-            plant, imu.ImuState(_get3(error, 0), _get3(error, 3)), model.imu, noise
-        )
+        inertial, biases = imu.sample(plant, imu.ImuState(_get3(error, 0), _get3(error, 3)), model.imu, noise)
         _put3(row, READING, inertial.accel_body)
         _put3(row, READING + 3, inertial.gyro_body)
         _put3(error, 0, biases.accel_bias)
@@ -186,7 +186,7 @@ def measure(plant: PlantState, now_us: int, model: WorldModel, buffers: Buffers)
 
 @kernel
 def arrived(sensor: int, now_us: int, buffers: Buffers) -> int:
-    """Row of the queue that holds the sensor's next reading that has left by now, which is taken out; or -1."""
+    """Row of the queue with the sensor's next reading that has left by now, taken out of it; or -1."""
     clock = buffers.clock[sensor]
     head = clock[HEAD]
     if clock[LENGTH] == 0 or buffers.queue[sensor, head, LEAVES] > now_us:
@@ -245,7 +245,9 @@ _NOT_FITTED = (
 _KINDS = (imu, pose_tracker, load_tracker, cable_sensor, gnss, barometer, magnetometer)
 
 
-def new_world(truth: Truth, profile: Profile, settings: Settings, seed: int) -> tuple[World, WorldModel, Buffers]:
+def new_world(
+    truth: Truth, profile: Profile, settings: Settings, seed: int
+) -> tuple[World, WorldModel, Buffers]:
     """The world before its first tick, its first readings taken."""
     tick_s = settings.tick_us / 1e6
     fitted: list[Delivery | None] = [
@@ -264,17 +266,18 @@ def new_world(truth: Truth, profile: Profile, settings: Settings, seed: int) -> 
             for table, blank in zip(fitted[1:], _NOT_FITTED, strict=True)
         ),
     ]
-    model = WorldModel(
+    parts: list[Any] = [
         truth,
         *configs,
-        tick_us=settings.tick_us,
-        actuator_delay_us=settings.actuator_delay_us,
-        seed=seed,
-        noise_scale=settings.noise_scale,
-        wind=settings.wind,
-        gust_std=settings.gust_std,
-        gust_tau_s=settings.gust_tau_s,
-    )
+        settings.tick_us,
+        settings.actuator_delay_us,
+        seed,
+        settings.noise_scale,
+        settings.wind,
+        settings.gust_std,
+        settings.gust_tau_s,
+    ]
+    model = WorldModel(*parts)
     clock = np.zeros((SENSORS, 9), dtype=np.int64)
     fate = np.zeros((SENSORS, 4))
     errors = np.zeros((SENSORS, 6))
@@ -286,7 +289,7 @@ def new_world(truth: Truth, profile: Profile, settings: Settings, seed: int) -> 
         timing = _timing(table, settings)
         chance = Fate.of(table)
         noise = Noise(seed, CHANNEL_STREAMS[sensor], 0, settings.noise_scale)
-        begun = _KINDS[sensor].start(config, noise)  # type: ignore[attr-defined]
+        begun = _KINDS[sensor].start(config, noise)
         errors[sensor, : 3 * len(begun)] = np.ravel(begun)
         extra = 0.0 if sensor == IMU else settings.sensor_loss
         period_us = timing.nominal_us(1) - timing.nominal_us(0)
