@@ -129,7 +129,7 @@ def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
         str(tmp_path),
         "--json",
     ]
-    result = CliRunner().invoke(gcs, arguments, prog_name="gcs")
+    result = CliRunner().invoke(gcs, [*arguments, "--json"], prog_name="gcs")
     assert result.exit_code == 0, result.output
     record = json.loads(result.stdout)
     assert (record["flights"], record["completed"], record["failed"]) == (2, 2, 0)
