@@ -12,7 +12,8 @@ circle, all commands delayed alike.
 computation, transport.
 
 The law `plumbline` knows delay and lag of the rotors, unless told otherwise by `believed_delay` and
-`believed_tau`; its force filter is `omega_force`, the lag it makes the rotors show `wanted_tau`.
+`believed_tau`; the lag it makes the rotors show is `wanted_tau`, its gains are those of the design unless any
+is given.
 
     python benchmarks/cascade_margin.py [--loop attitude|position|vehicle|plumbline] [--set k_R=0.45 ...]
 """
@@ -58,7 +59,6 @@ FILTERS = (
     "omega_direction",
     "omega_reference",
     "zeta",
-    "omega_force",
     "believed_tau",
     "believed_delay",
     "wanted_tau",
@@ -201,7 +201,6 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
 def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConstants:
     """What the law is told: the delay and lag of the settings, unless others are believed."""
     told = {
-        "omega_force": plumbline.OMEGA_FORCE,
         "believed_tau": settings.rotor_tau,
         "believed_delay": settings.delay,
         "wanted_tau": WANTED_TAU,
@@ -212,7 +211,6 @@ def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConsta
     )
     return PlumblineConstants(
         gains,
-        filter_constants(told["omega_force"], plumbline.ZETA, settings.period),
         Drag(0.0, 0.0),
         actuation_constants(told["believed_delay"], told["believed_tau"], settings.period),
         lag_gain(told["believed_tau"], told["wanted_tau"], settings.period),
@@ -221,11 +219,11 @@ def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConsta
     )
 
 
-LAW_MEMORY = 14  # force filter, thrust rate, thrust and moment of the rotors; then the commands on their way
+LAW_MEMORY = 5  # thrust rate, thrust and moment of the rotors; then the commands on their way
 
 
 def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array], Array], Array]:
-    """As `law`, and its memory at hover: force filter, thrust's rate, rotors, commands on their way.
+    """As `law`, and its memory at hover: the thrust's rate, rotors, commands on their way.
 
     Mass and wind are not observed here: across the cable what is observed does not depend on the rotors, and
     along it the mass is learned slowly.
@@ -238,12 +236,11 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
 
     def tick(numbers: Array) -> Array:
         state = state_at(numbers[-MOTION:], vehicle)
-        filtered = FilterState(_vec(numbers[0:3]), _vec(numbers[3:6]), _vec(numbers[6:9]))
         queue = np.zeros((rows + 1, 4))
         queue[:rows] = numbers[LAW_MEMORY:-MOTION].reshape(rows, 4)
-        actuation = Actuation(queue, float(numbers[10]), _vec(numbers[11:14]))
+        actuation = Actuation(queue, float(numbers[1]), _vec(numbers[2:5]))
         memory, command = load_position_tick(
-            plumbline.PlumblineMemory(filtered, float(numbers[9]), 1.0),
+            plumbline.PlumblineMemory(float(numbers[0])),
             state,
             reference,
             actuation,
@@ -253,7 +250,6 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
         after = advance(actuation, command.thrust, command.moment, constants.actuation)
         return np.array(
             [
-                *(number for vector in memory.force for number in vector),
                 memory.thrust_rate,
                 after.thrust,
                 *after.moment,
@@ -264,7 +260,7 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
         )
 
     hover = np.zeros(LAW_MEMORY + 4 * rows)
-    hover[10] = weight
+    hover[1] = weight
     hover[LAW_MEMORY::4] = weight
     return tick, hover
 
