@@ -98,6 +98,7 @@ def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
     return design(
         Wanted(
             tolerance=1e-3 * table["PLB_DELAY_TOL"],
+            integral_ratio=table["PLB_RATIO_I"],
             cable_ratio=table["PLB_RATIO_Q"],
             attitude_ratio=table["PLB_RATIO_R"],
             zeta=table["PLB_ZETA"],

@@ -81,6 +81,7 @@ def load_position_tick(
         constants.gains,
         constants.drag,
         observed.push,
+        constants.period,
         loaded(constants.vehicle, observed.load_mass),
     )
     return memory, hastened(wanted, ahead, constants)

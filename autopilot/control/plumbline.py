@@ -8,6 +8,7 @@
 | k_R, k_Omega   | k_R, k_Omega  | `design` | N m, N m s | (3-21)   |
 | k_q, k_w       | k_q, k_omega  | `design` | N, N s     | (3-33)   |
 | k_x, k_v       | k_x, k_v      | `design` | N/m, N s/m | (3-43)   |
+| e_i, k_i       | integral, k_i | `design` | m s, N/m/s | e_i' = e_x |
 | F              | F             |          | N          | (3-31)   |
 | F_d            | F_d           |          | N          | m (x_d'' + g e_3) - m_Q L q_d'' |
 | f, f'          | thrust, thrust_rate |    | N, N/s     | (3-35)   |
@@ -68,6 +69,8 @@ from missions.flatness import unit_derivatives_4
 
 STEP = 2e-3  # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
 
+GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask for
+
 # N; a shorter force has no direction to follow, and a load falling freely no cable direction
 _LEAST_FORCE = 1e-3
 # sine of the least angle between heading and thrust axis at which R_c is differentiated
@@ -83,12 +86,14 @@ class PlumblineGains(NamedTuple):
     k_omega: float  # N s
     k_x: Vec3  # N/m
     k_v: Vec3  # N s/m
+    k_i: Vec3  # N/m/s
 
 
 class PlumblineMemory(NamedTuple):
     """All that load position remembers from one tick to the next."""
 
     thrust_rate: float  # f', N/s
+    integral: Vec3  # e_i, of e_x, m s
 
 
 class WantedForce(NamedTuple):
@@ -107,13 +112,14 @@ PLUMBLINE_GAINS = PlumblineGains(
     k_omega=2.0,
     k_x=(6.0, 6.0, 6.0),
     k_v=(2.75, 2.75, 2.75),
+    k_i=(0.0, 0.0, 0.0),
 )
 
 
 @kernel
 def start() -> PlumblineMemory:
     """Memory of a law that begins now: the thrust is taken for steady."""
-    return PlumblineMemory(0.0)
+    return PlumblineMemory(0.0, (0.0, 0.0, 0.0))
 
 
 @kernel
@@ -191,11 +197,12 @@ def wanted_force(
     motion: LoadMotion,
     air: Vec3,
     jet: Jet,
+    e_i: Vec3,
     gains: PlumblineGains,
     vehicle: Vehicle,
 ) -> WantedForce:
     """F of (3-31), drag and wind made up for, and what it is made from."""
-    position = position_jet(state, motion, jet, gains.k_x, gains.k_v, vehicle)
+    position = position_jet(state, motion, jet, e_i, gains.k_i, gains.k_x, gains.k_v, vehicle)
     q_c = direction_jet(position, state)
     direction = load_attitude_force(
         state.q_cable,
@@ -216,7 +223,8 @@ def force_beside(
     motion: LoadMotion,
     turning: Vec3,
     rotors: Vec3,
-    reference: Reference,
+    jet: Jet,
+    e_i: Vec3,
     h: float,
     gains: PlumblineGains,
     drag: Drag,
@@ -229,7 +237,9 @@ def force_beside(
     air = add(air_force(then.v_quad, drag), push)
     thrust = f + h * f_dot + 0.5 * h * h * f_ddot
     moved = load_motion(then, thrust, f_dot + h * f_ddot, air, vehicle)
-    return wanted_force(then, moved, air, shifted_jet(reference.jet, h), gains, vehicle).F
+    e_x, e_v = sub(state.x_load, jet[0]), sub(state.v_load, jet[1])
+    summed = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
+    return wanted_force(then, moved, air, shifted_jet(jet, h), summed, gains, vehicle).F
 
 
 @kernel
@@ -242,17 +252,18 @@ def load_position(
     gains: PlumblineGains,
     drag: Drag,
     push: Vec3,
+    period: float,
     vehicle: Vehicle,
 ) -> tuple[PlumblineMemory, Command]:
     """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
 
     `thrust`, N, and `moment`, N m: what the rotors give at this instant; `push`, N, world: what the air does
-    to the vehicle besides drag in still air.
+    to the vehicle besides drag in still air; `period`, s, is that of the law.
     """
     jet = reference.jet
     air = add(air_force(state.v_quad, drag), push)
     motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
-    wanted = wanted_force(state, motion, air, jet, gains, vehicle)
+    wanted = wanted_force(state, motion, air, jet, memory.integral, gains, vehicle)
     F, position, direction = wanted.F, wanted.position, wanted.direction
 
     J, W = vehicle.inertia, state.omega_body
@@ -261,8 +272,12 @@ def load_position(
     F_d, F_d_dot, F_d_ddot = flat_force(jet, vehicle)
     u, u_dot, _ = unit_derivatives(F_d, F_d_dot, F_d_ddot)
     rotors: Vec3 = (thrust, memory.thrust_rate, dot(u, F_d_ddot) + dot(u_dot, F_d_dot))
-    F_after = force_beside(state, motion, turning, rotors, reference, STEP, gains, drag, push, vehicle)
-    F_before = force_beside(state, motion, turning, rotors, reference, -STEP, gains, drag, push, vehicle)
+    F_after = force_beside(
+        state, motion, turning, rotors, jet, memory.integral, STEP, gains, drag, push, vehicle
+    )
+    F_before = force_beside(
+        state, motion, turning, rotors, jet, memory.integral, -STEP, gains, drag, push, vehicle
+    )
     F_dot = scale(0.5 / STEP, sub(F_after, F_before))
     F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
 
@@ -286,4 +301,9 @@ def load_position(
         wanted.q_c.q_c,
         attitude.R_c,
     )
-    return PlumblineMemory(dot(F_dot, b3) + dot(F, b3_dot)), command
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    integral = axpy(period, position.e_x, memory.integral)
+    held = norm(times(gains.k_i, integral))
+    if held > GREATEST_HELD * weight:
+        integral = scale(GREATEST_HELD * weight / held, integral)
+    return PlumblineMemory(dot(F_dot, b3) + dot(F, b3_dot), integral), command
