@@ -116,7 +116,7 @@ def step(
             mixed=idle,
             actuation=actuation,
             observed=nominal(setup.vehicle)._replace(
-                vehicle_ground=observed.vehicle_ground, load_ground=observed.load_ground
+                support=observed.support, load_ground=observed.load_ground
             ),
         ), report
 

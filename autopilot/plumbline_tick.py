@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 from autopilot.actuation import Actuation, ActuationConstants
 from autopilot.control import plumbline
-from autopilot.control.command_filter import FilterConstants
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.observer import Observed, loaded
-from autopilot.prediction import Ahead, predict
+from autopilot.observer import Observed, loaded, standing
+from autopilot.prediction import Ahead, predict, stay
 from autopilot.rotor_lag import hasten
 
 
@@ -22,7 +21,6 @@ class PlumblineConstants(NamedTuple):
     """All that the parameters decide."""
 
     gains: plumbline.PlumblineGains
-    force_filter: FilterConstants
     drag: Drag
     actuation: ActuationConstants
     lag_gain: float
@@ -39,6 +37,8 @@ def ahead_of(
     constants: PlumblineConstants,
 ) -> Ahead:
     """State and rotors at the instant at which the command of this tick comes into force."""
+    if standing(observed, constants.vehicle):
+        return stay(state, actuation, constants.actuation)
     return predict(
         state,
         taut,
@@ -77,10 +77,11 @@ def load_position_tick(
         ahead.state,
         reference,
         ahead.thrust,
+        ahead.moment,
         constants.gains,
-        constants.force_filter,
         constants.drag,
         observed.push,
+        constants.period,
         loaded(constants.vehicle, observed.load_mass),
     )
     return memory, hastened(wanted, ahead, constants)
