@@ -83,7 +83,7 @@ def step(
     before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
 ) -> tuple[FlightState, Report]:
     """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
-    estimator = estimate(before.estimator, history, readings, setup.tuning, dt)
+    estimator = estimate(before.estimator, history, readings, setup.tuning, dt, before.mixed.thrust_done)
     if not is_due(tick, setup.control_every):
         return before._replace(estimator=estimator), Report()
 
