@@ -28,7 +28,10 @@ _COLUMNS = 9
 
 
 class Body(NamedTuple):
-    """The vehicle's numbers that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, see (2-13)."""
+    """The vehicle's numbers that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, see (2-13).
+
+    Drag of the vehicle in N s/m and N s^2/m^2.
+    """
 
     quad_mass: float
     load_mass: float
@@ -37,6 +40,8 @@ class Body(NamedTuple):
     gravity: float
     arm: float
     torque_ratio: float
+    drag_linear: float = 0.0
+    drag_quadratic: float = 0.0
 
 
 class Extreme(NamedTuple):
@@ -76,7 +81,15 @@ def _rotor_range(thrust: float, moment: Vec3, arm: float, torque_ratio: float) -
 def _fill(row: Samples, jet: Jet, body: Body) -> None:
     """One sample: the columns named above, for a heading of 0; TILT as the cosine of the angle."""
     flat = flat_outputs(
-        jet, 0.0, body.quad_mass, body.load_mass, body.cable_length, body.inertia, body.gravity
+        jet,
+        0.0,
+        body.quad_mass,
+        body.load_mass,
+        body.cable_length,
+        body.inertia,
+        body.gravity,
+        body.drag_linear,
+        body.drag_quadratic,
     )
     low, high = _rotor_range(flat.thrust, flat.moment, body.arm, body.torque_ratio)
     row[0] = norm(jet[1])
