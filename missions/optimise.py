@@ -27,11 +27,16 @@ from missions.survey import Body
 
 SAMPLES = 4  # to an interval
 _BAND = DEGREE + 1
-_ROUNDS = 8
-_EXCESS_PRICE = 300.0  # of one newton for one second, where a distance of d costs 1 for each second
+_ROUNDS = 12
+_EXCESS_PRICE = 2e4  # of one newton for one second, where a distance of d costs 1 for each second
+_ROW_PRICE = 1e5  # of one metre
+_HALVINGS = 7
 _SETTLED = 1e-3  # relative fall of the cost that ends the rounds
 _COS_SCALE, _TENSION_SCALE = 2.0, 1.0  # excess of cosine and tension, as newtons of a rotor
 _TINY = 1e-9
+_NEAR_ENOUGH_N = 0.05  # excess at which the rounds may begin
+_SMOOTHER, _SMOOTHER_TRIES = 30.0, 8
+_AWAY_N = 0.6  # a bound from which the demand is so far away is left out of a round
 _ACCURACY = 1e-7  # of the solver; the cost is of order one
 
 
@@ -91,6 +96,7 @@ class Problem:
     def _cost_matrix(self) -> sparse.csc_matrix:
         h = self.spacing
         found = self.goal.near * h * (self._linear[0].T @ self._linear[0])
+        self._near = sparse.csc_matrix(found)
         for order, weight in self.goal.smooth:
             found = found + weight * h * (self._linear[order].T @ self._linear[order])
         return sparse.csc_matrix(found)
@@ -134,41 +140,43 @@ class Problem:
         """(n,) the greatest excess at each sample, N."""
         return excess(demand(jets, self.body), self.spacing, self.bounds)
 
-    def _merit(self, jets: Array) -> float:
-        return self._cost(jets) + _EXCESS_PRICE * self.spacing * float(np.sum(self._over(jets)))
+    def _merit(self, free: Array, jets: Array, bounded: bool) -> float:
+        """Cost, with what the bounds and the linear constraints are broken by at its price."""
+        total = self._cost(jets)
+        if bounded:
+            total += _EXCESS_PRICE * self.spacing * float(np.sum(self._over(jets)))
+        if len(self.rows.time):
+            here = self._extra_fixed + self._extra @ free.T.ravel()
+            broken = np.maximum(here - self.rows.high, self.rows.low - here)
+            total += _ROW_PRICE * float(np.sum(np.maximum(broken, 0.0)))
+        return total
 
     # ---- one round
 
     def solve(self, bounded: bool = True) -> Solution:
         """The coefficients of the least cost."""
-        free = self._unbounded()
-        if len(self.rows.time):
-            step = self._quadratic(free, None)
-            if step is None:
-                return Solution(self.fixed, np.inf, False)
-            free = step
+        free = self._beginning() if bounded else self._unbounded(1.0)
         jets = self.jets(self._all(free))
-        if bounded and float(self._over(jets).max()) > _TINY:
-            merit = self._merit(jets)
-            for _ in range(_ROUNDS):
-                step = self._quadratic(free, jets)
-                if step is None:
-                    return Solution(self._all(free), np.inf, False)
-                share, better = 1.0, False
-                for _ in range(6):
-                    tried = free + share * (step - free)
-                    tried_jets = self.jets(self._all(tried))
-                    tried_merit = self._merit(tried_jets)
-                    if tried_merit < merit:
-                        better = True
-                        break
-                    share *= 0.5
-                if not better:
+        merit = self._merit(free, jets, bounded)
+        for _ in range(_ROUNDS):
+            step = self._quadratic(free, jets if bounded else None)
+            if step is None:
+                return Solution(self._all(free), np.inf, False)
+            better, share = False, 1.0
+            for _ in range(_HALVINGS):
+                tried = free + share * (step - free)
+                tried_jets = self.jets(self._all(tried))
+                tried_merit = self._merit(tried, tried_jets, bounded)
+                if tried_merit < merit:
+                    better = True
                     break
-                fallen = merit - tried_merit
-                free, jets, merit = tried, tried_jets, tried_merit
-                if fallen < _SETTLED * max(merit, 1e-3):
-                    break
+                share *= 0.5
+            if not better:
+                break
+            fallen = merit - tried_merit
+            free, jets, merit = tried, tried_jets, tried_merit
+            if share == 1.0 and fallen < _SETTLED * max(merit, 0.1):
+                break
         worst = float(self._over(jets).max()) if bounded else 0.0
         return Solution(self._all(free), worst, True)
 
@@ -179,10 +187,28 @@ class Problem:
             found = found + weight * (self._linear[order].T @ jets[order])
         return np.asarray(self.spacing * found)
 
-    def _unbounded(self) -> Array:
-        """(size, 3) the free coefficients of the least cost, whatever the bounds."""
-        factor = splu(self._hessian)
-        return np.asarray(-factor.solve(self._gradient(self.jets(self.fixed))))
+    def _unbounded(self, smoother: float) -> Array:
+        """(size, 3) the free coefficients of the least cost, whatever the bounds; `smoother` times as smooth."""
+        near, rest = self._near, self.jets(self.fixed)
+        smooth = self._hessian - near
+        gradient = self._gradient(rest)
+        pull = self.goal.near * self.spacing * (self._linear[0].T @ (rest[0] - self.goal.target))
+        factor = splu(sparse.csc_matrix(near + smoother * smooth))
+        return np.asarray(-factor.solve(pull + smoother * (gradient - pull)))
+
+    def _beginning(self) -> Array:
+        """Where to begin: the smoothest of the paths that are least smoothed and still within the bounds.
+
+        Far outside of them the demand is anything but linear: the thrust may turn over.
+        """
+        smoother = 1.0
+        free = self._unbounded(smoother)
+        for _ in range(_SMOOTHER_TRIES):
+            if float(self._over(self.jets(self._all(free))).max()) <= _NEAR_ENOUGH_N:
+                break
+            smoother *= _SMOOTHER
+            free = self._unbounded(smoother)
+        return free
 
     def _all(self, free: Array) -> Array:
         found = self.fixed.copy()
@@ -269,12 +295,11 @@ class Problem:
         limits: list[Array] = []
 
         def bound(rows: sparse.csr_matrix, value: Array, low: float, high: float, scale: float) -> None:
-            if np.isfinite(high):
-                blocks.append(sparse.hstack([rows, excess_of * scale], format="csr"))
-                limits.append(high - value)
-            if np.isfinite(low):
-                blocks.append(sparse.hstack([-rows, excess_of * scale], format="csr"))
-                limits.append(value - low)
+            for sign, room in ((1.0, high - value), (-1.0, value - low)):
+                keep = room < _AWAY_N
+                if keep.any():
+                    blocks.append(sparse.hstack([sign * rows[keep], scale * excess_of[keep]], format="csr"))
+                    limits.append(room[keep])
 
         for rotor in range(4):
             bound(lag @ matrix(rotor), lag @ found[:, rotor], bounds.rotor_low, bounds.rotor_high, 1.0)

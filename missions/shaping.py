@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import inf, nextafter
+from math import cos, inf, nextafter, pi
 
 import numpy as np
 
@@ -36,7 +36,8 @@ _WIDER = 1.6  # a window whose path exceeds the bounds is tried so many times as
 _TRIES = 3  # ... so often
 _COARSE_S = 0.01
 _FINE_S = 0.002
-_TOLERANCE_N = 0.02  # by which a shaped path may exceed its bounds
+_TOLERANCE_N = 0.05  # by which a shaped path may exceed its bounds between the samples
+_INSIDE_N = 0.03  # by which its samples keep within them
 # of the cost: a distance that counts as much as a sixth derivative which takes a rotor half its range
 _DISTANCE_M = 1e-3
 _SMOOTH_SHARE = 0.5
@@ -246,7 +247,8 @@ def _solve(
     full = full_crackle(body, _rotor_range(bounds))
     smooth = 1.0 / (_SMOOTH_SHARE * full) ** 2
     goal = Goal(target, _DISTANCE_M**-2, ((6, smooth), (7, smooth * _SMOOTH_S**2)))
-    problem = Problem(basis, fixed, body, bounds, goal, _held(begin, basis, origin))
+    inner = bounds._replace(rotor_low=bounds.rotor_low + _INSIDE_N, rotor_high=bounds.rotor_high - _INSIDE_N)
+    problem = Problem(basis, fixed, body, inner, goal, _rows(step, table, begin, end, origin))
     solution = problem.solve()
     if not solution.solved:
         return None
@@ -254,15 +256,35 @@ def _solve(
     return pieces, _fine_excess(pieces, begin, end, body, bounds)
 
 
-def _held(begin: float, basis: Basis, origin: Array) -> Rows:
-    """The load stays within HELD_M of its place until the signals begin."""
-    if begin >= 0.0:
+def _rows(step: Signals, table: SignalTable, begin: float, end: float, origin: Array) -> Rows:
+    """The load stays within HELD_M of its place until the signals begin, and arrives where it is asked to."""
+    times: list[float] = []
+    axes: list[int] = []
+    low: list[float] = []
+    high: list[float] = []
+    if begin < 0.0:
+        held = np.linspace(begin, 0.0, max(int(-begin / (0.5 * INTERVAL_S)), 1) + 1)[1:]
+        for axis in range(3):
+            times += held.tolist()
+            axes += [axis] * held.size
+            low += [-HELD_M] * held.size
+            high += [HELD_M] * held.size
+    for term in step.terms:
+        if term.rise_90_by_s is None or not begin < term.start_s + term.rise_90_by_s < end:
+            continue
+        axis = "xyz".index(term.axis)
+        time = term.start_s + term.rise_90_by_s
+        made = 0.5 - 0.5 * cos(pi * min(term.rise_90_by_s / term.rise_s, 1.0))
+        asked = float(asked_jets(table, step.duration_s, np.array([time]))[0, 0, axis])
+        bound = asked + (0.9 - made) * term.amplitude_m - origin[axis]
+        times.append(time)
+        axes.append(axis)
+        low.append(bound if term.amplitude_m > 0.0 else -inf)
+        high.append(bound if term.amplitude_m < 0.0 else inf)
+    if not times:
         return NO_ROWS
-    times = np.linspace(begin, 0.0, max(int(-begin / (0.5 * INTERVAL_S)), 1) + 1)[1:]
-    n = len(times)
-    direction = np.tile(np.eye(3), (n, 1))
-    bound = np.full(3 * n, HELD_M)
-    return Rows(np.repeat(times, 3), np.zeros(3 * n, np.int64), direction, -bound, bound)
+    order = np.zeros(len(times), np.int64)
+    return Rows(np.array(times), order, np.eye(3)[axes], np.array(low), np.array(high))
 
 
 def _fine_excess(pieces: PieceTable, begin: float, end: float, body: Body, bounds: Bounds) -> float:
