@@ -53,7 +53,7 @@ from missions.model import (
     Takeoff,
     Waypoint,
 )
-from missions.signals import signal_table
+from missions.shaping import Shaped, unshaped
 
 P, E = Phase, Event
 TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
@@ -118,14 +118,16 @@ def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Fligh
         legs = (_calm(flight.legs[0], view, settings, ends_step=False),)
     else:
         legs = _ENTRY[phase](flight, view, settings) if phase in _ENTRY else ()
-    return replace(
+    entered = replace(
         flight,
         phase=phase,
         phase_start_us=view.now_us,
         legs=legs,
         leg_start_us=view.now_us,
         still_since_us=-1,
+        following=(),
     )
+    return replace(entered, following=_following(entered, settings))
 
 
 def happen(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
@@ -254,13 +256,13 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
         case Waypoint(east_m=east, north_m=north, altitude_m=altitude, hold_s=hold):
             there = (east, north, altitude)
             go = _carry(here, there, flight.speed_m_s, settings)
-            return (go, Hold(there, hold)) if hold > 0.0 else (go,)
+            return (go, Hold(there, max(hold - _borrowed(flight), 0.0))) if hold > 0.0 else (go,)
         case Delay(duration_s=duration):
-            return (Hold(here, duration),)
+            return (Hold(here, max(duration - _borrowed(flight), 0.0)),)
         case ReturnHome():
             return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings),)
-        case Signals(duration_s=duration, terms=terms):
-            return (Run(here, signal_table(terms), duration),)
+        case Signals():
+            return (Run(here, _path_of(flight, flight.step) or unshaped(step)),)
         case AttitudeRun(
             controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
         ):
@@ -271,6 +273,34 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
         case Land():
             return ()
     raise AssertionError(step)
+
+
+def _path_of(flight: Flight, step: int) -> Shaped | None:
+    """The path that was made ready for a step of the plan, if it has one."""
+    made = flight.plan.prepared.made
+    return made[step] if 0 <= step < len(made) else None
+
+
+def _borrowed(flight: Flight) -> float:
+    """Time (s) that the paths before and after the present step take from its hold: to come to rest, and to
+    get ready."""
+    before, after = _path_of(flight, flight.step - 1), _path_of(flight, flight.step + 1)
+    return (before.tail_s if before else 0.0) + (after.lead_s if after else 0.0)
+
+
+def _following(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
+    """The legs of the step after the present one, where it begins at rest where this one ends."""
+    step = flight.step + 1
+    if not flight.on_mission or flight.phase not in (P.LIFT, P.MISSION) or step >= len(flight.plan.steps):
+        return ()
+    last = flight.legs[-1] if flight.legs else None
+    if last is None or last.control_mode != LOAD_POSITION or not isfinite(last.duration_s):
+        return ()
+    end = last.jet(last.duration_s)
+    coming = flight.plan.steps[step]
+    if norm(end[1]) > AT_REST or not isinstance(coming, Waypoint | Delay | ReturnHome | Signals):
+        return ()
+    return _step_legs(coming, end[0], replace(flight, step=step), settings)
 
 
 _ENTRY = {

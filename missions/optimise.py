@@ -72,7 +72,9 @@ class Solution(NamedTuple):
 class Problem:
     """A spline with fixed ends, a goal and bounds."""
 
-    def __init__(self, basis: Basis, fixed: Array, body: Body, bounds: Bounds, goal: Goal, rows: Rows) -> None:
+    def __init__(
+        self, basis: Basis, fixed: Array, body: Body, bounds: Bounds, goal: Goal, rows: Rows
+    ) -> None:
         self.basis, self.fixed, self.body, self.bounds = basis, fixed, body, bounds
         self.goal, self.rows = goal, rows
         self.times: Array = sample_times(basis)
@@ -223,7 +225,9 @@ class Problem:
         n, size = len(self.times), self.size
         gradient = self._gradient(self.jets(self._all(free)))
         excesses = 0 if jets is None else n
-        hessian = sparse.block_diag([self._hessian] * 3 + [sparse.csc_matrix((excesses, excesses))], format="csc")
+        hessian = sparse.block_diag(
+            [self._hessian] * 3 + [sparse.csc_matrix((excesses, excesses))], format="csc"
+        )
         linear = np.concatenate([gradient.T.ravel(), np.full(excesses, _EXCESS_PRICE * self.spacing)])
         blocks: list[sparse.csr_matrix] = []
         limits: list[Array] = []

@@ -182,9 +182,7 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
 
 
 def _refused(asked: Shaped, reason: str) -> Shaped:
-    return Shaped(
-        asked.table, asked.pieces, asked.duration_s, 0.0, 0.0, 0.0, inf, 1.0, reason
-    )
+    return Shaped(asked.table, asked.pieces, asked.duration_s, 0.0, 0.0, 0.0, inf, 1.0, reason)
 
 
 def _span(begin: float, end: float, spacing: float) -> Array:
