@@ -15,7 +15,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterTable
 from missions.demand import Bounds
 from missions.model import Step
-from missions.planning import Limits, Prepared
+from missions.planning import UNPREPARED, Limits, Prepared
 from missions.survey import Body
 
 
@@ -71,7 +71,7 @@ class Plan:
     steps: tuple[Step, ...] = ()
     sequence: tuple[int, ...] = ()
     items: int = 0
-    prepared: Prepared = Prepared()
+    prepared: Prepared = UNPREPARED
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,16 @@ def limits_from(table: ParameterTable) -> Limits:
     shaped = shaping == SHAPE_ALWAYS or (
         shaping == SHAPE_WITH_PLUMBLINE and LAWS[int(table["CTL_LAW"])] == "plumbline"
     )
-    return Limits(body, bounds, shaped, table["MIS_SHAPE_ERR"], int(table["MIS_INFEASIBLE"]))
+    return Limits(
+        body,
+        bounds,
+        shaped,
+        table["MIS_SHAPE_ERR"],
+        int(table["MIS_INFEASIBLE"]),
+        table["MIS_SPEED"],
+        table["MIS_ACCEL"],
+        table["MIS_TIME_OPT"] != 0.0,
+    )
 
 
 def leg_time_s(flight: Flight, now_us: int) -> float:

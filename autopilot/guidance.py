@@ -14,6 +14,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from missions.shaping import Shaped
 from missions.swing import swing
 from missions.transfer import PEAK_SPEED, transfer, transfer_duration
+from missions.waypoints import Passage, evaluate_path
 
 QUAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
 LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
@@ -144,6 +145,39 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
+class Pass:
+    """A stretch of a path through waypoints, past the last of which it goes on.
+
+    `offset` is by how much the load hung beside the beginning of the path; it fades away in `fade_s`.
+    """
+
+    path: Passage
+    offset: Vec3
+    fade_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From one waypoint to the next."""
+        return self.path.end_s - self.path.begin_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        at = self.path.begin_s + t
+        x, v, a, j, s, c, p = evaluate_path(self.path.table, at)
+        y = transfer(self.offset, ZERO, self.fade_s, at)
+        return (
+            add(x, y[0]),
+            add(v, y[1]),
+            add(a, y[2]),
+            add(j, y[3]),
+            add(s, y[4]),
+            add(c, y[5]),
+            add(p, y[6]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Swing:
     """An attitude of vehicle or load swung out and back. Only the height of `anchor` is held meanwhile."""
 
@@ -191,7 +225,7 @@ class Calm:
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
-Leg = Hold | Transfer | Brake | Creep | Run | Swing | Calm
+Leg = Hold | Transfer | Brake | Creep | Run | Pass | Swing | Calm
 
 
 def asked_jet(leg: Leg, t: float) -> Jet:

@@ -1,7 +1,7 @@
 """What a path asks of rotors, cable and attitude, with its derivatives: the constraints of an optimisation.
 
-For each sample of a path six numbers: the forces F1 ... F4 of the rotors (N), the tension (N) and the cosine of
-the vehicle's tilt, with a heading of 0.
+For each sample of a path six numbers: the forces F1 ... F4 of the rotors (N), the tension (N) and the cosine
+of the vehicle's tilt, with a heading of 0.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def fill_demand(jets: Array, body: Body, out: Array) -> None:
 
 @kernel
 def fill_slopes(jets: Array, body: Body, nudge: Array, out: Array) -> None:
-    """`out` (n, 6, 7, 3): the derivative of each output by each entry of the jet; `jets` is left as it was."""
+    """`out` (n, 6, 7, 3): the derivative of each output by each entry of the jet; `jets` stays as it was."""
     for i in range(jets.shape[1]):
         for order in range(1, 7):
             for axis in range(3):

@@ -54,7 +54,8 @@ NO_ROWS = Rows(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros(0)
 
 
 class Goal(NamedTuple):
-    """Weights at the samples: `near` of |x - target|^2 and `smooth[order]` of |x^(order)|^2, for one second."""
+    """Weights for one second: `near` of |x - target|^2 at the samples, `smooth` (order, weight) of
+    |x^(order)|^2."""
 
     target: Array  # (n, 3)
     near: float
@@ -190,7 +191,7 @@ class Problem:
         return np.asarray(self.spacing * found)
 
     def _unbounded(self, smoother: float) -> Array:
-        """(size, 3) the free coefficients of the least cost, whatever the bounds; `smoother` times as smooth."""
+        """(size, 3) of the least cost with `smoother` times the weight on smoothness, whatever the bounds."""
         near, rest = self._near, self.jets(self.fixed)
         smooth = self._hessian - near
         gradient = self._gradient(rest)
@@ -273,7 +274,8 @@ class Problem:
         solution = solver.solve()
         if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
             return None
-        return free + (unit * np.asarray(solution.x))[: 3 * size].reshape(3, size).T
+        changed: Array = free + (unit * np.asarray(solution.x))[: 3 * size].reshape(3, size).T
+        return changed
 
     def _linearised(self, jets: Array) -> tuple[sparse.csr_matrix, Array]:
         """Bounds on the demand along `jets`, as rows over (coefficients, excesses)."""
@@ -326,12 +328,12 @@ def band_jets(values: Array, first: NDArray[np.int64], coefficients: Array) -> A
 
 
 def excess(found: Array, spacing: float, bounds: Bounds) -> Array:
-    """(n,) by how much the demand (n, 6) of equally spaced samples exceeds the bounds, as N of a rotor; >= 0."""
+    """(n,) by how much the demand (n, 6) of equally spaced samples exceeds the bounds, N of a rotor; >= 0."""
     asked = commanded(found, spacing, bounds.rotor_tau)
     over = np.maximum(asked.max(axis=1) - bounds.rotor_high, bounds.rotor_low - asked.min(axis=1))
     over = np.maximum(over, _TENSION_SCALE * (bounds.tension_low - found[:, TENSION]))
     over = np.maximum(over, _COS_SCALE * (bounds.cos_tilt - found[:, COS_TILT]))
-    return np.maximum(over, 0.0)
+    return np.asarray(np.maximum(over, 0.0))
 
 
 def _lag_matrix(n: int, spacing: float, tau: float) -> sparse.csr_matrix:

@@ -3,10 +3,10 @@
 At the joints of half-cosine envelopes the acceleration jumps, and to follow a jump would take an unbounded
 moment; elsewhere a path may ask for more than rotors, cable or tilt allow. About each such place a window of
 the path is replaced by a spline, which takes over from the asked path and hands back to it without a jump up
-to the sixth derivative, and stays as near to it as the limits allow (`missions.optimise`). With the whole path
-known, the vehicle gets ready before a jump: a window about the beginning of the signals opens before it (the
-lead), with the load held within `HELD_M` of its place until then, and one about the end closes after it (the
-tail).
+to the sixth derivative, and stays as near to it as the limits allow (`missions.optimise`). With the whole
+path known, the vehicle gets ready before a jump: a window about the beginning of the signals opens before it
+(the lead), with the load held within `HELD_M` of its place until then, and one about the end closes after it
+(the tail).
 
 Times are seconds from the beginning of the signals as asked; paths are relative to where they begin.
 """
@@ -20,8 +20,8 @@ from math import cos, inf, nextafter, pi
 import numpy as np
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3
-from missions.demand import Bounds, commanded, demand
+from autopilot.geometry.linear import ZERO
+from missions.demand import Bounds, demand
 from missions.model import Signals
 from missions.optimise import NO_ROWS, SAMPLES, Goal, Problem, Rows, excess
 from missions.signals import REST, Jet, SignalTable, evaluate, joints, signal_table
@@ -234,7 +234,7 @@ def _solve(
     step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
 ) -> tuple[PieceTable, float] | None:
     """The spline from begin to end, and its excess."""
-    intervals = max(int(round((end - begin) / INTERVAL_S)), 2 * ORDERS)
+    intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
     basis = Basis(begin, end, intervals)
     ends = asked_jets(table, step.duration_s, np.array([begin, end]))
     origin = ends[0, 0].copy()

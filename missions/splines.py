@@ -59,7 +59,7 @@ class Basis:
         return values, first
 
     def ends(self, before: Array, after: Array) -> Array:
-        """(count, 3) coefficients: those that the jets (7, 3) at begin and end decide, 0 for the free ones."""
+        """(count, 3) coefficients: those that the jets (7, 3) at the two ends decide, 0 for the free ones."""
         found = np.zeros((self.count, 3))
         for at, jet, part in ((0.0, before, slice(0, ORDERS)), (1.0, after, slice(-ORDERS, None))):
             u = np.array([at * self.intervals])

@@ -115,6 +115,24 @@ def _fill_transfer(p0: Vec3, p1: Vec3, duration: float, times: Samples, body: Bo
         _fill(rows[i], transfer(p0, p1, duration, times[i]), body)
 
 
+@kernel
+def _fill_jets(jets: Samples, body: Body, rows: Samples) -> None:
+    for i in range(jets.shape[1]):
+        _fill(
+            rows[i],
+            (
+                (jets[0, i, 0], jets[0, i, 1], jets[0, i, 2]),
+                (jets[1, i, 0], jets[1, i, 1], jets[1, i, 2]),
+                (jets[2, i, 0], jets[2, i, 1], jets[2, i, 2]),
+                (jets[3, i, 0], jets[3, i, 1], jets[3, i, 2]),
+                (jets[4, i, 0], jets[4, i, 1], jets[4, i, 2]),
+                (jets[5, i, 0], jets[5, i, 1], jets[5, i, 2]),
+                (jets[6, i, 0], jets[6, i, 1], jets[6, i, 2]),
+            ),
+            body,
+        )
+
+
 def _peaks(times: Samples, rows: Samples) -> Peaks:
     def extreme(column: int, greatest: bool) -> Extreme:
         values = rows[:, column]
@@ -160,6 +178,14 @@ def survey_transfer(p0: Vec3, p1: Vec3, duration: float, body: Body) -> Peaks:
     times = np.linspace(0.0, duration, _STILL_SAMPLES)
     rows = np.empty((times.size, _COLUMNS))
     _fill_transfer(p0, p1, duration, times, body, rows)
+    return _peaks(times, rows)
+
+
+def survey_path(times: Samples, jets: Samples, height: float, body: Body) -> Peaks:
+    """Extremes along a path given by samples (7, n, 3), `height` m above home."""
+    rows = np.empty((times.size, _COLUMNS))
+    _fill_jets(jets, body, rows)
+    rows[:, HEIGHT] += height
     return _peaks(times, rows)
 
 

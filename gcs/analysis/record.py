@@ -118,7 +118,7 @@ GROUPS: tuple[Group, ...] = (
                 "mm",
                 1e3,
                 1,
-                "greatest distance from the asked path to the one that is flown, shaped to the vehicle's limits",
+                "greatest distance from the asked path to the one that is flown",
             ),
             Key(
                 "tracking_error_max_m",
