@@ -13,7 +13,7 @@ from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
-from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, leg_time_s
+from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, neg
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION, Calm, Leg, Swing
@@ -122,7 +122,7 @@ def step(
 
     leg = flight.legs[0]
     t = leg_time_s(flight, now_us) + setup.law.preview_s
-    jet = leg.jet(t)
+    jet = jet_ahead(flight, t)
     memory = after.memory
     if memory is None or leg.control_mode != after.control_mode:
         memory = setup.law.start(state, jet[0], jet[1])

@@ -43,6 +43,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import WorldParameters
+from missions.planning import prepare
 
 GROUND_WINDOW_US = 20_000
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
@@ -223,7 +224,11 @@ class Onboard:
 
     def _take_plan(self, mission: StoredMission) -> None:
         steps = located_steps(mission.items, self._options.home)
-        plan = Plan(tuple(s.step for s in steps), tuple(s.last for s in steps), len(mission.items))
+        flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+        prepared = prepare(flown, sequence, self._setup.settings.limits)
+        for note in prepared.notes:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
+        plan = Plan(flown, sequence, len(mission.items), prepared)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
 
     def _snapshot(self) -> Snapshot:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from autopilot.vehicle.belief import Belief
 from autopilot.wire.parameters import Parameter, ParameterTable
 
+SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
 LAWS = ("thesis", "lqr", "plumbline")  # CTL_LAW is an index into this
 
 
@@ -218,6 +219,37 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("MIS_ACCEL", 1.5, 0.05, 15.0, "m/s^2", "Greatest acceleration of the load between waypoints"),
             p("MIS_LIFT_SPEED", 0.8, 0.05, 5.0, "m/s", "Speed at which the load is lifted and lowered"),
             p("MIS_TAUT_SPEED", 0.15, 0.02, 1.0, "m/s", "Speed at which the slack cable is pulled taut"),
+            p(
+                "MIS_TIME_OPT",
+                0.0,
+                0.0,
+                1.0,
+                "",
+                "Waypoints in a row are passed 0 at MIS_SPEED and MIS_ACCEL, 1 as quickly as can be flown",
+                integer=True,
+            ),
+            p(
+                "MIS_SHAPE",
+                SHAPE_WITH_PLUMBLINE,
+                SHAPE_NEVER,
+                SHAPE_ALWAYS,
+                "",
+                "Load signals are shaped to what can be flown: 0 never, 1 with the law plumbline, 2 always",
+                integer=True,
+            ),
+            p("MIS_SHAPE_ERR", 0.05, 0.001, 10.0, "m", "How far a shaped path may be from the asked one"),
+            p(
+                "MIS_INFEASIBLE",
+                2.0,
+                0.0,
+                2.0,
+                "",
+                "A path that cannot be flown is 0 flown as asked, 1 slowed down, 2 refused",
+                integer=True,
+            ),
+            p("MIS_ROTOR_MARG", 15.0, 0.0, 45.0, "%", "Range of a rotor kept free for control at either end"),
+            p("MIS_TILT_DEG", 45.0, 1.0, 80.0, "deg", "Greatest tilt of the vehicle along a shaped path"),
+            p("MIS_TENSION", 30.0, 0.0, 90.0, "%", "Least tension along a shaped path, of the load's weight"),
             p("FS_LOAD_ERR", 5.0, 0.05, 1000.0, "m", "Load position error at which the flight is given up"),
             p("FS_TILT_DEG", 120.0, 10.0, 180.0, "deg", "Tilt at which the flight is given up"),
             p(

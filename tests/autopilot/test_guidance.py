@@ -10,6 +10,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
+from autopilot.flight import limits_from
 from autopilot.geometry.linear import Vec3, norm
 from autopilot.guidance import (
     LOAD_ATTITUDE,
@@ -22,6 +23,7 @@ from autopilot.guidance import (
     Creep,
     Hold,
     Leg,
+    Pass,
     Run,
     Swing,
     brake_leg,
@@ -29,18 +31,28 @@ from autopilot.guidance import (
     least_move_s,
     transfer_leg,
 )
-from missions.model import Sine, Term
-from missions.signals import signal_table
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from missions.model import Signals, Sine, Term
+from missions.shaping import shape, unshaped
+from missions.waypoints import Passage, passage
 
 HERE, THERE = (1.0, -2.0, 3.0), (2.0, 1.0, 2.5)
-TABLE = signal_table((Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
+SIGNALS = Signals(4.0, (Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
+LIMITS = limits_from(autopilot_parameters(load_belief("bebop")))
+SHAPED = shape(Signals(3.0, (Term("y", 0.2, 0.2, 0.7, None, 0.0),)), LIMITS.body, LIMITS.bounds)
+POINTS = (HERE, THERE, (3.0, 1.0, 3.0))
+_PATH, _TIMES = passage(POINTS, 1.5, 1.5, LIMITS.body, LIMITS.bounds, False)
+PASSAGE = Passage(_PATH.table(), 0.0, float(_TIMES[1]), HERE)
 BRAKE = Brake(HERE, (1.2, -0.4, 0.1), (-0.5, 0.8, 0.2), 2.4)
 LEGS: dict[str, Leg] = {
     "hold": Hold(HERE, 5.0),
     "transfer": transfer_leg(HERE, THERE, 1.5, 1.5, LOAD_POSITION),
     "brake": BRAKE,
     "creep": Creep(HERE, (0.0, 0.0, -0.2), QUAD_POSITION),
-    "run": Run(HERE, TABLE, 4.0),
+    "run": Run(HERE, unshaped(SIGNALS)),
+    "shaped run": Run(HERE, SHAPED),
+    "pass": Pass(PASSAGE, (0.02, -0.01, 0.0), 1.7),
     "swing": Swing(HERE, 0.1, 0.2, 1.5, QUAD_ATTITUDE),
     "calm": Calm(HERE, (0.2, 0.1, 0.0), (1.0, -0.5, 0.0), False, 1.2),
 }
