@@ -13,7 +13,13 @@ from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
 from autopilot.flight import Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
-from autopilot.laws import believed_vehicle, build_law
+from autopilot.laws import (
+    believed_actuation,
+    believed_drag,
+    believed_observer,
+    believed_vehicle,
+    build_law,
+)
 from autopilot.loss import Loss
 from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
@@ -136,11 +142,14 @@ class Onboard:
 
     def _build_setup(self, control_every: int) -> Setup:
         table = self.parameters
-        law = build_law(table)
+        law, vehicle = build_law(table), believed_vehicle(table)
         return Setup(
-            vehicle=believed_vehicle(table),
+            vehicle=vehicle,
             limited=table["VEH_ROTOR_LIM"],
             law=law,
+            actuation=believed_actuation(table),
+            observer=believed_observer(table, vehicle),
+            drag=believed_drag(table),
             tuning=estimator_tuning(table),
             settings=settings_from(table, law.ramp_lag_s),
             control_every=control_every,

@@ -12,7 +12,7 @@
 | F_d            | F_d           |          | N          | m (x_d'' + g e_3) - m_Q L q_d'' |
 | omega_n, zeta  | force         | 25, 0.98 | rad/s      | (4-3)    |
 | f, f'          | thrust, thrust_rate |    | N, N/s     | (3-35)   |
-| D              | air           | `PLB_DRAG`, `PLB_DRAG_2` | N | drag of the vehicle |
+| D              | air           | `PLB_DRAG`, `PLB_DRAG_2` | N | drag and wind on the vehicle |
 
 What the thesis filters is computed here:
 
@@ -22,11 +22,12 @@ What the thesis filters is computed here:
 * Of F, whose derivatives would need those of the moment, the part F_d that the reference alone asks for has
   exact derivatives by flatness. Only the rest, which vanishes with the errors, is passed through a command
   filter (4-2) for its two; F itself is not filtered. R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
-* The rotors are asked for F - D, so that the drag D of the vehicle, as far as it is known, does not count.
+* The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
+  count.
 * f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
 
 Memory comes in and goes out. `thrust` of `load_position` is what the rotors give at this instant, which the
-caller knows better than the law: `autopilot.rotor_lag`.
+caller knows better than the law: `autopilot.actuation`.
 """
 
 from __future__ import annotations
@@ -135,14 +136,16 @@ def load_position(
     gains: PlumblineGains,
     force_filter: FilterConstants,
     drag: Drag,
+    push: Vec3,
     vehicle: Vehicle,
 ) -> tuple[PlumblineMemory, Command]:
     """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
 
-    `thrust`, N: what the rotors give at this instant.
+    `thrust`, N: what the rotors give at this instant; `push`, N, world: what the air does to the vehicle
+    besides drag in still air.
     """
     jet = reference.jet
-    air = air_force(state.v_quad, drag)
+    air = add(air_force(state.v_quad, drag), push)
     motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
     position = position_jet(state, motion, jet, gains.k_x, gains.k_v, vehicle)
     q_c = direction_jet(position, state)

@@ -10,11 +10,23 @@ from autopilot.wire.parameters import Parameter, ParameterTable
 LAWS = ("thesis", "lqr", "plumbline")  # CTL_LAW is an index into this
 
 
+# what a builder measures on the bench: the autopilot is told of it where the world is
+MEASURED = {"SIM_ACT_DELAY_MS": "VEH_ACT_DELAY", "SIM_ROTOR_TAU_MS": "VEH_ROTOR_TAU"}
+
+
 def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]]) -> None:
-    """Set what is the autopilot's; SIM_ parameters that it does not know belong to the simulator."""
-    for name, value in settings:
+    """Set what is the autopilot's; SIM_ parameters that it does not know belong to the simulator.
+
+    Delay and lag of the rotors that are given to the simulator are believed as well, unless the belief is
+    given, too: then the two differ, which is the experiment.
+    """
+    given = list(settings)
+    names = {name for name, _ in given}
+    for name, value in given:
         if name in table or not name.startswith("SIM_"):
             table.set(name, value)
+        elif name in MEASURED and MEASURED[name] not in names:
+            table.set(MEASURED[name], value)
 
 
 def autopilot_parameters(belief: Belief) -> ParameterTable:
@@ -55,6 +67,15 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
                 1.0,
                 "m",
                 "Drag torque for each newton of rotor force",
+            ),
+            p("VEH_ACT_DELAY", 0.0, 0.0, 200.0, "ms", "Believed transport delay of actuator commands"),
+            p(
+                "VEH_ROTOR_TAU",
+                1e3 * belief.rotor_tau_s,
+                0.0,
+                1000.0,
+                "ms",
+                "Believed first-order lag of the rotors",
             ),
             p("VEH_GRAVITY", belief.gravity_m_s2, 0.1, 30.0, "m/s^2", "Acceleration of gravity"),
             p(
@@ -113,14 +134,6 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("PLB_KX", 6.0, 0.0, 1000.0, "N/m", "Plumbline's gain of the load position error"),
             p("PLB_KV", 2.75, 0.0, 1000.0, "N s/m", "Plumbline's gain of the load velocity error"),
             p("PLB_WN_F", 25.0, 1.0, 1000.0, "rad/s", "Command filter of the force's deviation"),
-            p(
-                "PLB_LAG_MS",
-                1e3 * belief.rotor_tau_s,
-                0.0,
-                500.0,
-                "ms",
-                "Believed first-order lag of the rotors",
-            ),
             p("PLB_DRAG", belief.quad_drag_n_s_m, 0.0, 100.0, "N s/m", "Believed linear drag of the vehicle"),
             p(
                 "PLB_DRAG_2",
@@ -136,8 +149,10 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
                 0.0,
                 500.0,
                 "ms",
-                "Lag that the rotors are made to show; no less than PLB_LAG_MS leaves them as they are",
+                "Lag that the rotors are made to show; no less than VEH_ROTOR_TAU leaves them as they are",
             ),
+            p("PLB_T_MASS", 0.3, 0.0, 100.0, "s", "Time in which the load's mass is learned; 0: never"),
+            p("PLB_T_PUSH", 0.1, 0.0, 100.0, "s", "Time in which the wind's push is learned; 0: never"),
             p("EST_GYRO_STD", 0.005, 1e-7, 1.0, "rad/s", "Believed noise of one gyro sample"),
             p("EST_ACC_STD", 0.05, 1e-7, 10.0, "m/s^2", "Believed noise of one accelerometer sample"),
             p("EST_GYRO_WALK", 1e-4, 0.0, 1.0, "rad/s", "Believed gyro bias walk in a second"),
