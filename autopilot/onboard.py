@@ -43,6 +43,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import WorldParameters
+from missions.planning import Limits, prepare
 
 GROUND_WINDOW_US = 20_000
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
@@ -64,10 +65,11 @@ def build_setup(table: ParameterTable, control_every: int) -> Setup:
     )
 
 
-def plan_of(mission: StoredMission, home: Home) -> Plan:
-    """The steps of a mission as it was uploaded."""
+def plan_of(mission: StoredMission, home: Home, limits: Limits) -> Plan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits."""
     steps = located_steps(mission.items, home)
-    return Plan(tuple(s.step for s in steps), tuple(s.last for s in steps), len(mission.items))
+    flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+    return Plan(flown, sequence, len(mission.items), prepare(flown, sequence, limits))
 
 
 class Onboard:
@@ -234,7 +236,9 @@ class Onboard:
         return verdict
 
     def _take_plan(self, mission: StoredMission) -> None:
-        plan = plan_of(mission, self._options.home)
+        plan = plan_of(mission, self._options.home, self._setup.settings.limits)
+        for note in plan.prepared.notes:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
 
     def _snapshot(self) -> Snapshot:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from autopilot.actuation import Actuation, ActuationConstants
 from autopilot.control import plumbline
-from autopilot.control.command_filter import FilterConstants
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
@@ -22,7 +21,6 @@ class PlumblineConstants(NamedTuple):
     """All that the parameters decide."""
 
     gains: plumbline.PlumblineGains
-    force_filter: FilterConstants
     drag: Drag
     actuation: ActuationConstants
     lag_gain: float
@@ -79,10 +77,11 @@ def load_position_tick(
         ahead.state,
         reference,
         ahead.thrust,
+        ahead.moment,
         constants.gains,
-        constants.force_filter,
         constants.drag,
         observed.push,
+        constants.period,
         loaded(constants.vehicle, observed.load_mass),
     )
     return memory, hastened(wanted, ahead, constants)

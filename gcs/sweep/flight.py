@@ -140,7 +140,9 @@ class _Flight:
         self.tick_us = settings.tick_us
         self.every = divider(1e6 / self.tick_us, table["CTL_RATE_HZ"], "CTL_RATE_HZ")
         self.setup: Setup = build_setup(table, self.every)
-        plan: Plan = plan_of(StoredMission(tuple(encode_mission(mission, home))), home)
+        plan: Plan = plan_of(
+            StoredMission(tuple(encode_mission(mission, home))), home, self.setup.settings.limits
+        )
         self.state: FlightState = initial_state()
         self.state = self.state._replace(flight=with_plan(self.state.flight, plan))
         self.history = new_history()
