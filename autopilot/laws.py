@@ -10,7 +10,7 @@ from autopilot.control import lqr, plumbline, quad_position, thesis
 from autopilot.control.design import Design, Timing, Wanted, design
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
-from autopilot.geometry.linear import Mat3, Vec3, axpy
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, axpy
 from autopilot.observer import Observed, ObserverConstants, observer_constants
 from autopilot.plumbline_tick import PlumblineConstants, ahead_of, hastened, load_position_tick
 from autopilot.rotor_lag import lag_gain
@@ -192,7 +192,7 @@ class ThesisLaw(NamedTuple):
         self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
     ) -> tuple[Memory, Command]:
         return quad_position.quad_position(
-            memory, state, reference, 0.0, self.position_gains, self.gains, self.filters, self.vehicle
+            memory, state, reference, 0.0, ZERO, self.position_gains, self.gains, self.filters, self.vehicle
         )
 
 
@@ -349,8 +349,17 @@ class PlumblineLaw(NamedTuple):
         self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
     ) -> tuple[Memory, Command]:
         ahead = ahead_of(state, 0.0, actuation, observed, self.constants)
-        other, wanted = self.other_modes.quad_position(
-            memory.other_modes, ahead.state, reference, actuation, observed
+        others = self.other_modes
+        other, wanted = quad_position.quad_position(
+            memory.other_modes,
+            ahead.state,
+            reference,
+            0.0,
+            observed.push,
+            others.position_gains,
+            others.gains,
+            others.filters,
+            others.vehicle,
         )
         return memory._replace(other_modes=other), hastened(wanted, ahead, self.constants)
 

@@ -81,6 +81,12 @@ def standing(observed: Observed, vehicle: Vehicle) -> bool:
 
 
 @kernel
+def lying(observed: Observed, state: State) -> bool:
+    """Whether the load is no higher than where it lay while the cable was slack."""
+    return not state.x_load[2] > observed.load_ground + _OFF_GROUND
+
+
+@kernel
 def loaded(vehicle: Vehicle, load_mass: float) -> Vehicle:
     """The vehicle with a load of this mass."""
     return Vehicle(
@@ -122,7 +128,7 @@ def observe(
         tension = dot(rest, q)
         pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, felt)
         rest = axpy(-tension, q, rest)
-        if state.x_load[2] > load_ground + _OFF_GROUND and pull > 0.0:
+        if not lying(observed, state) and pull > 0.0:
             correlation += constants.mass * (tension * pull - correlation)
             square += constants.mass * (pull * pull - square)
             found = correlation / square

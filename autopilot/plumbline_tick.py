@@ -12,7 +12,7 @@ from autopilot.control import plumbline
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.observer import Observed, loaded, standing
+from autopilot.observer import Observed, loaded, lying, standing
 from autopilot.prediction import Ahead, predict, stay
 from autopilot.rotor_lag import hasten
 
@@ -72,11 +72,28 @@ def load_position_tick(
 ) -> tuple[plumbline.PlumblineMemory, Command]:
     """Load position mode. The reference is that of the instant at which the command comes into force."""
     ahead = ahead_of(state, 1.0, actuation, observed, constants)
+    then, thrust = ahead.state, ahead.thrust
+    if lying(observed, state):
+        # the ground gives what the rotors do not yet
+        vehicle = constants.vehicle
+        thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
+        memory = plumbline.PlumblineMemory(0.0, memory.integral)
+        then = State(
+            state.x_load,
+            state.v_load,
+            then.q_cable,
+            then.q_cable_dot,
+            then.x_quad,
+            then.v_quad,
+            then.R,
+            then.omega_body,
+            then.a_quad,
+        )
     memory, wanted = plumbline.load_position(
         memory,
-        ahead.state,
+        then,
         reference,
-        ahead.thrust,
+        thrust,
         ahead.moment,
         constants.gains,
         constants.drag,

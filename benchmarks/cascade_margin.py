@@ -192,6 +192,7 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
                 state,
                 vehicle_reference,
                 vehicle.load_mass,
+                ZERO,
                 QUAD_POSITION_GAINS,
                 settings.gains,
                 filters,

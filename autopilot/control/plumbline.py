@@ -75,6 +75,11 @@ GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask fo
 _LEAST_FORCE = 1e-3
 # sine of the least angle between heading and thrust axis at which R_c is differentiated
 _LEAST_SINE = 1e-2
+# tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
+_GREATEST_LEAN = 2.7
+_LEAST_LIFT = 0.2
+_GREATEST_RATE = 15.0  # rad/s
+_FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
 
 
 class PlumblineGains(NamedTuple):
@@ -144,13 +149,38 @@ def flat_force(jet: Jet, vehicle: Vehicle) -> tuple[Vec3, Vec3, Vec3]:
 
 
 @kernel
-def commanded_attitude(F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: State) -> AttitudeCommand:
-    """R_c of (3-27) with Omega_c, Omega_c'; without the rates where F vanishes or lies along the heading."""
+def no_longer(v: Vec3, greatest: float) -> Vec3:
+    """v, shortened to `greatest` where it is longer."""
+    n = norm(v)
+    return v if n <= greatest else scale(greatest / n, v)
+
+
+@kernel
+def commanded_attitude(
+    F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: State, vehicle: Vehicle
+) -> AttitudeCommand:
+    """R_c of (3-27) with Omega_c, Omega_c', no faster than the rotors can turn the vehicle.
+
+    Without the rates where F vanishes, lies along the heading or is more level than the vehicle may lean.
+    """
     zero: Vec3 = (0.0, 0.0, 0.0)
+    sideways = norm((F[0], F[1], 0.0))
+    upward = max(F[2], _LEAST_LIFT * vehicle.quad_mass * vehicle.gravity)
+    if sideways > _GREATEST_LEAN * upward:
+        shrink = _GREATEST_LEAN * upward / sideways
+        return AttitudeCommand(
+            attitude_towards((shrink * F[0], shrink * F[1], upward), b1_d, state.R), zero, zero
+        )
     n = norm(F)
     if n < _LEAST_FORCE or norm(cross(F, b1_d)) < _LEAST_SINE * n:
         return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
-    return attitude_from_axes(F, F_dot, F_ddot, b1_d, zero, zero)
+    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, zero, zero)
+    J = max(vehicle.inertia[0], vehicle.inertia[1])
+    return AttitudeCommand(
+        attitude.R_c,
+        no_longer(attitude.Omega_c, _GREATEST_RATE),
+        no_longer(attitude.Omega_c_dot, vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J),
+    )
 
 
 @kernel
@@ -281,7 +311,7 @@ def load_position(
     F_dot = scale(0.5 / STEP, sub(F_after, F_before))
     F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
 
-    attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state)
+    attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state, vehicle)
     result = attitude_moment(
         state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
     )
@@ -306,4 +336,6 @@ def load_position(
     held = norm(times(gains.k_i, integral))
     if held > GREATEST_HELD * weight:
         integral = scale(GREATEST_HELD * weight / held, integral)
-    return PlumblineMemory(dot(F_dot, b3) + dot(F, b3_dot), integral), command
+    fastest = 4.0 * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
+    thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
+    return PlumblineMemory(thrust_rate, integral), command
