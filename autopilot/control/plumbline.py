@@ -33,6 +33,7 @@ caller knows better than the law: `autopilot.actuation`.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from autopilot.control.direction_jet import PositionJet, direction_jet, position_jet
@@ -78,6 +79,8 @@ _LEAST_SINE = 1e-2
 # tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
 _GREATEST_LEAN = 2.7
 _LEAST_LIFT = 0.2
+# of the pull along the cable: what is exerted across it at most
+_GREATEST_ACROSS = 0.7
 _GREATEST_RATE = 15.0  # rad/s
 _FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
 
@@ -146,6 +149,13 @@ def flat_force(jet: Jet, vehicle: Vehicle) -> tuple[Vec3, Vec3, Vec3]:
         axpy(reach, u3, scale(mass, jet[3])),
         axpy(reach, u4, scale(mass, jet[4])),
     )
+
+
+@kernel
+def gently(v: Vec3, greatest: float) -> Vec3:
+    """v, never longer than `greatest`: smooth, and 0.2 % shorter than v where v is 0.3 times that."""
+    share = dot(v, v) / max(greatest * greatest, _LEAST_FORCE * _LEAST_FORCE)
+    return scale(1.0 / sqrt(sqrt(1.0 + share * share)), v)
 
 
 @kernel
@@ -244,7 +254,10 @@ def wanted_force(
         vehicle.quad_mass,
         vehicle.cable_length,
     )
-    return WantedForce(sub(direction.F, air), position, direction, q_c)
+    along = dot(state.q_cable, direction.F)
+    pull = scale(along, state.q_cable)
+    across = gently(sub(direction.F, pull), _GREATEST_ACROSS * norm(position.A))
+    return WantedForce(sub(add(pull, across), air), position, direction, q_c)
 
 
 @kernel
