@@ -12,7 +12,14 @@ from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.linear import ZERO, Mat3, Vec3, axpy
 from autopilot.observer import Observed, ObserverConstants, observer_constants
-from autopilot.plumbline_tick import PlumblineConstants, ahead_of, hastened, load_position_tick
+from autopilot.plumbline_tick import (
+    PlumblineConstants,
+    SlackConstants,
+    ahead_of,
+    hastened,
+    load_position_tick,
+    quad_position_tick,
+)
 from autopilot.rotor_lag import lag_gain
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.parameters import ParameterTable
@@ -348,20 +355,12 @@ class PlumblineLaw(NamedTuple):
     def quad_position(
         self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
     ) -> tuple[Memory, Command]:
-        ahead = ahead_of(state, 0.0, actuation, observed, self.constants)
         others = self.other_modes
-        other, wanted = quad_position.quad_position(
-            memory.other_modes,
-            ahead.state,
-            reference,
-            0.0,
-            observed.push,
-            others.position_gains,
-            others.gains,
-            others.filters,
-            others.vehicle,
+        slack = SlackConstants(others.position_gains, others.gains, others.filters)
+        other, command = quad_position_tick(
+            memory.other_modes, state, reference, actuation, observed, self.constants, slack
         )
-        return memory._replace(other_modes=other), hastened(wanted, ahead, self.constants)
+        return memory._replace(other_modes=other), command
 
 
 _BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {

@@ -20,6 +20,7 @@ cable was slack. The push is learned while the vehicle is off the ground.
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from autopilot.control.load_motion import Drag, air_force
@@ -72,6 +73,11 @@ def nominal(vehicle: Vehicle) -> Observed:
     """Nothing observed: the load's mass as told, still air, standing on the ground, the load at home."""
     g = vehicle.gravity
     return Observed(vehicle.load_mass, ZERO, vehicle.load_mass * g * g, g * g, vehicle.quad_mass * g, 0.0)
+
+
+def aloft(vehicle: Vehicle) -> Observed:
+    """As `nominal`, but vehicle and load are off the ground, wherever they are."""
+    return nominal(vehicle)._replace(support=0.0, load_ground=-inf)
 
 
 @kernel

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.actuation import Actuation, ActuationConstants
-from autopilot.control import plumbline
+from autopilot.control import plumbline, quad_position, thesis
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
@@ -26,6 +26,14 @@ class PlumblineConstants(NamedTuple):
     lag_gain: float
     period: float  # s
     vehicle: Vehicle
+
+
+class SlackConstants(NamedTuple):
+    """What the vehicle is flown with while the cable is slack."""
+
+    position_gains: quad_position.QuadPositionGains
+    gains: thesis.ThesisGains
+    filters: thesis.ThesisFilters
 
 
 @kernel
@@ -59,6 +67,32 @@ def hastened(wanted: Command, ahead: Ahead, constants: PlumblineConstants) -> Co
     return Command(
         thrust, moment, c.e_x, c.e_v, c.e_q, c.e_q_dot, c.e_R, c.e_Omega, c.psi_R, c.psi_q, c.q_c, c.R_c
     )
+
+
+@kernel
+def quad_position_tick(
+    memory: thesis.ThesisMemory,
+    state: State,
+    reference: Reference,
+    actuation: Actuation,
+    observed: Observed,
+    constants: PlumblineConstants,
+    slack: SlackConstants,
+) -> tuple[thesis.ThesisMemory, Command]:
+    """Vehicle position mode, for a slack cable. The reference is that of the instant of the command."""
+    ahead = ahead_of(state, 0.0, actuation, observed, constants)
+    memory, wanted = quad_position.quad_position(
+        memory,
+        ahead.state,
+        reference,
+        0.0,
+        observed.push,
+        slack.position_gains,
+        slack.gains,
+        slack.filters,
+        constants.vehicle,
+    )
+    return memory, hastened(wanted, ahead, constants)
 
 
 @kernel

@@ -223,7 +223,7 @@ def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, veh
         v,
         q,
         q_dot,
-        sub(state.x_quad, scale(L, sub(q, state.q_cable))),
+        add(state.x_quad, sub(sub(x, state.x_load), scale(L, sub(q, state.q_cable)))),
         add(state.v_quad, sub(sub(v, state.v_load), scale(L, sub(q_dot, state.q_cable_dot)))),
         mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, turning)))),
         axpy(h, turning, state.omega_body),
