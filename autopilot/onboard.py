@@ -13,7 +13,13 @@ from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
 from autopilot.flight import Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
-from autopilot.laws import believed_vehicle, build_law
+from autopilot.laws import (
+    believed_actuation,
+    believed_drag,
+    believed_observer,
+    believed_vehicle,
+    build_law,
+)
 from autopilot.loss import Loss
 from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
@@ -37,6 +43,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import WorldParameters
+from missions.planning import prepare
 
 GROUND_WINDOW_US = 20_000
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
@@ -136,11 +143,14 @@ class Onboard:
 
     def _build_setup(self, control_every: int) -> Setup:
         table = self.parameters
-        law = build_law(table)
+        law, vehicle = build_law(table), believed_vehicle(table)
         return Setup(
-            vehicle=believed_vehicle(table),
+            vehicle=vehicle,
             limited=table["VEH_ROTOR_LIM"],
             law=law,
+            actuation=believed_actuation(table),
+            observer=believed_observer(table, vehicle),
+            drag=believed_drag(table),
             tuning=estimator_tuning(table),
             settings=settings_from(table, law.ramp_lag_s),
             control_every=control_every,
@@ -214,7 +224,11 @@ class Onboard:
 
     def _take_plan(self, mission: StoredMission) -> None:
         steps = located_steps(mission.items, self._options.home)
-        plan = Plan(tuple(s.step for s in steps), tuple(s.last for s in steps), len(mission.items))
+        flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+        prepared = prepare(flown, sequence, self._setup.settings.limits)
+        for note in prepared.notes:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
+        plan = Plan(flown, sequence, len(mission.items), prepared)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
 
     def _snapshot(self) -> Snapshot:

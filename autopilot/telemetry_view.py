@@ -12,7 +12,7 @@ from autopilot.flight import CARRYING, ON_GROUND, Flight, Phase, Selected, leg_t
 from autopilot.flight_core import FlightState, Setup, view_of
 from autopilot.geometry.linear import ZERO, norm, sub
 from autopilot.geometry.so3 import quat_from_rotation
-from autopilot.guidance import LOAD_POSITION, QUAD_POSITION
+from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, asked_jet
 from autopilot.sensor_link import Tick
 from autopilot.services import identity, snapshot
 from autopilot.services.mission_store import StoredMission
@@ -143,6 +143,7 @@ def make_snapshot(
 
     leg = flight.legs[0] if flight.legs else None
     x_d, v_d, a_d, x_quad_d = control.x_load, ZERO, ZERO, (nan, nan, nan)
+    x_asked, v_asked = x_d, v_d
     elapsed, duration = (now_us - flight.phase_start_us) * 1e-6, nan
     if leg is not None:
         elapsed = leg_time_s(flight, now_us)
@@ -150,6 +151,8 @@ def make_snapshot(
         jet = leg.jet(elapsed)
         if leg.control_mode == LOAD_POSITION:
             x_d, v_d, a_d = jet[0], jet[1], jet[2]
+            asked = asked_jet(leg, elapsed)
+            x_asked, v_asked = asked[0], asked[1]
         elif leg.control_mode == QUAD_POSITION:
             x_quad_d = jet[0]
     sequence = flight.plan.sequence
@@ -187,6 +190,8 @@ def make_snapshot(
         x_load_d=x_d,
         v_load_d=v_d,
         a_load_d=a_d,
+        x_load_asked=x_asked,
+        v_load_asked=v_asked,
         q_cable_c=command.q_c,
         x_quad_d=x_quad_d,
         quat_c_wxyz=quat_from_rotation(command.R_c),

@@ -133,6 +133,7 @@ def control_state(state: EstimatorState) -> State:
         vehicle.v_quad,
         rotation_from_quat(vehicle.quat_wxyz),
         vehicle.omega_body,
+        vehicle.accel_quad,
     )
 
 

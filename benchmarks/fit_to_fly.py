@@ -1,0 +1,161 @@
+"""What the law holds under real sensors, delay, rotor lag, wind and a wrong load, over many seeds.
+
+Flights run in one process each, through the same MAVLink queues as `gcs fly`, whose telemetry they equal byte
+for byte; every figure comes from that telemetry. A row is met when its worst seed is within the limits and no
+flight was lost. Exit code 1 if a row is not met.
+
+    python benchmarks/fit_to_fly.py [--seeds 20] [--law plumbline] [--rows B ...] [--jobs 2] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import multiprocessing
+import os
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from autopilot.vehicle.parameters import LAWS
+from autopilot.wire.tlog import TlogWriter, read_tlog
+from gcs.analysis.record import FlightMeta, flight_record
+from gcs.analysis.samples import Samples, samples_of
+from gcs.analysis.step import find_step
+from gcs.analysis.telemetry import telemetry_of
+from gcs.closed_loop import Conditions, fly
+from missions.fileformat import load_mission
+
+Figures = dict[str, float | None]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A flight that is asked for, and the greatest value that each of its figures may have."""
+
+    name: str
+    mission: str
+    limits: dict[str, float]
+    sensors: str = "lab"
+    settings: dict[str, float] = field(default_factory=dict)
+
+
+SLOW = {"SIM_ACT_DELAY_MS": 12.0, "SIM_ROTOR_TAU_MS": 30.0}
+ROWS = (
+    Row("B ideal", "case-b", {"load_error_max_m": 0.010}, "ideal"),
+    Row("B lab 12/30 ms", "case-b", {"load_error_max_m": 0.020}, settings=SLOW),
+    Row("C lab 12/30 ms", "case-c", {"load_error_max_m": 0.040}, settings=SLOW),
+    Row("B rtk", "case-b", {"load_error_max_m": 0.150}, "rtk"),
+    Row("C rtk", "case-c", {"load_error_max_m": 0.150}, "rtk"),
+    Row(
+        "A lab",
+        "case-a",
+        {
+            "rise_time_90_s": 0.61,
+            "overshoot_pct": 5.0,
+            "settling_time_5pct_s": 1.0,
+            "before_step_max_m": 0.010,
+        },
+    ),
+    Row("C lab load -50 %", "case-c", {"load_error_max_m": 0.100}, settings={"SIM_LOAD_MASS": 0.05}),
+    Row("C lab load +50 %", "case-c", {"load_error_max_m": 0.100}, settings={"SIM_LOAD_MASS": 0.15}),
+    Row("gust lab", "gust", {"gust_recovery_50mm_s": 3.0}),
+    Row("B lab 72 ms", "case-b", {"load_error_max_m": 0.040}, settings={"SIM_ACT_DELAY_MS": 72.0}),
+    Row("B lab 72, told 62", "case-b", {}, settings={"SIM_ACT_DELAY_MS": 72.0, "VEH_ACT_DELAY": 62.0}),
+    Row("B lab 72, told 82", "case-b", {}, settings={"SIM_ACT_DELAY_MS": 72.0, "VEH_ACT_DELAY": 82.0}),
+)
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What came of one flight."""
+
+    outcome: str
+    reason: str
+    figures: Figures
+
+
+def before_step_max(samples: Samples) -> float | None:
+    """Greatest distance (m) of the true load from where the step starts, before it starts."""
+    window = np.flatnonzero(samples.in_mission & np.isfinite(samples.desired_m).all(axis=1))
+    step = find_step(samples.time_s[window], samples.desired_m[window], samples.desired_m_s[window])
+    if step is None:
+        return None
+    before = samples.in_mission & (samples.time_s <= step.start_s)
+    return float(np.linalg.norm(samples.actual_m[before] - step.origin_m, axis=1).max())
+
+
+def flown(row: Row, law: str, seed: int) -> Flown:
+    """Fly the row once."""
+    settings = {"CTL_LAW": float(LAWS.index(law)), **row.settings}
+    file = io.BytesIO()
+    outcome = fly(
+        load_mission(row.mission), Conditions("bebop", row.sensors, seed, settings), TlogWriter(file)
+    )
+    file.seek(0)
+    telemetry = telemetry_of(read_tlog(file))
+    samples = samples_of(telemetry)
+    record: dict[str, Any] = flight_record(telemetry, FlightMeta(outcome=outcome.name), samples)
+    record["before_step_max_m"] = before_step_max(samples)
+    figures = {"load_error_max_m", "saturated_fraction", "psi_q_max", *row.limits}
+    return Flown(outcome.name, outcome.reason, {name: record.get(name) for name in sorted(figures)})
+
+
+def met(row: Row, flights: list[Flown]) -> bool:
+    """Whether every seed completed within every limit."""
+    if any(flight.outcome != "completed" for flight in flights):
+        return False
+    values = [(flight.figures[name], limit) for flight in flights for name, limit in row.limits.items()]
+    return all(value is not None and value <= limit for value, limit in values)
+
+
+def shown(row: Row, flights: list[Flown]) -> str:
+    """One line: the worst and the median of each figure."""
+    lost = [flight for flight in flights if flight.outcome != "completed"]
+    text = f"{row.name:20} {'met' if met(row, flights) else 'MISSED':7}"
+    if lost:
+        text += f" {len(lost)} of {len(flights)} lost ({lost[0].reason})"
+    for name in sorted({*row.limits, "load_error_max_m"}):
+        values = [v for v in (flight.figures[name] for flight in flights) if v is not None]
+        if values:
+            limit = f" <= {row.limits[name]:g}" if name in row.limits else ""
+            text += f"  {name} {max(values):.4g} (median {float(np.median(values)):.4g}){limit}"
+    return text
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--law", choices=LAWS, default="plumbline")
+    parser.add_argument("--rows", nargs="*", default=[], help="only rows whose names contain one of these")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--json", type=Path, help="every figure of every flight goes here")
+    options = parser.parse_args()
+    rows = [row for row in ROWS if not options.rows or any(word in row.name for word in options.rows)]
+    if not rows:
+        parser.error(f"no such row; they are: {', '.join(row.name for row in ROWS)}")
+    kept: dict[str, Any] = {}
+    missed = 0
+    began = time.perf_counter()
+    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
+        for row in rows:
+            flights = pool.starmap(
+                flown, [(row, options.law, seed) for seed in range(1, options.seeds + 1)], chunksize=1
+            )
+            missed += not met(row, flights)
+            kept[row.name] = [vars(flight) for flight in flights]
+            print(shown(row, flights), flush=True)
+    print(f"{len(rows)} rows, {options.seeds} seeds, {time.perf_counter() - began:.0f} s")
+    if options.json:
+        options.json.write_text(json.dumps(kept, indent=1))
+    sys.exit(missed > 0)
+
+
+if __name__ == "__main__":
+    main()
