@@ -83,10 +83,16 @@ def step(
     before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
 ) -> tuple[FlightState, Report]:
     """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
-    estimator = estimate(before.estimator, history, readings, setup.tuning, dt, before.mixed.thrust_done)
+    estimator = estimate(before.estimator, history, readings, setup.tuning, dt, before.actuation.thrust)
+    before = before._replace(estimator=estimator)
     if not is_due(tick, setup.control_every):
-        return before._replace(estimator=estimator), Report()
+        return before, Report()
+    return control(before, setup, now_us)
 
+
+def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState, Report]:
+    """The supervisor's, the law's and the mixer's part of a tick: `before` holds the estimate already."""
+    estimator = before.estimator
     state = control_state(estimator)
     view = view_of(estimator, state, setup.settings, now_us)
     flight, report = advance(before.flight, view, setup.settings)
@@ -103,9 +109,7 @@ def step(
         setup.drag,
         setup.vehicle,
     )
-    after = before._replace(
-        estimator=estimator, flight=flight, slack_events=slack_events, was_taut=taut, observed=observed
-    )
+    after = before._replace(flight=flight, slack_events=slack_events, was_taut=taut, observed=observed)
     if flight.phase not in IN_AIR:
         idle = IDLE if flight.phase == Phase.ARMED else STOPPED
         actuation = actuate(after.actuation, idle.thrust_done, idle.moment_done, setup.actuation)

@@ -38,15 +38,38 @@ from autopilot.services.records import (
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import HilGps, hil_actuator_controls_message
+from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import WorldParameters
-from missions.planning import prepare
+from missions.planning import Limits, prepare
 
 GROUND_WINDOW_US = 20_000
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
+
+
+def build_setup(table: ParameterTable, control_every: int) -> Setup:
+    """What the flight core is given, from the parameters and the ticks between two runs of the law."""
+    law, vehicle = build_law(table), believed_vehicle(table)
+    return Setup(
+        vehicle=vehicle,
+        limited=table["VEH_ROTOR_LIM"],
+        law=law,
+        actuation=believed_actuation(table),
+        observer=believed_observer(table, vehicle),
+        drag=believed_drag(table),
+        tuning=estimator_tuning(table),
+        settings=settings_from(table, law.ramp_lag_s),
+        control_every=control_every,
+    )
+
+
+def plan_of(mission: StoredMission, home: Home, limits: Limits) -> Plan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits."""
+    steps = located_steps(mission.items, home)
+    flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+    return Plan(flown, sequence, len(mission.items), prepare(flown, sequence, limits))
 
 
 class Onboard:
@@ -73,7 +96,7 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
-        self._setup = self._build_setup(1)
+        self._setup = build_setup(parameters, 1)
         self._take_plan(self.endpoint.mission)
 
     # ---- simulator link
@@ -101,9 +124,14 @@ class Onboard:
         return self._answer
 
     @property
+    def phase(self) -> Phase:
+        """The phase of flight."""
+        return self._state.flight.phase
+
+    @property
     def armed(self) -> bool:
         """Whether rotors may turn."""
-        return self._state.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE)
+        return self.phase not in (Phase.DISARMED, Phase.FAILSAFE)
 
     def _run(self, tick: Tick) -> None:
         period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
@@ -141,21 +169,6 @@ class Onboard:
 
     # ---- parameters
 
-    def _build_setup(self, control_every: int) -> Setup:
-        table = self.parameters
-        law, vehicle = build_law(table), believed_vehicle(table)
-        return Setup(
-            vehicle=vehicle,
-            limited=table["VEH_ROTOR_LIM"],
-            law=law,
-            actuation=believed_actuation(table),
-            observer=believed_observer(table, vehicle),
-            drag=believed_drag(table),
-            tuning=estimator_tuning(table),
-            settings=settings_from(table, law.ramp_lag_s),
-            control_every=control_every,
-        )
-
     def _follow_parameters(self) -> None:
         self._version = self.parameters.version
         try:
@@ -166,7 +179,7 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
             return
         self.fault = ""
-        self._setup = self._build_setup(every)
+        self._setup = build_setup(self.parameters, every)
 
     # ---- ground
 
@@ -223,12 +236,9 @@ class Onboard:
         return verdict
 
     def _take_plan(self, mission: StoredMission) -> None:
-        steps = located_steps(mission.items, self._options.home)
-        flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
-        prepared = prepare(flown, sequence, self._setup.settings.limits)
-        for note in prepared.notes:
+        plan = plan_of(mission, self._options.home, self._setup.settings.limits)
+        for note in plan.prepared.notes:
             self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
-        plan = Plan(flown, sequence, len(mission.items), prepared)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
 
     def _snapshot(self) -> Snapshot:
