@@ -99,6 +99,7 @@ INFO, WARNING, CRITICAL = (
 )
 
 CLEARANCE = 0.6  # height over the load, in cable lengths, at which the slack vehicle moves sideways
+ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable taut is moved over it
 ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
@@ -350,6 +351,8 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
     if flight.phase == P.TAUTEN and len(flight.legs) == 1:
         if view.taut:
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
+        flight = _over_load(flight, view)
+    if flight.phase == P.TAUTEN and len(flight.legs) == 1:
         if flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(flight, settings):
             text = "Cable never taut, landing; check VEH_CABLE_LEN"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
@@ -483,6 +486,21 @@ def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
         if down:
             return flight if flight.still_since_us >= 0 else replace(flight, still_since_us=view.now_us)
     return flight if flight.still_since_us < 0 else replace(flight, still_since_us=-1)
+
+
+def _over_load(flight: Flight, view: View) -> Flight:
+    """The rising vehicle, moved over a load that was not seen well from the ground."""
+    creep = flight.legs[0]
+    assert isinstance(creep, Creep)
+    at = creep.jet(leg_time_s(flight, view.now_us))[0]
+    over = (view.x_load[0], view.x_load[1], at[2])
+    if norm(sub(over, at)) <= ASTRAY:
+        return flight
+    legs = (
+        transfer_leg(at, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        replace(creep, begin=over),
+    )
+    return replace(flight, legs=legs, leg_start_us=view.now_us)
 
 
 def _taut_by(flight: Flight, settings: Settings) -> float:
