@@ -174,7 +174,7 @@ def limits_from(table: ParameterTable) -> Limits:
         high - margin if limited else inf,
         0.01 * table["MIS_TENSION"] * load_mass * gravity,
         cos(radians(table["MIS_TILT_DEG"])),
-        1e-3 * table["PLB_LAG_MS"],
+        1e-3 * table["VEH_ROTOR_TAU"],
     )
     shaping = table["MIS_SHAPE"]
     shaped = shaping == SHAPE_ALWAYS or (

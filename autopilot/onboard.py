@@ -14,7 +14,13 @@ from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
 from autopilot.flight import ON_GROUND, Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
-from autopilot.laws import believed_vehicle, build_law
+from autopilot.laws import (
+    believed_actuation,
+    believed_drag,
+    believed_observer,
+    believed_vehicle,
+    build_law,
+)
 from autopilot.loss import Loss
 from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
@@ -33,7 +39,7 @@ from autopilot.services.records import (
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import HilGps, hil_actuator_controls_message
+from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
@@ -55,6 +61,30 @@ class Work(NamedTuple):
     def done(self) -> Prepared:
         """What comes of it; takes from a millisecond to some seconds."""
         return prepare(self.steps, self.sequence, self.limits)
+
+
+def build_setup(table: ParameterTable, control_every: int) -> Setup:
+    """What the flight core is given, from the parameters and the ticks between two runs of the law."""
+    law, vehicle = build_law(table), believed_vehicle(table)
+    return Setup(
+        vehicle=vehicle,
+        limited=table["VEH_ROTOR_LIM"],
+        law=law,
+        actuation=believed_actuation(table),
+        observer=believed_observer(table, vehicle),
+        drag=believed_drag(table),
+        tuning=estimator_tuning(table),
+        settings=settings_from(table, law.ramp_lag_s),
+        control_every=control_every,
+    )
+
+
+def plan_of(mission: StoredMission, home: Home, limits: Limits | None) -> Plan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet."""
+    steps = located_steps(mission.items, home)
+    flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+    prepared = PENDING if limits is None else prepare(flown, sequence, limits)
+    return Plan(flown, sequence, len(mission.items), prepared)
 
 
 class Onboard:
@@ -81,7 +111,7 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
-        self._setup = self._build_setup(1)
+        self._setup = build_setup(parameters, 1)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self._setup.settings.limits
         self._take_plan(self.endpoint.mission)
@@ -111,9 +141,14 @@ class Onboard:
         return self._answer
 
     @property
+    def phase(self) -> Phase:
+        """The phase of flight."""
+        return self._state.flight.phase
+
+    @property
     def armed(self) -> bool:
         """Whether rotors may turn."""
-        return self._state.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE)
+        return self.phase not in (Phase.DISARMED, Phase.FAILSAFE)
 
     def _run(self, tick: Tick) -> None:
         period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
@@ -151,18 +186,6 @@ class Onboard:
 
     # ---- parameters
 
-    def _build_setup(self, control_every: int) -> Setup:
-        table = self.parameters
-        law = build_law(table)
-        return Setup(
-            vehicle=believed_vehicle(table),
-            limited=table["VEH_ROTOR_LIM"],
-            law=law,
-            tuning=estimator_tuning(table),
-            settings=settings_from(table, law.ramp_lag_s),
-            control_every=control_every,
-        )
-
     def _follow_parameters(self) -> None:
         self._version = self.parameters.version
         try:
@@ -173,7 +196,7 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
             return
         self.fault = ""
-        self._setup = self._build_setup(every)
+        self._setup = build_setup(self.parameters, every)
         # a mission under way keeps the paths that it began with
         if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
             self._prepare()
@@ -233,13 +256,12 @@ class Onboard:
         return verdict
 
     def _take_plan(self, mission: StoredMission) -> None:
-        steps = located_steps(mission.items, self._options.home)
-        plan = Plan(tuple(s.step for s in steps), tuple(s.last for s in steps), len(mission.items), PENDING)
+        plan = plan_of(mission, self._options.home, None)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
         self._prepare()
 
     def _prepare(self) -> None:
-        """Have the paths of the plan made: at once or, where the loop must not wait, by whoever takes `work`."""
+        """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
         plan, limits = self._state.flight.plan, self._setup.settings.limits
         self._prepared_for = limits
         self.work = Work(plan.steps, plan.sequence, limits)

@@ -20,6 +20,7 @@ from autopilot.guidance import (
     transfer_leg,
 )
 from autopilot.mixer import mix
+from autopilot.observer import nominal
 from missions.model import Signals, Sine, Term
 from missions.shaping import shape
 
@@ -52,5 +53,5 @@ def rehearse(setup: Setup) -> None:
     for leg in legs:
         jet = leg.jet(0.5)
         memory = setup.law.start(motion, jet[0], jet[1])
-        _, command = track(setup, memory, motion, leg, jet, 0.5)
+        _, command = track(setup, memory, motion, leg, jet, 0.5, state.actuation, nominal(setup.vehicle))
         mix(command.thrust, command.moment, setup.vehicle, setup.limited)

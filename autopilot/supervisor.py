@@ -40,6 +40,7 @@ from autopilot.guidance import (
     Swing,
     brake_leg,
     carry_leg,
+    slow_leg,
     transfer_leg,
 )
 from autopilot.wire.dialect import plumbline as mavlink
@@ -174,6 +175,10 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     x, v, a = load_motion(flight, view, settings)
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
+    if flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
+        t = leg_time_s(flight, view.now_us)
+        slow = slow_leg(flight.legs[0], t, settings.accel_m_s2, settings.least_move_s)
+        return (slow,), slow.end
     brake = brake_leg(x, v, a, settings.accel_m_s2, settings.least_move_s)
     return (brake,), brake.end
 

@@ -7,6 +7,7 @@ from math import inf, nan
 
 from autopilot.decisions import arming_complaints
 from autopilot.estimation.filter import control_state
+from autopilot.estimation.records import TRACKER
 from autopilot.flight import CARRYING, ON_GROUND, Flight, Phase, Selected, leg_time_s
 from autopilot.flight_core import FlightState, Setup, view_of
 from autopilot.geometry.linear import ZERO, norm, sub
@@ -113,7 +114,7 @@ def sensor_bits(tick: Tick | None, state: FlightState, gps: HilGps | None, ready
             present |= bit
             healthy |= bit
     estimator = state.estimator
-    if estimator.vehicle.age_s < inf:
+    if estimator.vehicle.source == TRACKER:
         present |= snapshot.TRACKER
         if estimator.vehicle.age_s < FRESH_S and estimator.load.age_s < FRESH_S:
             healthy |= snapshot.TRACKER
@@ -173,8 +174,8 @@ def make_snapshot(
         quat_wxyz=estimator.vehicle.quat_wxyz,
         omega_body=control.omega_body,
         estimator_flags=0 if view.complaints else _ESTIMATING,
-        horizontal_std=estimator.vehicle.covariance[0] ** 0.5,
-        vertical_std=estimator.vehicle.covariance[0] ** 0.5,
+        horizontal_std=estimator.doubt.horizontal,
+        vertical_std=estimator.doubt.vertical,
         x_load=control.x_load,
         v_load=control.v_load,
         q_cable=control.q_cable,

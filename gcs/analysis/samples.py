@@ -26,7 +26,7 @@ AIRBORNE = (
     mavlink.PLUMBLINE_PHASE_SET_DOWN,
     mavlink.PLUMBLINE_PHASE_FAILSAFE,
 )
-_ATTITUDE_MODES = (
+ATTITUDE_MODES = (
     mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE,
     mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE,
 )
@@ -69,7 +69,7 @@ class Samples:
     @property
     def position_tracked(self) -> NDArray[np.bool_]:
         """(n,) in the mission window, and the cascade tracks a position rather than an attitude."""
-        return self.in_mission & ~np.isin(self.control_mode, _ATTITUDE_MODES)
+        return self.in_mission & ~np.isin(self.control_mode, ATTITUDE_MODES)
 
 
 def phase_at(telemetry: Telemetry, at_s: Floats) -> Ints:

@@ -122,6 +122,24 @@ class SimulationTrack:
     load_on_ground: Ints
 
 
+@dataclass(frozen=True)
+class WindTrack:
+    """WIND_STATE."""
+
+    time_s: Floats  # (n,) from when on it holds
+    wind_m_s: Floats  # (n, 3) ENU, mean
+    gust_m_s: Floats  # (n, 3) ENU, the gust pulse in force
+
+
+@dataclass(frozen=True)
+class SnapTrack:
+    """CABLE_SNAP."""
+
+    time_s: Floats  # (n,)
+    speed_m_s: Floats  # (n,) closing speed
+    impulse_n_s: Floats  # (n,)
+
+
 class StatusText(NamedTuple):
     """One whole STATUSTEXT, its chunks joined; stamped by the capture."""
 
@@ -146,6 +164,8 @@ class Telemetry:
     mission_current: ItemTrack
     mission_reached: ItemTrack
     simulation: SimulationTrack
+    wind: WindTrack
+    snaps: SnapTrack
     texts: tuple[StatusText, ...]
 
     @property

@@ -201,6 +201,24 @@ def read_cascade_errors(m: Any) -> CascadeErrors:
     )
 
 
+class WindState(NamedTuple):
+    """WIND_STATE: mean wind and gust pulse in force from `time_us` on, m/s; random gusts are in neither."""
+
+    time_us: int
+    wind: Vec3
+    gust: Vec3
+
+
+def wind_state_message(time_us: int, wind: Vec3, gust: Vec3) -> Any:
+    """WIND_STATE, see `WindState`."""
+    return mavlink.MAVLink_wind_state_message(time_us, ned_from_enu(wind), ned_from_enu(gust))
+
+
+def read_wind_state(m: Any) -> WindState:
+    """Inverse of `wind_state_message`."""
+    return WindState(m.time_usec, enu_from_ned(tuple(m.wind)), enu_from_ned(tuple(m.gust)))
+
+
 class RotorState(NamedTuple):
     """ROTOR_STATE: commanded (estimated source) or true forces; bit i of `saturated`: rotor i+1 was cut."""
 

@@ -6446,6 +6446,8 @@ MAVLINK_MSG_ID_LOAD_SETPOINT = 60102
 MAVLINK_MSG_ID_CASCADE_ERRORS = 60103
 MAVLINK_MSG_ID_ROTOR_STATE = 60104
 MAVLINK_MSG_ID_SIM_STATUS = 60105
+MAVLINK_MSG_ID_WIND_STATE = 60106
+MAVLINK_MSG_ID_CABLE_SNAP = 60107
 MAVLINK_MSG_ID_SYS_STATUS = 1
 MAVLINK_MSG_ID_SYSTEM_TIME = 2
 MAVLINK_MSG_ID_PING = 4
@@ -6965,6 +6967,87 @@ class MAVLink_sim_status_message(MAVLink_message):
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
 setattr(MAVLink_sim_status_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_wind_state_message(MAVLink_message):
+    """
+    Wind of the simulated world: five times a second, and when a gust
+    pulse begins or ends.
+    """
+
+    id = MAVLINK_MSG_ID_WIND_STATE
+    msgname = "WIND_STATE"
+    fieldnames = ["time_usec", "wind", "gust"]
+    ordered_fieldnames = ["time_usec", "wind", "gust"]
+    fieldtypes = ["uint64_t", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "wind": "m/s", "gust": "m/s"}
+    native_format = bytearray(b"<Qff")
+    orders = [0, 1, 2]
+    lengths = [1, 3, 3]
+    array_lengths = [0, 3, 3]
+    crc_extra = 38
+    unpacker = struct.Struct("<Q3f3f")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, time_usec: int, wind: Sequence[float], gust: Sequence[float]):
+        MAVLink_message.__init__(self, MAVLink_wind_state_message.id, MAVLink_wind_state_message.msgname)
+        self._fieldnames = MAVLink_wind_state_message.fieldnames
+        self._instance_field = MAVLink_wind_state_message.instance_field
+        self._instance_offset = MAVLink_wind_state_message.instance_offset
+        self.time_usec = time_usec
+        self.wind = wind
+        self.gust = gust
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.wind[0], self.wind[1], self.wind[2], self.gust[0], self.gust[1], self.gust[2]), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_wind_state_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_cable_snap_message(MAVLink_message):
+    """
+    The slack cable of the simulated world came taut.
+    """
+
+    id = MAVLINK_MSG_ID_CABLE_SNAP
+    msgname = "CABLE_SNAP"
+    fieldnames = ["time_usec", "speed", "impulse"]
+    ordered_fieldnames = ["time_usec", "speed", "impulse"]
+    fieldtypes = ["uint64_t", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "speed": "m/s", "impulse": "N.s"}
+    native_format = bytearray(b"<Qff")
+    orders = [0, 1, 2]
+    lengths = [1, 1, 1]
+    array_lengths = [0, 0, 0]
+    crc_extra = 208
+    unpacker = struct.Struct("<Qff")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, time_usec: int, speed: float, impulse: float):
+        MAVLink_message.__init__(self, MAVLink_cable_snap_message.id, MAVLink_cable_snap_message.msgname)
+        self._fieldnames = MAVLink_cable_snap_message.fieldnames
+        self._instance_field = MAVLink_cable_snap_message.instance_field
+        self._instance_offset = MAVLink_cable_snap_message.instance_offset
+        self.time_usec = time_usec
+        self.speed = speed
+        self.impulse = impulse
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.speed, self.impulse), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_cable_snap_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_sys_status_message(MAVLink_message):
@@ -17046,6 +17129,8 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_CASCADE_ERRORS: MAVLink_cascade_errors_message,
     MAVLINK_MSG_ID_ROTOR_STATE: MAVLink_rotor_state_message,
     MAVLINK_MSG_ID_SIM_STATUS: MAVLink_sim_status_message,
+    MAVLINK_MSG_ID_WIND_STATE: MAVLink_wind_state_message,
+    MAVLINK_MSG_ID_CABLE_SNAP: MAVLink_cable_snap_message,
     MAVLINK_MSG_ID_SYS_STATUS: MAVLink_sys_status_message,
     MAVLINK_MSG_ID_SYSTEM_TIME: MAVLink_system_time_message,
     MAVLINK_MSG_ID_PING: MAVLink_ping_message,
@@ -17919,6 +18004,52 @@ class MAVLink(object):
 
         """
         self.send(self.sim_status_encode(time_usec, speed_factor, rate_hz, late_p50_us, late_p99_us, late_max_us, missed, vehicle_on_ground, load_on_ground), force_mavlink1=force_mavlink1)
+
+    def wind_state_encode(self, time_usec: int, wind: Sequence[float], gust: Sequence[float]) -> MAVLink_wind_state_message:
+        """
+        Wind of the simulated world: five times a second, and when a gust
+        pulse begins or ends.
+
+        time_usec                 : Time from which this holds, clock of the vehicle. [us] (type:uint64_t)
+        wind                      : Mean wind, NED, without random gusts. [m/s] (type:float)
+        gust                      : Gust pulse in force, NED, to be added; 0 where there is none. [m/s] (type:float)
+
+        """
+        return MAVLink_wind_state_message(time_usec, wind, gust)
+
+    def wind_state_send(self, time_usec: int, wind: Sequence[float], gust: Sequence[float], force_mavlink1: bool = False) -> None:
+        """
+        Wind of the simulated world: five times a second, and when a gust
+        pulse begins or ends.
+
+        time_usec                 : Time from which this holds, clock of the vehicle. [us] (type:uint64_t)
+        wind                      : Mean wind, NED, without random gusts. [m/s] (type:float)
+        gust                      : Gust pulse in force, NED, to be added; 0 where there is none. [m/s] (type:float)
+
+        """
+        self.send(self.wind_state_encode(time_usec, wind, gust), force_mavlink1=force_mavlink1)
+
+    def cable_snap_encode(self, time_usec: int, speed: float, impulse: float) -> MAVLink_cable_snap_message:
+        """
+        The slack cable of the simulated world came taut.
+
+        time_usec                 : The tick by which it had, clock of the vehicle. [us] (type:uint64_t)
+        speed                     : Closing speed: at which the distance grew to the length of the cable. [m/s] (type:float)
+        impulse                   : What the cable exchanged between vehicle and load. [N.s] (type:float)
+
+        """
+        return MAVLink_cable_snap_message(time_usec, speed, impulse)
+
+    def cable_snap_send(self, time_usec: int, speed: float, impulse: float, force_mavlink1: bool = False) -> None:
+        """
+        The slack cable of the simulated world came taut.
+
+        time_usec                 : The tick by which it had, clock of the vehicle. [us] (type:uint64_t)
+        speed                     : Closing speed: at which the distance grew to the length of the cable. [m/s] (type:float)
+        impulse                   : What the cable exchanged between vehicle and load. [N.s] (type:float)
+
+        """
+        self.send(self.cable_snap_encode(time_usec, speed, impulse), force_mavlink1=force_mavlink1)
 
     def sys_status_encode(self, onboard_control_sensors_present: int, onboard_control_sensors_enabled: int, onboard_control_sensors_health: int, load: int, voltage_battery: int, current_battery: int, battery_remaining: int, drop_rate_comm: int, errors_comm: int, errors_count1: int, errors_count2: int, errors_count3: int, errors_count4: int, onboard_control_sensors_present_extended: int = 0, onboard_control_sensors_enabled_extended: int = 0, onboard_control_sensors_health_extended: int = 0) -> MAVLink_sys_status_message:
         """
