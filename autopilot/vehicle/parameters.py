@@ -165,6 +165,14 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("MIS_ACCEL", 1.5, 0.05, 15.0, "m/s^2", "Greatest acceleration of the load between waypoints"),
             p("MIS_LIFT_SPEED", 0.8, 0.05, 5.0, "m/s", "Speed at which the load is lifted and lowered"),
             p("MIS_TAUT_SPEED", 0.15, 0.02, 1.0, "m/s", "Speed at which the slack cable is pulled taut"),
+            p(
+                "MIS_SNAP_SPEED",
+                0.25,
+                0.02,
+                5.0,
+                "m/s",
+                "Greatest closing speed at which a slack cable is made taut",
+            ),
             p("FS_LOAD_ERR", 5.0, 0.05, 1000.0, "m", "Load position error at which the flight is given up"),
             p("FS_TILT_DEG", 120.0, 10.0, 180.0, "deg", "Tilt at which the flight is given up"),
             p(
