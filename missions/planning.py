@@ -46,9 +46,11 @@ class Prepared:
     made: tuple[Shaped | Passage | None, ...] = ()
     notes: tuple[str, ...] = ()
     refusal: str = ""
+    pending: bool = False  # the paths are not there yet
 
 
 UNPREPARED = Prepared()
+PENDING = Prepared(pending=True)
 
 
 def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits) -> Prepared:
