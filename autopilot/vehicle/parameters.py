@@ -81,7 +81,7 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("VEH_GRAVITY", belief.gravity_m_s2, 0.1, 30.0, "m/s^2", "Acceleration of gravity"),
             p(
                 "CTL_LAW",
-                0.0,
+                float(LAWS.index("plumbline")),
                 0.0,
                 len(LAWS) - 1.0,
                 "",

@@ -19,7 +19,7 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
 @click.option(
     "--law",
     type=click.Choice(["thesis", "lqr", "plumbline"]),
-    default="thesis",
+    default="plumbline",
     show_default=True,
     help="Control law to fly with.",
 )

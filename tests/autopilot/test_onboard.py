@@ -190,11 +190,11 @@ def test_a_parameter_set_in_flight_is_flown_with_at_once() -> None:
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
     setup = craft.onboard._setup
-    name, kind = b"NGC_KX", mavlink.MAV_PARAM_TYPE_REAL32
+    name, kind = b"QP_KX", mavlink.MAV_PARAM_TYPE_REAL32
     craft.send(mavlink.MAVLink_param_set_message(1, 1, name, 5.0, kind))
     craft.tick()
     assert craft.onboard._setup is not setup
-    assert craft.onboard._setup.law.gains.k_x == (5.0, 5.0, 5.0)
+    assert craft.onboard._setup.law.other_modes.position_gains.k_x[0] == 5.0
     assert craft.onboard._setup.control_every == setup.control_every
     craft.wait(1.0)
     assert craft.flight.phase == Phase.MISSION
