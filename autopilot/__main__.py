@@ -8,12 +8,15 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import click
 from platformdirs import user_state_path
 
-from autopilot.onboard import Onboard
+from autopilot.onboard import Onboard, Work
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import Event, Link, MissionChanged, ParameterChanged, TimesyncAnswered
@@ -39,6 +42,7 @@ from autopilot.wire.shell import (
     setting_option,
     shown,
 )
+from missions.planning import Prepared
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
@@ -159,6 +163,47 @@ class GroundInStep:
         self._socket.close()
 
 
+class Aside:
+    """Work for which the control loop must not wait, done by a process of its own."""
+
+    def __init__(self) -> None:
+        self._work: Work | None = None
+        self._process: SpawnProcess | None = None
+        self._answer: Connection | None = None
+
+    def attend(self, onboard: Onboard) -> None:
+        """Begin what waits; hand over what is done."""
+        if onboard.work is not None and onboard.work is not self._work:
+            self.close()
+            self._work = onboard.work
+            context = get_context("spawn")
+            self._answer, theirs = context.Pipe(duplex=False)
+            self._process = context.Process(target=_work_aside, args=(onboard.work, theirs), daemon=True)
+            self._process.start()
+            theirs.close()
+        if self._answer is not None and self._work is not None and self._answer.poll():
+            try:
+                onboard.finish(self._work, self._answer.recv())
+            except EOFError:
+                text = "the process that prepares paths has died"
+                onboard.finish(self._work, Prepared(refusal=text, notes=(text,)))
+            self.close()
+
+    def close(self) -> None:
+        """End what goes on."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+        if self._answer is not None:
+            self._answer.close()
+        self._work = self._process = self._answer = None
+
+
+def _work_aside(work: Work, answer: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
+    answer.send(work.done())
+
+
 class Program:
     """The running autopilot: an `Onboard`, and anew whenever the simulator starts again."""
 
@@ -185,6 +230,7 @@ class Program:
             system_status=mavlink.MAV_STATE_BOOT,
             mavlink_version=3,
         )
+        self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
         self._ground.join(self.onboard)
@@ -198,6 +244,7 @@ class Program:
         self._greet()
         while True:
             stop.check()
+            self._aside.attend(self.onboard)
             arrived = receive(self._socket)
             if arrived is None:
                 now = time.monotonic()
@@ -269,6 +316,7 @@ class Program:
         """Close all sockets."""
         self._socket.close()
         self._ground.close()
+        self._aside.close()
 
 
 def _address_or_none(text: str) -> Address | None:
@@ -361,7 +409,7 @@ def main(
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
-        options = Options(place, boot)
+        options = Options(place, boot, clock_waits=in_step)
 
         def build(stored: StoredMission | None) -> Onboard:
             return Onboard(table, Identity(), options, stored)

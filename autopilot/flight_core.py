@@ -14,7 +14,7 @@ from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
-from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, leg_time_s
+from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance import (
@@ -106,10 +106,16 @@ def step(
     before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
 ) -> tuple[FlightState, Report]:
     """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
-    estimator = estimate(before.estimator, history, readings, setup.tuning, dt)
+    estimator = estimate(before.estimator, history, readings, setup.tuning, dt, before.actuation.thrust)
+    before = before._replace(estimator=estimator)
     if not is_due(tick, setup.control_every):
-        return before._replace(estimator=estimator), Report()
+        return before, Report()
+    return control(before, setup, now_us)
 
+
+def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState, Report]:
+    """The supervisor's, the law's and the mixer's part of a tick: `before` holds the estimate already."""
+    estimator = before.estimator
     state = control_state(estimator)
     pull_n = felt_pull(before, state, setup)
     view = view_of(estimator, state, setup.settings, now_us, pull_n)
@@ -127,9 +133,7 @@ def step(
         setup.drag,
         setup.vehicle,
     )
-    after = before._replace(
-        estimator=estimator, flight=flight, slack_events=slack_events, was_taut=taut, observed=observed
-    )
+    after = before._replace(flight=flight, slack_events=slack_events, was_taut=taut, observed=observed)
     if flight.phase not in IN_AIR:
         idle = IDLE if flight.phase == Phase.ARMED else STOPPED
         actuation = actuate(after.actuation, idle.thrust_done, idle.moment_done, setup.actuation)
@@ -140,7 +144,7 @@ def step(
             mixed=idle,
             actuation=actuation,
             observed=nominal(setup.vehicle)._replace(
-                vehicle_ground=observed.vehicle_ground, load_ground=observed.load_ground
+                support=observed.support, load_ground=observed.load_ground
             ),
         ), report
 
@@ -149,7 +153,7 @@ def step(
     if isinstance(leg, Catch):
         jet = leg.meeting(state.x_quad, state.v_quad, state.x_load, state.v_load, setup.vehicle.gravity)
     else:
-        jet = leg.jet(t)
+        jet = jet_ahead(flight, t)
     memory = after.memory
     if memory is None or leg.control_mode != after.control_mode:
         memory = setup.law.start(state, jet[0], jet[1])

@@ -11,9 +11,10 @@ from math import comb, inf, pi, sqrt
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.signals import SignalTable, evaluate
+from missions.shaping import Shaped
 from missions.swing import swing
 from missions.transfer import PEAK_SPEED, transfer, transfer_duration
+from missions.waypoints import Passage, evaluate_path
 
 QUAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
 LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
@@ -31,6 +32,11 @@ _STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k
 
 def _rest(position: Vec3) -> Jet:
     return (position, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
+
+
+def _moved(anchor: Vec3, jet: Jet) -> Jet:
+    x, v, a, j, s, c, p = jet
+    return (add(anchor, x), v, a, j, s, c, p)
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,17 +226,57 @@ class Creep:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """The signals of a mission, from where the load hung when they began."""
+    """The signals of a mission as they are flown, from where the load hung when they began."""
 
     anchor: Vec3
-    table: SignalTable
-    duration_s: float
+    path: Shaped
     control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From getting ready for the signals to coming to rest after them."""
+        return self.path.lead_s + self.path.duration_s + self.path.tail_s
 
     def jet(self, t: float) -> Jet:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
-        x, v, a, j, s, c, p = evaluate(self.table, t)
-        return (add(self.anchor, x), v, a, j, s, c, p)
+        return _moved(self.anchor, self.path.jet(t - self.path.lead_s))
+
+    def asked(self, t: float) -> Jet:
+        """The same of the path that was asked for."""
+        return _moved(self.anchor, self.path.asked(t - self.path.lead_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """A stretch of a path through waypoints, past the last of which it goes on.
+
+    `offset` is by how much the load hung beside the beginning of the path; it fades away in `fade_s`.
+    """
+
+    path: Passage
+    offset: Vec3
+    fade_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From one waypoint to the next."""
+        return self.path.end_s - self.path.begin_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        at = self.path.begin_s + t
+        x, v, a, j, s, c, p = evaluate_path(self.path.table, at)
+        y = transfer(self.offset, ZERO, self.fade_s, at)
+        return (
+            add(x, y[0]),
+            add(v, y[1]),
+            add(a, y[2]),
+            add(j, y[3]),
+            add(s, y[4]),
+            add(c, y[5]),
+            add(p, y[6]),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +327,12 @@ class Calm:
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
-Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Run | Swing | Calm
+Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Run | Pass | Swing | Calm
+
+
+def asked_jet(leg: Leg, t: float) -> Jet:
+    """What was asked for where the leg flies something near it; else what it flies."""
+    return leg.asked(t) if isinstance(leg, Run) else leg.jet(t)
 
 
 def least_move_s(cable_length: float, gravity: float) -> float:

@@ -7,12 +7,19 @@ from typing import Any, NamedTuple, Protocol
 
 from autopilot.actuation import Actuation, ActuationConstants, actuation_constants
 from autopilot.control import lqr, plumbline, quad_position, thesis
-from autopilot.control.command_filter import filter_constants
+from autopilot.control.design import Design, Timing, Wanted, design
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
-from autopilot.geometry.linear import Mat3, Vec3, axpy
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, axpy
 from autopilot.observer import Observed, ObserverConstants, observer_constants
-from autopilot.plumbline_tick import PlumblineConstants, ahead_of, hastened, load_position_tick
+from autopilot.plumbline_tick import (
+    PlumblineConstants,
+    SlackConstants,
+    ahead_of,
+    hastened,
+    load_position_tick,
+    quad_position_tick,
+)
 from autopilot.rotor_lag import lag_gain
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.parameters import ParameterTable
@@ -90,6 +97,23 @@ def believed_actuation(table: ParameterTable) -> ActuationConstants:
     """Delay and lag of the rotors as the parameters describe them."""
     period = 1.0 / table["CTL_RATE_HZ"]
     return actuation_constants(1e-3 * table["VEH_ACT_DELAY"], 1e-3 * table["VEH_ROTOR_TAU"], period)
+
+
+def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
+    """The gains of `plumbline` for the vehicle that the parameters describe."""
+    lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
+    return design(
+        Wanted(
+            tolerance=1e-3 * table["PLB_DELAY_TOL"],
+            integral_ratio=table["PLB_RATIO_I"],
+            cable_ratio=table["PLB_RATIO_Q"],
+            attitude_ratio=table["PLB_RATIO_R"],
+            zeta=table["PLB_ZETA"],
+            noise=table["PLB_NOISE"],
+        ),
+        Timing(1e-3 * table["VEH_ACT_DELAY"], lag, min(lag, shown), 1.0 / table["CTL_RATE_HZ"]),
+        vehicle,
+    )
 
 
 def believed_observer(table: ParameterTable, vehicle: Vehicle) -> ObserverConstants:
@@ -175,7 +199,7 @@ class ThesisLaw(NamedTuple):
         self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
     ) -> tuple[Memory, Command]:
         return quad_position.quad_position(
-            memory, state, reference, 0.0, self.position_gains, self.gains, self.filters, self.vehicle
+            memory, state, reference, 0.0, ZERO, self.position_gains, self.gains, self.filters, self.vehicle
         )
 
 
@@ -253,34 +277,35 @@ class PlumblineLaw(NamedTuple):
     """Every mode at the state at which its command will find the vehicle, with rotors hastened by their lag.
 
     Load position is flown with exact derivatives. The other modes, which are flown for moments only, are the
-    loops of the thesis's cascade with its parameters.
+    loops of the thesis's cascade with its filters and the gains of the design.
     """
 
     constants: PlumblineConstants
+    designed: Design
     other_modes: ThesisLaw
 
     @classmethod
     def build(cls, table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
         """From the PLB_ and VEH_ parameters; the other modes from NGC_ and QP_."""
-        gains = plumbline.PlumblineGains(
-            k_R=_diagonal(table["PLB_KR"]),
-            k_Omega=_diagonal(table["PLB_KOMEGA"]),
-            k_q=table["PLB_KQ"],
-            k_omega=table["PLB_KW"],
-            k_x=_diagonal(table["PLB_KX"]),
-            k_v=_diagonal(table["PLB_KV"]),
-        )
         period = 1.0 / table["CTL_RATE_HZ"]
+        lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
+        designed = believed_design(table, vehicle)
         constants = PlumblineConstants(
-            gains,
-            filter_constants(table["PLB_WN_F"], plumbline.ZETA, period),
+            designed.gains,
             believed_drag(table),
             believed_actuation(table),
-            lag_gain(1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"], period),
+            lag_gain(lag, shown, period),
             period,
             vehicle,
         )
-        return cls(constants, ThesisLaw.build(table, vehicle))
+        gains = designed.gains
+        others = ThesisLaw.build(table, vehicle)
+        others = others._replace(
+            gains=others.gains._replace(
+                k_R=gains.k_R, k_Omega=gains.k_Omega, k_q=gains.k_q, k_omega=gains.k_omega, epsilon=1.0
+            )
+        )
+        return cls(constants, designed, others)
 
     @property
     def ramp_lag_s(self) -> float:
@@ -330,11 +355,12 @@ class PlumblineLaw(NamedTuple):
     def quad_position(
         self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
     ) -> tuple[Memory, Command]:
-        ahead = ahead_of(state, 0.0, actuation, observed, self.constants)
-        other, wanted = self.other_modes.quad_position(
-            memory.other_modes, ahead.state, reference, actuation, observed
+        others = self.other_modes
+        slack = SlackConstants(others.position_gains, others.gains, others.filters)
+        other, command = quad_position_tick(
+            memory.other_modes, state, reference, actuation, observed, self.constants, slack
         )
-        return memory._replace(other_modes=other), hastened(wanted, ahead, self.constants)
+        return memory._replace(other_modes=other), command
 
 
 _BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {

@@ -20,6 +20,7 @@ cable was slack. The push is learned while the vehicle is off the ground.
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from autopilot.control.load_motion import Drag, air_force
@@ -29,8 +30,9 @@ from autopilot.geometry.linear import ZERO, Vec3, add, axpy, column, dot, norm, 
 
 # m: so much higher than where it stood or lay is in the air
 _OFF_GROUND = 0.03
-# share of the vehicle's weight: rotors that give less leave it where it stands
-_STANDING = 0.5
+# share of the vehicle's weight that the ground carries while the vehicle counts as standing
+_STANDING = 0.2
+_CONTACT_TIME = 0.02  # s, in which the ground's force is believed
 # of the nominal mass of the load
 _LEAST_MASS = 0.25
 _GREATEST_MASS = 4.0
@@ -41,6 +43,7 @@ class ObserverConstants(NamedTuple):
 
     mass: float
     push: float
+    contact: float
     greatest_push: float  # N
 
 
@@ -51,7 +54,7 @@ class Observed(NamedTuple):
     push: Vec3  # N, world, on the vehicle
     correlation: float  # of T and w, N m/s^2
     square: float  # of w, m^2/s^4
-    vehicle_ground: float  # m, height at which the vehicle stood
+    support: float  # N, what holds the vehicle up besides its rotors while the cable is slack
     load_ground: float  # m, height at which the load lay
 
 
@@ -63,13 +66,30 @@ def observer_constants(
     def share(time: float) -> float:
         return min(1.0, period / time) if time > 0.0 else 0.0
 
-    return ObserverConstants(share(mass_time), share(push_time), greatest_push)
+    return ObserverConstants(share(mass_time), share(push_time), share(_CONTACT_TIME), greatest_push)
 
 
 def nominal(vehicle: Vehicle) -> Observed:
-    """Nothing observed: the load's mass as told, still air, ground at any height."""
+    """Nothing observed: the load's mass as told, still air, standing on the ground, the load at home."""
     g = vehicle.gravity
-    return Observed(vehicle.load_mass, ZERO, vehicle.load_mass * g * g, g * g, 0.0, 0.0)
+    return Observed(vehicle.load_mass, ZERO, vehicle.load_mass * g * g, g * g, vehicle.quad_mass * g, 0.0)
+
+
+def aloft(vehicle: Vehicle) -> Observed:
+    """As `nominal`, but vehicle and load are off the ground, wherever they are."""
+    return nominal(vehicle)._replace(support=0.0, load_ground=-inf)
+
+
+@kernel
+def standing(observed: Observed, vehicle: Vehicle) -> bool:
+    """Whether the ground holds the vehicle."""
+    return observed.support > _STANDING * vehicle.quad_mass * vehicle.gravity
+
+
+@kernel
+def lying(observed: Observed, state: State) -> bool:
+    """Whether the load is no higher than where it lay while the cable was slack."""
+    return not state.x_load[2] > observed.load_ground + _OFF_GROUND
 
 
 @kernel
@@ -102,27 +122,29 @@ def observe(
     q, a = state.q_cable, state.a_quad
     load_mass, push = observed.load_mass, observed.push
     correlation, square = observed.correlation, observed.square
-    vehicle_ground, load_ground = observed.vehicle_ground, observed.load_ground
-    if thrust < _STANDING * vehicle.quad_mass * vehicle.gravity:
-        vehicle_ground = state.x_quad[2]
+    support, load_ground = observed.support, observed.load_ground
     if not taut > 0.0:
         load_ground = state.x_load[2]
 
     felt: Vec3 = (a[0], a[1], a[2] + vehicle.gravity)
     known = axpy(thrust, column(state.R, 2), air_force(state.v_quad, drag))
     rest = sub(scale(vehicle.quad_mass, felt), known)
+    support += constants.contact * ((0.0 if taut > 0.0 else rest[2]) - support)
     if taut > 0.0:
         tension = dot(rest, q)
         pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, felt)
         rest = axpy(-tension, q, rest)
-        if state.x_load[2] > load_ground + _OFF_GROUND and pull > 0.0:
+        if not lying(observed, state) and pull > 0.0:
             correlation += constants.mass * (tension * pull - correlation)
             square += constants.mass * (pull * pull - square)
             found = correlation / square
             load_mass = min(_GREATEST_MASS * vehicle.load_mass, max(_LEAST_MASS * vehicle.load_mass, found))
-    if state.x_quad[2] > vehicle_ground + _OFF_GROUND:
+    else:
+        # up and down it cannot be told from the ground
+        rest = (rest[0], rest[1], 0.0)
+    if not support > _STANDING * vehicle.quad_mass * vehicle.gravity:
         push = add(push, scale(constants.push, sub(rest, push)))
         size = norm(push)
         if size > constants.greatest_push:
             push = scale(constants.greatest_push / size, push)
-    return Observed(load_mass, push, correlation, square, vehicle_ground, load_ground)
+    return Observed(load_mass, push, correlation, square, support, load_ground)

@@ -6,12 +6,13 @@ waits until the shell hands it over, between two ticks.
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from autopilot.decisions import decide, with_plan
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
-from autopilot.flight import Phase, Plan, settings_from
+from autopilot.flight import ON_GROUND, Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
 from autopilot.laws import (
     believed_actuation,
@@ -40,17 +41,55 @@ from autopilot.services.requests import Reboot
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import HilGps, hil_actuator_controls_message
+from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
+from missions.model import Step
+from missions.planning import PENDING, Limits, Prepared, prepare
 
 GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
+
+
+class Work(NamedTuple):
+    """The paths of a mission, to be prepared; plain data, so that another process can do it."""
+
+    steps: tuple[Step, ...]
+    sequence: tuple[int, ...]
+    limits: Limits
+
+    def done(self) -> Prepared:
+        """What comes of it; takes from a millisecond to some seconds."""
+        return prepare(self.steps, self.sequence, self.limits)
+
+
+def build_setup(table: ParameterTable, control_every: int) -> Setup:
+    """What the flight core is given, from the parameters and the ticks between two runs of the law."""
+    law, vehicle = build_law(table), believed_vehicle(table)
+    return Setup(
+        vehicle=vehicle,
+        limited=table["VEH_ROTOR_LIM"],
+        law=law,
+        actuation=believed_actuation(table),
+        observer=believed_observer(table, vehicle),
+        drag=believed_drag(table),
+        tuning=estimator_tuning(table),
+        settings=settings_from(table, law.ramp_lag_s),
+        control_every=control_every,
+    )
+
+
+def plan_of(mission: StoredMission, home: Home, limits: Limits | None) -> Plan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet."""
+    steps = located_steps(mission.items, home)
+    flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+    prepared = PENDING if limits is None else prepare(flown, sequence, limits)
+    return Plan(flown, sequence, len(mission.items), prepared)
 
 
 class Onboard:
@@ -78,7 +117,9 @@ class Onboard:
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
         self._reboot = False  # the simulator is asked to begin anew
-        self._setup = self._build_setup(1)
+        self._setup = build_setup(parameters, 1)
+        self.work: Work | None = None  # what waits for `finish`
+        self._prepared_for = self._setup.settings.limits
         self._take_plan(self.endpoint.mission)
 
     # ---- simulator link
@@ -108,9 +149,14 @@ class Onboard:
         return self._answer
 
     @property
+    def phase(self) -> Phase:
+        """The phase of flight."""
+        return self._state.flight.phase
+
+    @property
     def armed(self) -> bool:
         """Whether rotors may turn."""
-        return self._state.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE)
+        return self.phase not in (Phase.DISARMED, Phase.FAILSAFE)
 
     def _run(self, tick: Tick) -> None:
         period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
@@ -148,21 +194,6 @@ class Onboard:
 
     # ---- parameters
 
-    def _build_setup(self, control_every: int) -> Setup:
-        table = self.parameters
-        law, vehicle = build_law(table), believed_vehicle(table)
-        return Setup(
-            vehicle=vehicle,
-            limited=table["VEH_ROTOR_LIM"],
-            law=law,
-            actuation=believed_actuation(table),
-            observer=believed_observer(table, vehicle),
-            drag=believed_drag(table),
-            tuning=estimator_tuning(table),
-            settings=settings_from(table, law.ramp_lag_s),
-            control_every=control_every,
-        )
-
     def _follow_parameters(self) -> None:
         self._version = self.parameters.version
         try:
@@ -173,7 +204,10 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
             return
         self.fault = ""
-        self._setup = self._build_setup(every)
+        self._setup = build_setup(self.parameters, every)
+        # a mission under way keeps the paths that it began with
+        if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
+            self._prepare()
 
     # ---- ground
 
@@ -243,9 +277,32 @@ class Onboard:
         return verdict
 
     def _take_plan(self, mission: StoredMission) -> None:
-        steps = located_steps(mission.items, self._options.home)
-        plan = Plan(tuple(s.step for s in steps), tuple(s.last for s in steps), len(mission.items))
+        plan = plan_of(mission, self._options.home, None)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
+        plan, limits = self._state.flight.plan, self._setup.settings.limits
+        self._prepared_for = limits
+        self.work = Work(plan.steps, plan.sequence, limits)
+        self._have_prepared(PENDING)
+        if self._options.clock_waits or self._state.flight.phase in ON_GROUND:
+            self.finish(self.work, self.work.done())
+
+    def finish(self, work: Work, prepared: Prepared) -> None:
+        """Take what came of `work`, unless there is other work by now."""
+        if work is not self.work:
+            return
+        self.work = None
+        for note in prepared.notes:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
+        self._have_prepared(prepared)
+
+    def _have_prepared(self, prepared: Prepared) -> None:
+        flight = self._state.flight
+        flight = replace(flight, plan=replace(flight.plan, prepared=prepared))
+        self._state = self._state._replace(flight=flight)
 
     def _snapshot(self) -> Snapshot:
         return make_snapshot(

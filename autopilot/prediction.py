@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.actuation import Actuation, ActuationConstants, lagged
+from autopilot.actuation import Actuation, ActuationConstants, after_delay, lagged
 from autopilot.control.load_motion import Drag, air_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
@@ -113,6 +113,13 @@ def _glide(
     thrust, moment = lagged(actuation.thrust, actuation.moment, actuation.queue, row, half)
     middle = _shifted(m, 0.5 * h, begin)
     return _shifted(m, h, _rates(middle, thrust, moment, taut, push, drag, vehicle))
+
+
+@kernel
+def stay(state: State, actuation: Actuation, constants: ActuationConstants) -> Ahead:
+    """A vehicle that the ground holds stays as it is, whatever its rotors do."""
+    thrust, moment = after_delay(actuation, constants)
+    return Ahead(state, thrust, moment)
 
 
 @kernel

@@ -21,8 +21,8 @@ from autopilot.guidance import (
 )
 from autopilot.mixer import mix
 from autopilot.observer import nominal
-from missions.model import Sine, Term
-from missions.signals import signal_table
+from missions.model import Signals, Sine, Term
+from missions.shaping import shape
 
 
 def rehearse(setup: Setup) -> None:
@@ -39,12 +39,14 @@ def rehearse(setup: Setup) -> None:
     for tick in range(3):
         state, _ = step(state, history, readings, setup, tick * 4000, tick, 0.004)
     motion = control_state(state.estimator)
-    table = signal_table((Term("x", 1.0, 0.0, 1.0, None, 0.0, (Sine(1.0),)),))
+    wave = Signals(
+        1.0, (Term("x", 0.01, 0.0, 1.0, None, 0.0, (Sine(1.0),)), Term("x", 0.1, 0.0, 1.0, None, 0.0))
+    )
     legs: tuple[Leg, ...] = (
         Hold(load),
         transfer_leg(load, over, 1.0, 1.0, LOAD_POSITION),
         Creep(over, ZERO, QUAD_POSITION),
-        Run(load, table, 1.0),
+        Run(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
         Swing(load, 0.1, 0.1, 1.0, LOAD_ATTITUDE),
         Swing(load, 0.1, 0.1, 1.0, QUAD_ATTITUDE),
     )

@@ -7,12 +7,15 @@
 | e_a, e_j     | e_a, e_j           | I     | m/s^2, m/s^3  | e_v', e_v'' |
 | x_d .. x_d'''' | jet[0] .. jet[4] | I     | m .. m/s^4    | (3-12)   |
 | k_x, k_v     | k_x, k_v           | I     | N/m, N s/m    | (3-43)   |
+| e_i, k_i     | e_i, k_i           | I     | m s, N/m/s    | e_i' = e_x |
 | s            | s                  |       | 1/s^2         | q' . q'  |
 | q_c          | q_c                | I     |               | (3-42)   |
 
-    A   = -k_x e_x - k_v e_v + m (x_d'' + g e_3) + m_Q L s q
-    A'  = -k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
-    A'' = -k_x e_a - k_v e_j + m x_d''''         + m_Q L (s'' q + 2 s' q' + s q'')
+    A   = -k_i e_i - k_x e_x - k_v e_v + m (x_d'' + g e_3) + m_Q L s q
+    A'  = -k_i e_x - k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
+    A'' = -k_i e_v - k_x e_a - k_v e_j + m x_d''''         + m_Q L (s'' q + 2 s' q' + s q'')
+
+What the errors ask for, k_i e_i + k_x e_x + k_v e_v, is bounded smoothly by half the weight (`saturated`).
 
 e_a = x_L'' - x_d'' and e_j = x_L''' - x_d''' are what the model says of the load (`load_motion`), not
 differences of what was measured; s' = 2 q'.q'', s'' = 2 (q''.q'' + q'.q'''). The derivatives of q_c = -A/|A|
@@ -22,6 +25,7 @@ alone, leaving out those of the errors, makes the cascade unstable with its gain
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from autopilot.control.load_attitude import DirectionCommand
@@ -29,9 +33,11 @@ from autopilot.control.load_motion import LoadMotion
 from autopilot.control.load_position import load_position_force
 from autopilot.control.records import Jet, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, add3, dot, norm, scale, sub, times
+from autopilot.geometry.linear import Vec3, add, add3, axpy, dot, norm, scale, sub, times
 from autopilot.geometry.s2 import unit_derivatives
 
+# of the weight: what the errors may ask for, however great they are
+GREATEST_FEEDBACK = 0.5
 # N; a shorter A has no direction to follow
 _LEAST_FORCE = 1e-3
 
@@ -47,10 +53,33 @@ class PositionJet(NamedTuple):
 
 
 @kernel
+def saturated(v: Vec3, v_dot: Vec3, v_ddot: Vec3, limit: float) -> tuple[Vec3, Vec3, Vec3]:
+    """limit v / sqrt(limit^2 + v^2), which is v while v is small and never longer than `limit`; with its
+    derivatives."""
+    n = sqrt(limit * limit + dot(v, v))
+    u = scale(1.0 / n, v)
+    n_dot = dot(u, v_dot)
+    u_dot = scale(1.0 / n, axpy(-n_dot, u, v_dot))
+    n_ddot = dot(u_dot, v_dot) + dot(u, v_ddot)
+    u_ddot = scale(1.0 / n, axpy(-2.0 * n_dot, u_dot, axpy(-n_ddot, u, v_ddot)))
+    return scale(limit, u), scale(limit, u_dot), scale(limit, u_ddot)
+
+
+@kernel
 def position_jet(
-    state: State, motion: LoadMotion, jet: Jet, k_x: Vec3, k_v: Vec3, vehicle: Vehicle
+    state: State,
+    motion: LoadMotion,
+    jet: Jet,
+    e_i: Vec3,
+    k_i: Vec3,
+    k_x: Vec3,
+    k_v: Vec3,
+    vehicle: Vehicle,
 ) -> PositionJet:
-    """A, A', A'' along the motion of the model; the gains are diagonals in the world frame."""
+    """A, A', A'' along the motion of the model; the gains are diagonals in the world frame.
+
+    With k_i = 0 and small errors it is (3-43).
+    """
     q, q_dot = state.q_cable, state.q_cable_dot
     at = load_position_force(
         state.x_load,
@@ -76,9 +105,21 @@ def position_jet(
     s_ddot = 2.0 * (dot(motion.q_ddot, motion.q_ddot) + dot(q_dot, motion.q_dddot))
     swing_dot = add(scale(s_dot, q), scale(s, q_dot))
     swing_ddot = add3(scale(s_ddot, q), scale(2.0 * s_dot, q_dot), scale(s, motion.q_ddot))
-    A_dot = sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), add(times(k_x, at.e_v), times(k_v, e_a)))
-    A_ddot = sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), add(times(k_x, e_a), times(k_v, e_j)))
-    return PositionJet(at.A, A_dot, A_ddot, at.e_x, at.e_v)
+    wanted = add3(times(k_i, e_i), times(k_x, at.e_x), times(k_v, at.e_v))
+    closed, closed_dot, closed_ddot = saturated(
+        wanted,
+        add3(times(k_i, at.e_x), times(k_x, at.e_v), times(k_v, e_a)),
+        add3(times(k_i, at.e_v), times(k_x, e_a), times(k_v, e_j)),
+        GREATEST_FEEDBACK * mass * vehicle.gravity,
+    )
+    open_loop = add(at.A, add(times(k_x, at.e_x), times(k_v, at.e_v)))
+    return PositionJet(
+        sub(open_loop, closed),
+        sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), closed_dot),
+        sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), closed_ddot),
+        at.e_x,
+        at.e_v,
+    )
 
 
 @kernel

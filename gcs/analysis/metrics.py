@@ -64,7 +64,8 @@ def time_numbers(telemetry: Telemetry, wall_s: float | None) -> Numbers:
 
 
 def tracking_numbers(samples: Samples) -> Numbers:
-    """Load position error over the mission window, norm and axes; (3-40)."""
+    """Load position error over the mission window, norm and axes, (3-40), and its two parts: how far the
+    flown path is from the asked one, and the load from the flown one."""
     error = samples.error_m[samples.position_tracked]
     norm = np.linalg.norm(error, axis=1)
     known = norm[np.isfinite(norm)]
@@ -73,6 +74,11 @@ def tracking_numbers(samples: Samples) -> Numbers:
         "load_error_rms_m": _over(norm, _rms),
         "load_error_final_m": float(known[-1]) if len(known) else None,
     }
+    tracked = samples.position_tracked
+    shaped = np.linalg.norm((samples.desired_m - samples.asked_m)[tracked], axis=1)
+    numbers["shaping_distance_max_m"] = _over(shaped, np.max)
+    flown = np.linalg.norm((samples.actual_m - samples.desired_m)[tracked], axis=1)
+    numbers["tracking_error_max_m"] = _over(flown, np.max)
     for i, axis in enumerate(_AXES):
         numbers[f"load_error_max_{axis}_m"] = _over(np.abs(error[:, i]), np.max)
     for i, axis in enumerate(_AXES):
@@ -107,7 +113,7 @@ def step_numbers(samples: Samples) -> Numbers:
     if not samples.position_tracked[window].any():
         return numbers
     time_s = samples.time_s[window]
-    step = find_step(time_s, samples.desired_m[window], samples.desired_m_s[window])
+    step = find_step(time_s, samples.asked_m[window], samples.asked_m_s[window])
     if step is None:
         return numbers
     response = step_response(step, time_s, samples.actual_m[window])

@@ -78,7 +78,7 @@ _FIELDS: dict[int, str] = {
     mavlink.MAVLINK_MSG_ID_LOAD_STATE: "time_usec x y z vx vy vz qx qy qz qx_dot qy_dot qz_dot distance"
     " tension slack_events taut source",
     mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: "time_usec x y z vx vy vz ax ay az qx qy qz elapsed duration"
-    " seq phase control_mode",
+    " seq phase control_mode asked_x asked_y asked_z asked_vx asked_vy asked_vz",
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: "time_usec e_x e_v e_q e_q_dot e_r e_omega moment"
     " psi_r psi_q thrust control_mode",
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE: "time_usec force force_min force_max saturated source",
@@ -167,12 +167,17 @@ def _load(c: _Columns, source: int) -> LoadTrack:
 
 
 def _setpoint(c: _Columns) -> SetpointTrack:
+    asked, asked_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
+    if not asked.any():  # a vehicle that does not say: the wire fills extensions with zeros
+        asked, asked_m_s = c["x y z"], c["vx vy vz"]
     return _in_order(
         SetpointTrack(
             time_s=c["time_usec"] * _MICRO,
             position_m=enu_from_ned(c["x y z"]),
             velocity_m_s=enu_from_ned(c["vx vy vz"]),
             acceleration_m_s2=enu_from_ned(c["ax ay az"]),
+            asked_m=enu_from_ned(asked),
+            asked_m_s=enu_from_ned(asked_m_s),
             q_cable_c=enu_from_ned(c["qx qy qz"]),
             elapsed_s=c["elapsed"],
             duration_s=c["duration"],

@@ -41,6 +41,8 @@ class SetpointTrack:
     position_m: Floats  # (n, 3) ENU, desired
     velocity_m_s: Floats  # (n, 3) ENU, desired
     acceleration_m_s2: Floats  # (n, 3) ENU, desired
+    asked_m: Floats  # (n, 3) ENU, what the mission asks for; desired is as near to it as can be flown
+    asked_m_s: Floats  # (n, 3) ENU
     q_cable_c: Floats  # (n, 3) commanded cable direction, ENU
     elapsed_s: Floats  # (n,) since the item or phase began
     duration_s: Floats  # (n,) of the item or phase, NaN if open

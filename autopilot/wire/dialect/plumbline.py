@@ -442,7 +442,8 @@ enums["PLUMBLINE_COMMAND"][31010].param[5] = """Start after the beginning of the
 enums["PLUMBLINE_COMMAND"][31010].label[5] = """Start"""
 enums["PLUMBLINE_COMMAND"][31010].param[6] = """Duration of the hold, -1 for ever (MISSION_ITEM_INT.y)."""
 enums["PLUMBLINE_COMMAND"][31010].label[6] = """Hold"""
-enums["PLUMBLINE_COMMAND"][31010].param[7] = """Reserved (0)."""
+enums["PLUMBLINE_COMMAND"][31010].param[7] = """Time after the start by which nine tenths of the rise are to be made; 0: as the envelope has it."""
+enums["PLUMBLINE_COMMAND"][31010].label[7] = """Rise by"""
 PLUMBLINE_LOAD_SIGNAL_FACTOR = 31011
 enums["PLUMBLINE_COMMAND"][31011] = EnumEntry("PLUMBLINE_LOAD_SIGNAL_FACTOR", """Multiplies the last term by a sine.""")
 enums["PLUMBLINE_COMMAND"][31011].param[1] = """Phase."""
@@ -6774,22 +6775,22 @@ class MAVLink_load_setpoint_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_LOAD_SETPOINT
     msgname = "LOAD_SETPOINT"
-    fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode"]
-    ordered_fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode"]
-    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "uint16_t", "uint8_t", "uint8_t"]
+    fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode", "asked_x", "asked_y", "asked_z", "asked_vx", "asked_vy", "asked_vz"]
+    ordered_fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode", "asked_x", "asked_y", "asked_z", "asked_vx", "asked_vy", "asked_vz"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "uint16_t", "uint8_t", "uint8_t", "float", "float", "float", "float", "float", "float"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {"phase": "PLUMBLINE_PHASE", "control_mode": "PLUMBLINE_CONTROL_MODE"}
-    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s/s", "ay": "m/s/s", "az": "m/s/s", "elapsed": "s", "duration": "s"}
-    native_format = bytearray(b"<QffffffffffffffHBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
-    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s/s", "ay": "m/s/s", "az": "m/s/s", "elapsed": "s", "duration": "s", "asked_x": "m", "asked_y": "m", "asked_z": "m", "asked_vx": "m/s", "asked_vy": "m/s", "asked_vz": "m/s"}
+    native_format = bytearray(b"<QffffffffffffffHBBffffff")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
     crc_extra = 67
-    unpacker = struct.Struct("<QffffffffffffffHBB")
+    unpacker = struct.Struct("<QffffffffffffffHBBffffff")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int):
+    def __init__(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, asked_x: float = 0, asked_y: float = 0, asked_z: float = 0, asked_vx: float = 0, asked_vy: float = 0, asked_vz: float = 0):
         MAVLink_message.__init__(self, MAVLink_load_setpoint_message.id, MAVLink_load_setpoint_message.msgname)
         self._fieldnames = MAVLink_load_setpoint_message.fieldnames
         self._instance_field = MAVLink_load_setpoint_message.instance_field
@@ -6812,9 +6813,15 @@ class MAVLink_load_setpoint_message(MAVLink_message):
         self.seq = seq
         self.phase = phase
         self.control_mode = control_mode
+        self.asked_x = asked_x
+        self.asked_y = asked_y
+        self.asked_z = asked_z
+        self.asked_vx = asked_vx
+        self.asked_vy = asked_vy
+        self.asked_vz = asked_vz
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.x, self.y, self.z, self.vx, self.vy, self.vz, self.ax, self.ay, self.az, self.qx, self.qy, self.qz, self.elapsed, self.duration, self.seq, self.phase, self.control_mode), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.x, self.y, self.z, self.vx, self.vy, self.vz, self.ax, self.ay, self.az, self.qx, self.qy, self.qz, self.elapsed, self.duration, self.seq, self.phase, self.control_mode, self.asked_x, self.asked_y, self.asked_z, self.asked_vx, self.asked_vy, self.asked_vz), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -17828,7 +17835,7 @@ class MAVLink(object):
         """
         self.send(self.load_state_encode(time_usec, x, y, z, vx, vy, vz, qx, qy, qz, qx_dot, qy_dot, qz_dot, distance, tension, slack_events, taut, source), force_mavlink1=force_mavlink1)
 
-    def load_setpoint_encode(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int) -> MAVLink_load_setpoint_message:
+    def load_setpoint_encode(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, asked_x: float = 0, asked_y: float = 0, asked_z: float = 0, asked_vx: float = 0, asked_vy: float = 0, asked_vz: float = 0) -> MAVLink_load_setpoint_message:
         """
         What the cascade is asked to track, and where in the flight it is.
 
@@ -17850,11 +17857,17 @@ class MAVLink(object):
         seq                       : Mission item. (type:uint16_t)
         phase                     : Phase of flight. (type:uint8_t, values:PLUMBLINE_PHASE)
         control_mode              : What the cascade tracks. (type:uint8_t, values:PLUMBLINE_CONTROL_MODE)
+        asked_x                   : Load position that the mission asks for, north of home; the desired one is as near to it as can be flown. [m] (type:float)
+        asked_y                   : The same, east of home. [m] (type:float)
+        asked_z                   : The same, below home. [m] (type:float)
+        asked_vx                  : Load velocity that the mission asks for, north. [m/s] (type:float)
+        asked_vy                  : The same, east. [m/s] (type:float)
+        asked_vz                  : The same, down. [m/s] (type:float)
 
         """
-        return MAVLink_load_setpoint_message(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode)
+        return MAVLink_load_setpoint_message(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode, asked_x, asked_y, asked_z, asked_vx, asked_vy, asked_vz)
 
-    def load_setpoint_send(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, force_mavlink1: bool = False) -> None:
+    def load_setpoint_send(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, asked_x: float = 0, asked_y: float = 0, asked_z: float = 0, asked_vx: float = 0, asked_vy: float = 0, asked_vz: float = 0, force_mavlink1: bool = False) -> None:
         """
         What the cascade is asked to track, and where in the flight it is.
 
@@ -17876,9 +17889,15 @@ class MAVLink(object):
         seq                       : Mission item. (type:uint16_t)
         phase                     : Phase of flight. (type:uint8_t, values:PLUMBLINE_PHASE)
         control_mode              : What the cascade tracks. (type:uint8_t, values:PLUMBLINE_CONTROL_MODE)
+        asked_x                   : Load position that the mission asks for, north of home; the desired one is as near to it as can be flown. [m] (type:float)
+        asked_y                   : The same, east of home. [m] (type:float)
+        asked_z                   : The same, below home. [m] (type:float)
+        asked_vx                  : Load velocity that the mission asks for, north. [m/s] (type:float)
+        asked_vy                  : The same, east. [m/s] (type:float)
+        asked_vz                  : The same, down. [m/s] (type:float)
 
         """
-        self.send(self.load_setpoint_encode(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode), force_mavlink1=force_mavlink1)
+        self.send(self.load_setpoint_encode(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode, asked_x, asked_y, asked_z, asked_vx, asked_vy, asked_vz), force_mavlink1=force_mavlink1)
 
     def cascade_errors_encode(self, time_usec: int, e_x: Sequence[float], e_v: Sequence[float], e_q: Sequence[float], e_q_dot: Sequence[float], e_r: Sequence[float], e_omega: Sequence[float], psi_r: float, psi_q: float, thrust: float, moment: Sequence[float], control_mode: int) -> MAVLink_cascade_errors_message:
         """
