@@ -90,6 +90,7 @@ def with_slow(aids: AidEstimate, horizontal: float, vertical: float, reversion: 
         horizontal,
         vertical,
         reversion,
+        aids.debt,
         aids.field,
         aids.magnetic_age,
         aids.barometer_age,

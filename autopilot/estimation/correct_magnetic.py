@@ -47,6 +47,7 @@ def with_field(state: EstimatorState, field: Vec3, age: float) -> EstimatorState
             a.horizontal_slow,
             a.vertical_slow,
             a.reversion,
+            a.debt,
             field,
             age,
             a.barometer_age,

@@ -45,6 +45,7 @@ SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on
 # lying: the pendulum then means little.
 LIFTING_S, LIFTING_PULL = 4.0, 0.8
 LIFTING_ACCEL_STD = 5.0  # rad/s^2
+DEBT_TIME_S = 4.0  # in which a plain receiver's corrections are passed on
 SPEED_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
 LAID_WALK = 0.01  # m per square root of a second, of a load that lies where it was laid
 
@@ -239,6 +240,7 @@ def predict(
             aids.horizontal_slow,
             aids.vertical_slow,
             aids.reversion,
+            scale(1.0 - dt / DEBT_TIME_S, aids.debt),
             aids.field,
             aids.magnetic_age + dt,
             aids.barometer_age + dt,

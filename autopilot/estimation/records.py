@@ -189,6 +189,7 @@ class AidEstimate(NamedTuple):
     horizontal_slow: float  # m, its standard deviation as last stated
     vertical_slow: float
     reversion: float  # 1 with carrier phase, else less: see `correct_gnss`
+    debt: Vec3  # m, of late corrections that those who fly by the estimate have yet to be told
     field: Vec3  # the magnetometer's last reading, body
     magnetic_age: float
     barometer_age: float
@@ -271,7 +272,7 @@ def blank_state() -> EstimatorState:
             rejected=0.0,
             source=NOBODY,
         ),
-        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, inf, inf, 0.0),
+        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
         doubt=Doubt(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
         resets=0.0,
