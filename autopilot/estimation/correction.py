@@ -1,16 +1,16 @@
 """What all corrections share: the past a reading speaks of, rows of its Jacobian, and the state moved by it.
 
-A reading of `age` ago is a function of the errors of *then*; `row` wants them in errors of *now*. Errors move by
-x' = F x, and back over the age
+A reading of `age` ago is a function of the errors of *then*; `row` wants them in errors of *now*. Errors move
+by x' = F x, and back over the age
 
     attitude(then)  = attitude + age R gyro bias
     velocity(then)  = velocity - attitude x S + age R accel bias
     position(then)  = position - age velocity + attitude x D - age^2/2 R accel bias
     direction(then) = (1 + age^2 k / 2) direction - age rate,    k = q . f / L
 
-with f the specific force in the world, S its integral since then and D that of (s - then) f. S and D follow from
-the velocities and positions of then and now in the ring. Left out: the noise that came in since then, the turn
-of R within the age, and in the cable's direction what attitude and bias drive within the age.
+with f the specific force in the world, S its integral since then and D that of (s - then) f. S and D follow
+from the velocities and positions of then and now in the ring. Left out: the noise that came in since, the
+turn of R within the age, and in the cable's direction what attitude and bias drive within the age.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def with_aids(state: EstimatorState, aids: AidEstimate) -> EstimatorState:
 
 @kernel
 def heard(state: EstimatorState, age: float, size: int) -> EstimatorState:
-    """The state that keeps the ring corrected as far back as `age`, with an error state of at least `size`."""
+    """The state with its ring corrected as far back as `age` from now on, and at least `size` errors."""
     return EstimatorState(
         state.time_s,
         state.vehicle,

@@ -41,7 +41,7 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on the ground, it is not known
-# For so long after the cable came taut a load that pulls less than this share of what hanging would is taken as
+# For so long after the cable came taut a load that pulls less than this share of a hanging one's is taken as
 # lying: the pendulum then means little.
 LIFTING_S, LIFTING_PULL = 4.0, 0.8
 LIFTING_ACCEL_STD = 5.0  # rad/s^2
@@ -224,10 +224,10 @@ def predict(
     if vehicle.source > 0.0:
         transit(history, motion, tuning, dt, state.size)
     if load.taut > 0.0:
-        load = predict_taut(load, vehicle, tuning, dt)
+        at_end = predict_taut(load, vehicle, tuning, dt)
     else:
-        load = predict_slack(load, vehicle, history, dt)
-    load = watch(load, vehicle, history, imu, thrust, tuning, dt)
+        at_end = predict_slack(load, vehicle, history, dt)
+    load = watch(at_end, vehicle, history, imu, thrust, tuning, dt)
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,

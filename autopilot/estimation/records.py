@@ -14,8 +14,8 @@ from autopilot.geometry.so3 import IDENTITY_QUAT, Quat
 Array = NDArray[np.float64]
 
 # The error state, all but the biases in world axes: position, velocity and attitude of the vehicle
-# (R = exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own two
-# axes: direction, rate, and its length. Flights with trackers alone need no more.
+# (R = exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own
+# two axes: direction, rate, and its length. Flights with trackers alone need no more.
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
 DIRECTION, RATE, LENGTH = 15, 17, 19
 TRACKED_SIZE = 20
@@ -110,7 +110,7 @@ class DirectionReading(NamedTuple):
 
 
 class EstimatorTuning(NamedTuple):
-    """What the estimator believes. Deviations of IMU and models are those of one sample, walks of a second."""
+    """What the estimator believes. Deviations of IMU and models are of one sample, walks of a second."""
 
     cable_length: float
     quad_mass: float
@@ -160,7 +160,7 @@ class VehicleEstimate(NamedTuple):
 
 
 class LoadEstimate(NamedTuple):
-    """Load and cable. While slack, `covariance` is that of load (position, velocity), the same on each axis."""
+    """Load and cable. While slack, `covariance` is that of load (position, velocity), alike on each axis."""
 
     x_load: Vec3
     v_load: Vec3

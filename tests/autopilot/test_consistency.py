@@ -1,9 +1,9 @@
 """What the estimator says of its own error, against the truth of flights with the simulator's sensors.
 
 NEES is error^T P^-1 error of a part of the error state, NIS the same of the innovations; each is, on average,
-its number of degrees of freedom if the filter knows itself. Averages are over seeds and over instants one second
-apart; a slow error (of the receiver, of the levelling) makes the instants of one flight alike, so the seeds are
-what counts.
+its number of degrees of freedom if the filter knows itself. Averages are over seeds and over instants one
+second apart; a slow error (of the receiver, of the levelling) makes the instants of one flight alike, so the
+seeds are what counts.
 """
 
 from __future__ import annotations
@@ -90,8 +90,31 @@ def flown(sensors: str) -> tuple[dict[str, Array], Array]:
     return {name: np.array(values) for name, values in nees.items()}, consistency
 
 
-if __name__ == "__main__":
-    for sensors in ("lab", "rtk", "gps"):
-        nees, consistency = flown(sensors)
-        print(sensors, {n: round(float(v.mean() / PARTS[n][1]), 2) for n, v in nees.items()})
-        print({s: round(float(consistency[s, 1] / max(consistency[s, 0], 1) / k), 3) for s, k in SCALARS.items()})
+# The mean is over 10 seeds and 8 instants. Instants of one flight are alike: the chi-square bounds are those of
+# the seeds with three instants that count. Direction and rate are believed worse than they are: the pendulum's
+# noise stands for drag on a fast load. Measured per degree of freedom, position to rate, lab 1.00, 1.00, 1.08,
+# 0.86, 0.63, rtk 0.91, 0.94, 1.04, 0.90, 0.62.
+COUNTING = 3 * len(SEEDS)
+MODEL_MARGIN = 0.5  # share of the stated variance that the believed error of the pendulum may be too much
+
+
+@pytest.mark.parametrize("sensors", ["lab", "rtk"])
+def test_the_error_is_what_the_filter_says(sensors: str) -> None:
+    for name, values in flown(sensors)[0].items():
+        axes = PARTS[name][1]
+        low, high = chi2.ppf([0.001, 0.999], COUNTING * axes) / COUNTING
+        if name in ("direction", "rate"):
+            low *= MODEL_MARGIN
+        assert low < values.mean() < high, (name, values.mean() / axes)
+
+
+@pytest.mark.parametrize(
+    ("sensors", "readings"), [("lab", (POSE, LOAD)), ("rtk", (FIX, PRESSURE, MAGNETIC, SIGHT))]
+)
+def test_innovations_are_as_large_as_the_filter_says(sensors: str, readings: tuple[int, ...]) -> None:
+    """Measured: 1.00, 0.99; 1.03, 1.00, 0.87, 0.99."""
+    consistency = flown(sensors)[1]
+    for sensor in readings:
+        count, total = consistency[sensor]
+        assert count > 30 * len(SEEDS)
+        assert 0.8 < total / count / SCALARS[sensor] < 1.2, (sensor, total / count / SCALARS[sensor])
