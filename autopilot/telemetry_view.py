@@ -65,6 +65,7 @@ class Options:
     home: Home
     boot_unix_us: int
     lockstep: bool = True
+    clock_waits: bool = True  # for the autopilot, however long it works
 
 
 def sub_mode(flight: Flight) -> int:
