@@ -158,9 +158,7 @@ def test_after_a_long_jump_the_estimate_starts_anew_where_the_trackers_say(laten
 
     trace = track(motion, 6.0, Noise(latency_s=latency_s), seed=5, tampered=moved)
     last = trace.states[-1]
-    assert last.resets == 3.0, (
-        "two at the start, one at the jump: the load hangs from the vehicle"
-    )
+    assert last.resets == 3.0, "two at the start, one at the jump: the load hangs from the vehicle"
     assert last.vehicle.x_quad[0] == pytest.approx(1.0, abs=0.005)
     assert last.load.x_load[0] == pytest.approx(1.0, abs=0.005)
 
