@@ -46,6 +46,7 @@ from missions.planning import Prepared
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
+_BEAT_S = 1.0  # between two heartbeats while the clock stands
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _GROUND_RESEND_S = 0.5
 _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
@@ -100,7 +101,14 @@ class GroundStations:
 
     def send(self, onboard: Onboard) -> None:
         """Send what is due."""
-        for link, datagram in onboard.ground_datagrams():
+        self._send(onboard.ground_datagrams())
+
+    def beat(self, onboard: Onboard) -> None:
+        """A heartbeat while the clock stands and nothing is due."""
+        self._send([(link, onboard.stranded_heartbeat(link)) for link in self._links])
+
+    def _send(self, datagrams: list[tuple[Link, bytes]]) -> None:
+        for link, datagram in datagrams:
             i, address = link  # type: ignore[misc]
             with suppress(OSError):  # nobody listens there yet, or the network is full: lost
                 self._sockets[i].sendto(datagram, address)  # type: ignore[has-type]
@@ -231,7 +239,7 @@ class Program:
         """Tick for ever."""
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
-        silent = True
+        silent, lost, beaten = True, False, 0.0
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         while True:
@@ -243,11 +251,18 @@ class Program:
                 if not silent and now - heard > _SILENCE_S:
                     silent = True
                     self._say(f"no word from the simulator for {_SILENCE_S:g} s; looking for it")
+                    self.onboard.endpoint.say(
+                        mavlink.MAV_SEVERITY_CRITICAL, "Simulator silent: time stands still"
+                    )
+                    lost = True
                 if silent or now - heard > 1.0:
                     self._greet()
                 # the clock stands, but questions are answered
                 if isinstance(self._ground, GroundStations):
                     self._ground.exchange(self.onboard, self._keep, stop)
+                    if lost and now - beaten >= _BEAT_S:
+                        beaten = now
+                        self._ground.beat(self.onboard)
                 continue
             datagram, sender = arrived
             if sender != self._simulator:
@@ -260,6 +275,9 @@ class Program:
                 if silent:
                     silent = False
                     self._say(f"flying with the simulator at {shown(self._simulator)}")
+                    if lost:
+                        lost = False
+                        self.onboard.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again")
                 heard = time.monotonic()
             elif self.onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
@@ -382,6 +400,7 @@ def main(
     try:
         table = autopilot_parameters(load_belief(vehicle))
         kept = Storage(storage or user_state_path("plumbline"))
+        kept.lock()
         for trouble in kept.load_parameters(table):
             print(f"autopilot: {trouble}", file=sys.stderr)
         apply_settings(table, settings)

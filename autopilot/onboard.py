@@ -26,6 +26,7 @@ from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
 from autopilot.sensor_link import Tick, read_tick
 from autopilot.services.endpoint import VehicleEndpoint
+from autopilot.services.heartbeat import heartbeat_message
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
@@ -36,6 +37,7 @@ from autopilot.services.records import (
     TimesyncAnswered,
     Verdict,
 )
+from autopilot.services.requests import Reboot
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
@@ -43,11 +45,14 @@ from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
-from autopilot.world_parameters import WorldParameters
+from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
 from missions.model import Step
 from missions.planning import PENDING, Limits, Prepared, prepare
 
 GROUND_WINDOW_US = 20_000
+_REBOOT = mavlink.MAVLink_command_long_message(
+    1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+)
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
 
 
@@ -111,6 +116,7 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
+        self._reboot = False  # the simulator is asked to begin anew
         self._setup = build_setup(parameters, 1)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self._setup.settings.limits
@@ -137,6 +143,8 @@ class Onboard:
             tick.now_us, self._state.mixed.forces, self.armed, self._options.lockstep
         )
         aside = self._world.messages(self.now_us)
+        if self._reboot:
+            aside.append(_REBOOT)
         self._answer = b"".join(map(self._writer.frame, (command, *aside)))
         return self._answer
 
@@ -242,11 +250,24 @@ class Onboard:
         self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
         return self.endpoint.datagram(link, mavlink.MAVLink_timesync_message(0, self.now_us * 1000))
 
+    def stranded_heartbeat(self, link: Link) -> bytes:
+        """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
+        snapshot = self._snapshot()._replace(system_status=mavlink.MAV_STATE_CRITICAL)
+        if snapshot.armed:
+            snapshot = snapshot._replace(system_status=mavlink.MAV_STATE_EMERGENCY)
+        return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
+
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self._setup)
 
     def _decide(self, request: object) -> Verdict:
+        if isinstance(request, Reboot) and not request.shutdown:
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "Reboot denied: armed")
+            # the world begins anew, and when its clock does, so does the shell with us
+            self._reboot = True
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         state = self._state

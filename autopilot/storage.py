@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
 from autopilot.wire.convert import Home
 from autopilot.wire.parameters import ParameterError, ParameterTable, parse_text
 
 MISSION_FILE = "mission.bin"
 PARAMETER_FILE = "parameters.txt"
+LOCK_FILE = "lock"
 
 
 class StorageError(OSError):
@@ -23,12 +26,25 @@ class Storage:
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._parameters: dict[str, float] = {}
+        self._lock = FileLock(directory / LOCK_FILE)
         try:
             directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise StorageError(
                 f"--storage {directory}: {error.strerror}; name a directory that can be made"
             ) from None
+
+    def lock(self) -> None:
+        """Keep other autopilots out until this object or the process is gone."""
+        try:
+            self._lock.acquire(blocking=False)
+        except Timeout:
+            raise StorageError(
+                f"--storage {self._directory}: another autopilot keeps its mission and parameters there; "
+                "name another directory"
+            ) from None
+        except OSError as error:
+            raise StorageError(f"--storage {self._directory}: {error.strerror}") from None
 
     def load_mission(self, home: Home) -> tuple[StoredMission | None, str]:
         """The stored mission, and what is wrong with the file if it is none (empty: nothing)."""

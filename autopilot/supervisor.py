@@ -258,8 +258,14 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
     )
 
 
-def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings) -> Leg:
-    return carry_leg(begin, end, speed, settings.accel_m_s2, settings.least_move_s)
+def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, least_s: float = 0.0) -> Leg:
+    return carry_leg(begin, end, speed, settings.accel_m_s2, max(least_s, settings.least_move_s))
+
+
+def _least_s(flight: Flight) -> float:
+    """What the transfer of the present step takes at least, for rotors, cable and tilt."""
+    least = flight.plan.prepared.least_s
+    return least[flight.step] if flight.step < len(least) else 0.0
 
 
 def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -285,12 +291,12 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
                 fade = min(settings.least_move_s, float(path.table[-1, 1]))
                 go = Pass(path, sub(here, path.start), fade)
             else:
-                go = _carry(here, there, flight.speed_m_s, settings)
+                go = _carry(here, there, flight.speed_m_s, settings, _least_s(flight))
             return (go, Hold(there, max(hold - _borrowed(flight), 0.0))) if hold > 0.0 else (go,)
         case Delay(duration_s=duration):
             return (Hold(here, max(duration - _borrowed(flight), 0.0)),)
         case ReturnHome():
-            return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings),)
+            return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings, _least_s(flight)),)
         case Signals():
             return (Run(here, _path_of(flight, flight.step) or unshaped(step)),)
         case AttitudeRun(
@@ -374,8 +380,9 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             flight = replace(flight, taut_length_m=norm(sub(view.x_quad, view.x_load)))
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
         flight = _over_load(flight, view)
-    if flight.phase == P.TAUTEN and len(flight.legs) == 1:
-        if flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(flight, settings):
+        if len(flight.legs) == 1 and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
+            flight, settings
+        ):
             text = "Cable never taut, landing; check VEH_CABLE_LEN"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
     if flight.phase in (P.LOWER, P.SET_DOWN):

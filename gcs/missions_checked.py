@@ -34,8 +34,6 @@ def load_checked(name_or_path: str, vehicle: str, force: bool, shaped: bool = Tr
         return mission
     found = violations(mission, vehicle, shaped)
     if found:
-        more = f" (and {len(found) - 1} more, see gcs check)" if len(found) > 1 else ""
-        raise GcsError(
-            f"{mission.name} cannot be flown by vehicle {vehicle}: {found[0]}{more}; --force tries"
-        )
+        listed = "; ".join(map(str, found))
+        raise GcsError(f"{mission.name} cannot be flown by vehicle {vehicle}: {listed}; --force tries")
     return mission

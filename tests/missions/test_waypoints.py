@@ -16,7 +16,8 @@ from missions.demand import Bounds, commanded, demand
 from missions.model import Land, Speed, Step, Takeoff, Waypoint
 from missions.planning import REFUSE, Limits, prepare
 from missions.splines import Array
-from missions.survey import Body
+from missions.survey import Body, survey_transfer
+from missions.transfer import transfer_duration
 from missions.waypoints import TURN_S, MinimumSnap, Passage, evaluate_path, passage, passage_jets
 
 BODY = Body(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.02, 0.012)
@@ -146,6 +147,24 @@ def test_waypoints_in_a_row_are_one_passage() -> None:
     assert made_of(a, replace(b, hold_s=1.0), c) == [True, True, False]
     assert made_of(a, Speed(1.0), b) == [False, False, False]
     assert made_of(a, a, b, c) == [False, False, True, True], "a point twice is a stop there"
+
+
+def test_a_single_transfer_takes_longer_where_a_bound_binds() -> None:
+    steps = (
+        Takeoff(5.0),
+        Speed(15.0),
+        Waypoint(400.0, 0.0, 5.0, hold_s=1.0),
+        Waypoint(395.0, 0.0, 5.0),
+        Land(),
+    )
+    gentle = prepare(steps, range(5), LIMITS._replace(accel_m_s2=1.0))
+    assert gentle.least_s == (0.0,) * 5
+    weak = LIMITS._replace(bounds=BOUNDS._replace(rotor_high=1.35))
+    least = prepare(steps, range(5), weak).least_s
+    assert least[2] > 1.05 * transfer_duration(400.0, 15.0, 1.5)
+    along = survey_transfer((0.0, 0.0, 5.0), (400.0, 0.0, 5.0), least[2], BODY)
+    assert along.rotor_high.value <= 1.35
+    assert least[4] == 0.0
 
 
 def test_the_stretches_of_a_passage_join() -> None:
