@@ -90,13 +90,13 @@ NO_FIGURES = Figures(
 @kernel
 def control_state(state: EstimatorState) -> State:
     """As `autopilot.estimation.filter.control_state`."""
-    vehicle, load = state.vehicle, state.load
+    vehicle, load, debt = state.vehicle, state.load, state.aids.debt
     return State(
-        load.x_load,
+        sub(load.x_load, debt),
         load.v_load,
         load.q_cable,
         load.q_cable_dot,
-        vehicle.x_quad,
+        sub(vehicle.x_quad, debt),
         vehicle.v_quad,
         rotation_from_quat(vehicle.quat_wxyz),
         vehicle.omega_body,
