@@ -345,7 +345,7 @@ def main(
         options = Options(place, boot)
 
         def build(stored: StoredMission | None) -> Onboard:
-            return Onboard(table, Identity(), options, stored)
+            return Onboard(table, Identity(), options, stored, kept.card)
 
         stations = [address for address in (*gcs, api) if address is not None]
         ground = GroundInStep(ground_lockstep) if ground_lockstep else GroundStations(tuple(stations))

@@ -19,6 +19,7 @@ from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
 from autopilot.sensor_link import Tick, read_tick
 from autopilot.services.endpoint import VehicleEndpoint
+from autopilot.services.files import Card
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
@@ -46,10 +47,15 @@ class Onboard:
     """One autopilot. `receive_sensors` moves its clock; nothing else does."""
 
     def __init__(
-        self, parameters: ParameterTable, identity: Identity, options: Options, mission: StoredMission | None
+        self,
+        parameters: ParameterTable,
+        identity: Identity,
+        options: Options,
+        mission: StoredMission | None,
+        card: Card | None = None,
     ) -> None:
         self.parameters = parameters
-        self.endpoint = VehicleEndpoint(identity, options.home, parameters, mission)
+        self.endpoint = VehicleEndpoint(identity, options.home, parameters, mission, card)
         self.now_us = 0
         self.tick = -1
         self.fault = ""  # why the vehicle cannot be flown at all

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from autopilot.card import DirectoryCard
 from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
 from autopilot.wire.convert import Home
 from autopilot.wire.parameters import ParameterError, ParameterTable, parse_text
 
 MISSION_FILE = "mission.bin"
 PARAMETER_FILE = "parameters.txt"
+CARD_DIRECTORY = "card"  # what clients reach by FILE_TRANSFER_PROTOCOL
 
 
 class StorageError(OSError):
@@ -25,6 +27,7 @@ class Storage:
         self._parameters: dict[str, float] = {}
         try:
             directory.mkdir(parents=True, exist_ok=True)
+            self.card = DirectoryCard(directory / CARD_DIRECTORY)
         except OSError as error:
             raise StorageError(
                 f"--storage {directory}: {error.strerror}; name a directory that can be made"

@@ -13,16 +13,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from autopilot.services.answers import (
-    answer_ftp,
-    answer_log_data,
-    answer_log_list,
-    answer_ping,
-    answer_timesync,
-)
+from autopilot.services.answers import answer_ping, answer_timesync
 from autopilot.services.commands import CommandService
+from autopilot.services.file_tree import FileTree
+from autopilot.services.files import Card, MemoryCard
+from autopilot.services.ftp import FtpService
 from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT, Identity
 from autopilot.services.links import LinkState, Outgoing
+from autopilot.services.logs import LogService
+from autopilot.services.made_files import information_message, made_files, metadata_message
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.missions import MissionService
 from autopilot.services.parameters import ParameterService
@@ -63,6 +62,11 @@ _ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
+_METADATA = {
+    mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: metadata_message,
+    mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: information_message,
+}
+
 SnapshotFactory = Callable[[], Snapshot]
 
 
@@ -70,12 +74,22 @@ class VehicleEndpoint:
     """All services of one vehicle joined over all its links."""
 
     def __init__(
-        self, identity: Identity, home: Home, parameters: ParameterTable, mission: StoredMission | None = None
+        self,
+        identity: Identity,
+        home: Home,
+        parameters: ParameterTable,
+        mission: StoredMission | None = None,
+        card: Card | None = None,
     ) -> None:
         self.identity = identity
         self._missions = MissionService(home, mission or StoredMission())
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
+        made = made_files(identity, parameters, lambda: self._missions.mission)
+        self.files = FileTree(MemoryCard() if card is None else card, made)
+        self._ftp = FtpService(self.files)
+        self._logs = LogService(self.files)
+        self._timed = (self._missions, self._parameters, self._ftp, self._logs)
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._table: dict[int, Stream] = dict(STREAMS)
@@ -143,8 +157,7 @@ class VehicleEndpoint:
         return (
             self._work
             or any(state.streams.next_us <= now_us for state in self._links.values())
-            or self._missions.next_timer() <= now_us
-            or self._parameters.next_timer() <= now_us
+            or any(service.next_timer() <= now_us for service in self._timed)
         )
 
     def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:
@@ -152,8 +165,8 @@ class VehicleEndpoint:
         if not self.due(now_us):
             return []
         self._forget_silent(now_us)
-        self._do(self._missions.poll(now_us), [])
-        self._do(self._parameters.poll(now_us), [])
+        for service in self._timed:
+            self._do(service.poll(now_us), [])
         self._work = False
         taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
         if any(taken.values()) or any(state.announced for state in self._links.values()):
@@ -240,7 +253,8 @@ class VehicleEndpoint:
 
     def _forget(self, link: Link) -> None:
         del self._links[link]
-        self._parameters.forget(link)
+        for service in (self._parameters, self._ftp, self._logs):
+            service.forget(link)
 
     # ---- receiving
 
@@ -266,9 +280,11 @@ class VehicleEndpoint:
                 case StoreParameters():
                     return _ACCEPTED
                 case RequestCapabilities():
-                    return self._request_message(state, peer, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0)
+                    return self._request_message(
+                        state, peer, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0, now_us
+                    )
                 case RequestMessage(message_id, argument):
-                    return self._request_message(state, peer, message_id, argument)
+                    return self._request_message(state, peer, message_id, argument, now_us)
                 case GetMessageInterval(message_id):
                     return self._request_interval(state, message_id)
                 case SetMessageInterval(message_id, interval_us):
@@ -280,9 +296,15 @@ class VehicleEndpoint:
 
         return decided
 
-    def _request_message(self, state: LinkState, peer: Peer, message_id: int, argument: float) -> Verdict:
+    def _request_message(
+        self, state: LinkState, peer: Peer, message_id: int, argument: float, now_us: int
+    ) -> Verdict:
         if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._request_interval(state, int(argument) if 0.0 <= argument <= _UINT16 else -1)
+        where = _METADATA.get(message_id)
+        if where is not None:
+            state.queue.append(where(self.identity, self._parameters.table, now_us))
+            return _ACCEPTED
         if message_id not in STREAMS:
             return _UNSUPPORTED
         self._do([Announce(peer.link, (message_id,))], [])
@@ -330,7 +352,9 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST: missions.receive_partial,
             m.MAVLINK_MSG_ID_TIMESYNC: answer_timesync,
             m.MAVLINK_MSG_ID_PING: answer_ping,
-            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: answer_ftp,
-            m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: answer_log_list,
-            m.MAVLINK_MSG_ID_LOG_REQUEST_DATA: answer_log_data,
+            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._ftp.receive,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: self._logs.receive_list,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_DATA: self._logs.receive_data,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_END: self._logs.receive_end,
+            m.MAVLINK_MSG_ID_LOG_ERASE: self._logs.receive_erase,
         }
