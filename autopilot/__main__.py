@@ -48,6 +48,7 @@ _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a f
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
+_LOG_BYTES = 8192  # of the flight log that are stored at once
 
 
 class AutopilotError(Exception):
@@ -216,6 +217,7 @@ class Program:
                 heard = time.monotonic()
             elif self.onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
+                self._end_log()
                 self.onboard = self._build(self.onboard.endpoint.mission)
                 self._ground.join(self.onboard)
 
@@ -228,6 +230,7 @@ class Program:
         else:
             self._socket.sendto(answer, self._simulator)
             self._ground.exchange(self.onboard, self._keep, stop)
+        self._keep_log(_LOG_BYTES)
         if new and self.onboard.fault and self.onboard.tick == 1:
             raise AutopilotError(self.onboard.fault)
 
@@ -247,8 +250,23 @@ class Program:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
 
+    def _keep_log(self, least_bytes: int) -> None:
+        chunk = self.onboard.take_log(least_bytes)
+        if chunk is None:
+            return
+        try:
+            self._storage.keep_log(chunk, self.onboard.parameters["LOG_MAX_MB"])
+        except OSError as error:
+            self.onboard.give_up_log(error.strerror or str(error))
+            self._say(f"cannot store the flight log: {error}")
+
+    def _end_log(self) -> None:
+        self.onboard.end_log()
+        self._keep_log(1)
+
     def close(self) -> None:
-        """Close all sockets."""
+        """Store what is left of the flight log, close all sockets."""
+        self._end_log()
         self._socket.close()
         self._ground.close()
 
@@ -342,7 +360,7 @@ def main(
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
-        options = Options(place, boot)
+        options = Options(place, boot, log=True)
 
         def build(stored: StoredMission | None) -> Onboard:
             return Onboard(table, Identity(), options, stored, kept.card)

@@ -99,10 +99,27 @@ class DirectoryCard:
 
     def append(self, path: files.Path, data: bytes) -> None:
         """Write behind the end of a file, which is made if there is none; OSError as the system says."""
-        place = self._at(path)
+        try:
+            place = self._at(path)
+        except FileError:
+            raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
         place.parent.mkdir(parents=True, exist_ok=True)
         with place.open("ab") as file:
             file.write(data)
+
+    def make_room(self, folder: files.Path, ending: str, most_bytes: int) -> None:
+        """Take away the first files of a folder, by name, until the rest is no more than that."""
+        try:
+            place = self._at(folder)
+        except FileError:
+            return
+        found = sorted(file for file in place.glob("*" + ending) if file.is_file()) if place.is_dir() else []
+        size = sum(file.stat().st_size for file in found)
+        for file in found:
+            if size <= most_bytes:
+                return
+            size -= file.stat().st_size
+            file.unlink()
 
     def _file(self, path: files.Path) -> Path:
         place = self._at(path)

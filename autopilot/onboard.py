@@ -13,13 +13,14 @@ from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
 from autopilot.flight import Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
+from autopilot.flight_log import FlightLog, LogChunk, Sample
 from autopilot.laws import believed_vehicle, build_law
 from autopilot.loss import Loss
 from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
 from autopilot.sensor_link import Tick, read_tick
 from autopilot.services.endpoint import VehicleEndpoint
-from autopilot.services.files import Card
+from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
@@ -74,6 +75,11 @@ class Onboard:
         self._world = WorldParameters(parameters)
         self._setup = self._build_setup(1)
         self._take_plan(self.endpoint.mission)
+        self._log: FlightLog | None = None
+        if options.log:
+            release = ".".join(map(str, identity.version))
+            self._log = FlightLog(parameters, release, options.boot_unix_us)
+            self.endpoint.on_text = self._log_text
 
     # ---- simulator link
 
@@ -129,6 +135,10 @@ class Onboard:
             self.endpoint.say(severity, text)
         for seq in report.reached:
             self.endpoint.item_reached(seq)
+        if self._log is not None:
+            rate_hz = self.parameters["LOG_RATE_HZ"]
+            self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self._log_sample)
+            self.endpoint.files.protected = self._log.path
 
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -137,6 +147,37 @@ class Onboard:
         name = self._world.receive(message)
         if name is not None:
             self.endpoint.parameter_changed(name)
+
+    # ---- flight log
+
+    def take_log(self, least_bytes: int = 1) -> LogChunk | None:
+        """What is to be stored of the flight log, once it is so much or the log has ended."""
+        return None if self._log is None else self._log.take(least_bytes)
+
+    def end_log(self) -> None:
+        """The program ends: the last of the log can be taken."""
+        if self._log is not None:
+            self._log.end()
+
+    def give_up_log(self, why: str) -> None:
+        """The shell could not store the log."""
+        if self._log is not None:
+            self._log.give_up()
+        self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Flight log lost: {why}")
+
+    def _log_names(self) -> set[str]:
+        try:
+            return {entry.name for entry in self.endpoint.files.card.entries(LOG_FOLDER)}
+        except FileError:
+            return set()
+
+    def _log_sample(self) -> Sample:
+        imu = self._last.readings.imu if self._last else None
+        return Sample(self._snapshot(), imu, self._state.estimator)
+
+    def _log_text(self, severity: int, text: str) -> None:
+        if self._log is not None:
+            self._log.say(self.now_us, severity, text)
 
     # ---- parameters
 

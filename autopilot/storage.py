@@ -6,6 +6,9 @@ import os
 from pathlib import Path
 
 from autopilot.card import DirectoryCard
+from autopilot.flight_log import LogChunk
+from autopilot.services import files
+from autopilot.services.files import LOG_ENDING, LOG_FOLDER
 from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
 from autopilot.wire.convert import Home
 from autopilot.wire.parameters import ParameterError, ParameterTable, parse_text
@@ -25,6 +28,7 @@ class Storage:
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._parameters: dict[str, float] = {}
+        self._logs: set[files.Path] = set()  # begun by this process
         try:
             directory.mkdir(parents=True, exist_ok=True)
             self.card = DirectoryCard(directory / CARD_DIRECTORY)
@@ -82,6 +86,13 @@ class Storage:
         self._parameters[name] = value
         lines = [f"{name} {value!r}\n" for name, value in sorted(self._parameters.items())]
         self._write(self._directory / PARAMETER_FILE, "".join(lines).encode())
+
+    def keep_log(self, chunk: LogChunk, most_mb: float) -> None:
+        """Store a part of a flight log; a new log takes the place of the oldest where they are too many."""
+        if chunk.path not in self._logs:
+            self._logs.add(chunk.path)
+            self.card.make_room(LOG_FOLDER, LOG_ENDING, round(most_mb * 1e6))
+        self.card.append(chunk.path, chunk.data)
 
     def _write(self, path: Path, data: bytes) -> None:
         new = path.with_suffix(".new")

@@ -64,6 +64,7 @@ class Options:
     home: Home
     boot_unix_us: int
     lockstep: bool = True
+    log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` gives
 
 
 def sub_mode(flight: Flight) -> int:

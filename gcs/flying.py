@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -39,6 +42,7 @@ from missions.model import Mission
 
 LAWS = {"thesis": 0, "lqr": 1, "plumbline": 2}  # the value of CTL_LAW
 TRUTH_PORT = 14560
+ONBOARD_LOG = "flight.ulg"
 WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 _EXIT = {
     "completed": EXIT_DONE,
@@ -120,7 +124,12 @@ def _fly_own(
     client = _client(mission, options, Home())
     display = FlightDisplay(mission.name, options.quiet)
     vehicle, truth = UdpSocket(), UdpSocket()
-    with tempfile.TemporaryDirectory(prefix="plumbline-") as storage, Processes() as processes, display:
+    with (
+        tempfile.TemporaryDirectory(prefix="plumbline-") as storage,
+        _log_kept(Path(storage), out),
+        Processes() as processes,
+        display,
+    ):
         ended = processes.ended
 
         def begun() -> None:
@@ -141,6 +150,16 @@ def _fly_own(
             vehicle.close()
             truth.close()
     return client
+
+
+@contextmanager
+def _log_kept(storage: Path, out: Path) -> Iterator[None]:
+    """Afterwards the autopilot's own log of the flight is in `out`, if it has made one."""
+    try:
+        yield
+    finally:
+        for log in sorted((storage / "card" / "log").glob("*.ulg"))[-1:]:
+            shutil.copyfile(log, out / ONBOARD_LOG)
 
 
 def _start(
@@ -276,7 +295,7 @@ class _Stopwatch:
 class _Folder:
     """The output directory; if the flight came to nothing, what we put there is taken away again."""
 
-    _OURS = ("flight.tlog", "sitl.log", "autopilot.log")
+    _OURS = ("flight.tlog", ONBOARD_LOG, "sitl.log", "autopilot.log")
 
     def __init__(self, path: Path) -> None:
         self._path = path

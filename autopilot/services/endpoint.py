@@ -98,6 +98,7 @@ class VehicleEndpoint:
         self._defaults = {key: stream.interval_us for key, stream in self._table.items()}
         self._watched: dict[int, Any] = {}
         self._work = False  # something waits in a queue
+        self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
         self._handlers = self._handler_table()
 
     @property
@@ -220,6 +221,8 @@ class VehicleEndpoint:
                     for state in self._states(link):
                         state.queue.append(message)
                 case Say(severity, text):
+                    if self.on_text is not None:
+                        self.on_text(severity, text)
                     for message in self._texts.messages(severity, text):
                         for state in self._links.values():
                             state.queue.append(message)

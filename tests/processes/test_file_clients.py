@@ -1,0 +1,137 @@
+"""Files and logs of a running vehicle through the programs that people use."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from gcs.link import LOOPBACK, free_port
+
+if TYPE_CHECKING:
+    from conftest import Program
+
+pytestmark = pytest.mark.processes
+Start = Callable[..., "Program"]
+CLIENTS = Path(__file__).with_name("clients")
+LOG = os.urandom(50_000)
+LONG_S = 120.0
+
+
+@pytest.fixture
+def port(start: Start, tmp_path: Path) -> str:
+    """Where a vehicle speaks that stands on the ground and has one log."""
+    sim, truth, ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
+    logs = tmp_path / "storage" / "card" / "log"
+    logs.mkdir(parents=True)
+    (logs / "2026-01-01_00-00-00.ulg").write_bytes(LOG)
+    start("sitl", "--listen", sim, "--truth", truth, "--sensors", "ideal")
+    storage = ("--storage", str(tmp_path / "storage"))
+    start("autopilot", "--sim", sim, "--gcs", ground, "--api", "none", *storage)
+    return ground.rpartition(":")[2]
+
+
+def told_by(client: str, port: str, directory: Path) -> Any:
+    directory.mkdir()
+    done = subprocess.run(
+        [sys.executable, str(CLIENTS / client), port, str(directory)],
+        capture_output=True,
+        text=True,
+        timeout=LONG_S,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_mavsdk(port: str, tmp_path: Path) -> None:
+    told = told_by("mavsdk_files.py", port, tmp_path / "client")
+    assert told["root"] == ["@MISSION", "@PARAM", "etc", "fs"]
+    assert told["up"] == "SUCCESS"
+    assert told["identical"] is True
+    assert told["down True"] == told["down False"] == ["SUCCESS", True]
+    assert told["moved"] == ["other.bin"]
+    assert told["left"] == ["log"]
+    table = autopilot_parameters(load_belief("bebop"))
+    assert told["metadata"].items() >= {name: table.describe(name).text for name in table.names}.items()
+    assert told["logs"] == [len(LOG)]
+    assert told["log"] == "SUCCESS"
+    assert (tmp_path / "client" / "log.ulg").read_bytes() == LOG
+
+
+def test_pymavlink(port: str, tmp_path: Path) -> None:
+    told = told_by("pymavlink_files.py", port, tmp_path / "client")
+    assert told["codes"] == [0, 0, 0, 0, 0, 0, 9, 10]  # protected, not found
+    assert told["equal"] is True
+    table = autopilot_parameters(load_belief("bebop"))
+    for name in table.names:
+        assert told["parameters"][name] == pytest.approx(table[name], rel=1e-7)  # a float32
+
+
+class Mavproxy:
+    """MAVProxy without a screen: lines in, text out."""
+
+    def __init__(self, port: str, directory: Path) -> None:
+        directory.mkdir()
+        self.process = subprocess.Popen(
+            [
+                str(Path(sys.executable).with_name("mavproxy.py")),
+                f"--master=udpin:{LOOPBACK}:{port}",
+                "--default-modules=log,param,ftp",
+                f"--state-basedir={directory}",
+            ],
+            cwd=directory,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        self.text = ""
+
+    def type(self, line: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{line}\n".encode())
+        self.process.stdin.flush()
+
+    def expect(self, text: str) -> None:
+        """Wait until it has said `text`; what was said until then is forgotten."""
+        assert self.process.stdout is not None
+        until = time.monotonic() + LONG_S
+        while text not in self.text:
+            left = until - time.monotonic()
+            ready = select.select([self.process.stdout], [], [], max(left, 0.0))[0]
+            data = os.read(self.process.stdout.fileno(), 65536) if ready else b""
+            assert data, f"MAVProxy did not say {text!r} but {self.text!r}"
+            self.text += data.decode(errors="replace")
+        self.text = self.text.partition(text)[2]
+
+
+@pytest.fixture
+def mavproxy(port: str, tmp_path: Path) -> Iterator[Mavproxy]:
+    program = Mavproxy(port, tmp_path / "mavproxy")
+    yield program
+    program.process.kill()
+    program.process.communicate()
+
+
+def test_mavproxy(mavproxy: Mavproxy, tmp_path: Path) -> None:
+    mavproxy.expect("parameters (ftp)")  # which it fetches by itself
+    mavproxy.type("log list")
+    mavproxy.expect(f"Log 0  numLogs 1 lastLog 0 size {len(LOG)}")
+    mavproxy.type("log download 0 log.ulg")
+    mavproxy.expect("Finished downloading log.ulg")
+    assert (tmp_path / "mavproxy" / "log.ulg").read_bytes() == LOG
+    mavproxy.type("ftp list /fs/microsd/log")
+    mavproxy.expect(f"2026-01-01_00-00-00.ulg\t{len(LOG)}")
+    mavproxy.type("log erase")
+    mavproxy.type("log list")
+    mavproxy.expect("No logs")
