@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from math import radians
+from math import cos, inf, radians
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import Vec3
-from autopilot.guidance import Leg, least_move_s
+from autopilot.guidance import Leg, asked_jet, least_move_s
+from autopilot.vehicle.parameters import LAWS, SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterTable
+from missions.demand import Bounds
 from missions.model import Step
+from missions.planning import UNPREPARED, Limits, Prepared
+from missions.survey import Body
 
 
 class Phase(IntEnum):
@@ -67,6 +71,7 @@ class Plan:
     steps: tuple[Step, ...] = ()
     sequence: tuple[int, ...] = ()
     items: int = 0
+    prepared: Prepared = UNPREPARED
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +91,7 @@ class Flight:
     speed_m_s: float = 0.0
     still_since_us: int = -1  # since when the touchdown conditions hold, -1: they do not
     step_anchor: Vec3 | None = None  # where the present mission step began
+    following: tuple[Leg, ...] = ()  # what will be flown after `legs`, where that is known
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +109,7 @@ class Settings:
     sensor_age_limit_s: float
     gravity_m_s2: float
     least_move_s: float
+    limits: Limits  # of the paths of missions
     ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
 
 
@@ -140,7 +147,48 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         sensor_age_limit_s=table["FS_SENSOR_S"],
         gravity_m_s2=table["VEH_GRAVITY"],
         least_move_s=least_move_s(table["VEH_CABLE_LEN"], table["VEH_GRAVITY"]),
+        limits=limits_from(table),
         ramp_lag_s=ramp_lag_s,
+    )
+
+
+def limits_from(table: ParameterTable) -> Limits:
+    """What paths are shaped to: the believed vehicle, and the MIS_ parameters."""
+    low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
+    margin = 0.01 * table["MIS_ROTOR_MARG"] * (high - low)
+    limited = table["VEH_ROTOR_LIM"] != 0.0
+    load_mass, gravity = table["VEH_LOAD_MASS"], table["VEH_GRAVITY"]
+    body = Body(
+        table["VEH_QUAD_MASS"],
+        load_mass,
+        table["VEH_CABLE_LEN"],
+        (table["VEH_J_XX"], table["VEH_J_YY"], table["VEH_J_ZZ"]),
+        gravity,
+        table["VEH_ARM_LEN"],
+        table["VEH_TORQUE"],
+        table["PLB_DRAG"],
+        table["PLB_DRAG_2"],
+    )
+    bounds = Bounds(
+        low + margin if limited else -inf,
+        high - margin if limited else inf,
+        0.01 * table["MIS_TENSION"] * load_mass * gravity,
+        cos(radians(table["MIS_TILT_DEG"])),
+        1e-3 * table["VEH_ROTOR_TAU"],
+    )
+    shaping = table["MIS_SHAPE"]
+    shaped = shaping == SHAPE_ALWAYS or (
+        shaping == SHAPE_WITH_PLUMBLINE and LAWS[int(table["CTL_LAW"])] == "plumbline"
+    )
+    return Limits(
+        body,
+        bounds,
+        shaped,
+        table["MIS_SHAPE_ERR"],
+        int(table["MIS_INFEASIBLE"]),
+        table["MIS_SPEED"],
+        table["MIS_ACCEL"],
+        table["MIS_TIME_OPT"] != 0.0,
     )
 
 
@@ -150,7 +198,24 @@ def leg_time_s(flight: Flight, now_us: int) -> float:
 
 
 def setpoint(flight: Flight, now_us: int) -> Jet | None:
-    """Position and derivatives asked for now, of load or vehicle as the leg says; None without a leg."""
-    if not flight.legs:
-        return None
-    return flight.legs[0].jet(leg_time_s(flight, now_us))
+    """Position and derivatives to be flown now, of load or vehicle as the leg says; None without a leg."""
+    return jet_ahead(flight, leg_time_s(flight, now_us)) if flight.legs else None
+
+
+def jet_ahead(flight: Flight, t: float) -> Jet:
+    """Position and derivatives `t` seconds into the present leg, or into what follows where that is known.
+
+    Only legs that control the same as the present one follow it for this.
+    """
+    leg = flight.legs[0]
+    for after in (*flight.legs[1:], *flight.following):
+        if t < leg.duration_s or after.control_mode != leg.control_mode:
+            break
+        t -= leg.duration_s
+        leg = after
+    return leg.jet(t)
+
+
+def asked_setpoint(flight: Flight, now_us: int) -> Jet | None:
+    """As `setpoint`, but of the path that the mission asks for, which what is flown may keep near to only."""
+    return asked_jet(flight.legs[0], leg_time_s(flight, now_us)) if flight.legs else None

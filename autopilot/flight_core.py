@@ -5,17 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from autopilot.actuation import Actuation, ActuationConstants, resting
+from autopilot.actuation import advance as actuate
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
+from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
-from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, leg_time_s
+from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, neg
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION, Calm, Leg, Swing
 from autopilot.laws import Law, Memory
 from autopilot.mixer import MixerResult, mix
+from autopilot.observer import Observed, ObserverConstants, nominal, observe
 from autopilot.scheduler import is_due
 from autopilot.supervisor import advance
 
@@ -33,6 +37,9 @@ class Setup:
     vehicle: Vehicle
     limited: float
     law: Law
+    actuation: ActuationConstants
+    observer: ObserverConstants
+    drag: Drag
     tuning: EstimatorTuning
     settings: Settings
     control_every: int  # ticks
@@ -49,11 +56,13 @@ class FlightState(NamedTuple):
     mixed: MixerResult
     slack_events: int
     was_taut: bool
+    actuation: Actuation
+    observed: Observed | None  # of load and wind; None before the first tick
 
 
 def initial_state() -> FlightState:
     """A disarmed vehicle that knows nothing."""
-    return FlightState(blank_state(), Flight(), None, 0, NO_COMMAND, STOPPED, 0, False)
+    return FlightState(blank_state(), Flight(), None, 0, NO_COMMAND, STOPPED, 0, False, resting(), None)
 
 
 def view_of(estimator: EstimatorState, state: State, settings: Settings, now_us: int) -> View:
@@ -74,48 +83,89 @@ def step(
     before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
 ) -> tuple[FlightState, Report]:
     """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
-    estimator = estimate(before.estimator, history, readings, setup.tuning, dt)
+    estimator = estimate(before.estimator, history, readings, setup.tuning, dt, before.actuation.thrust)
+    before = before._replace(estimator=estimator)
     if not is_due(tick, setup.control_every):
-        return before._replace(estimator=estimator), Report()
+        return before, Report()
+    return control(before, setup, now_us)
 
+
+def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState, Report]:
+    """The supervisor's, the law's and the mixer's part of a tick: `before` holds the estimate already."""
+    estimator = before.estimator
     state = control_state(estimator)
     view = view_of(estimator, state, setup.settings, now_us)
     flight, report = advance(before.flight, view, setup.settings)
 
     taut = view.taut
     slack_events = before.slack_events + (before.was_taut and not taut)
-    after = before._replace(estimator=estimator, flight=flight, slack_events=slack_events, was_taut=taut)
+    observed = before.observed if before.observed is not None else nominal(setup.vehicle)
+    observed = observe(
+        observed,
+        state,
+        1.0 if taut else 0.0,
+        before.actuation.thrust,
+        setup.observer,
+        setup.drag,
+        setup.vehicle,
+    )
+    after = before._replace(flight=flight, slack_events=slack_events, was_taut=taut, observed=observed)
     if flight.phase not in IN_AIR:
         idle = IDLE if flight.phase == Phase.ARMED else STOPPED
-        return after._replace(memory=None, control_mode=0, command=NO_COMMAND, mixed=idle), report
+        actuation = actuate(after.actuation, idle.thrust_done, idle.moment_done, setup.actuation)
+        return after._replace(
+            memory=None,
+            control_mode=0,
+            command=NO_COMMAND,
+            mixed=idle,
+            actuation=actuation,
+            observed=nominal(setup.vehicle)._replace(
+                support=observed.support, load_ground=observed.load_ground
+            ),
+        ), report
 
     leg = flight.legs[0]
-    t = leg_time_s(flight, now_us)
-    jet = leg.jet(t)
+    t = leg_time_s(flight, now_us) + setup.law.preview_s
+    jet = jet_ahead(flight, t)
     memory = after.memory
     if memory is None or leg.control_mode != after.control_mode:
         memory = setup.law.start(state, jet[0], jet[1])
-    memory, command = track(setup, memory, state, leg, jet, t)
+    memory, command = track(setup, memory, state, leg, jet, t, after.actuation, observed)
     mixed = mix(command.thrust, command.moment, setup.vehicle, setup.limited)
-    return after._replace(memory=memory, control_mode=leg.control_mode, command=command, mixed=mixed), report
+    return after._replace(
+        memory=memory,
+        control_mode=leg.control_mode,
+        command=command,
+        mixed=mixed,
+        actuation=actuate(after.actuation, mixed.thrust_done, mixed.moment_done, setup.actuation),
+    ), report
 
 
-def track(setup: Setup, memory: Memory, state: State, leg: Leg, jet: Jet, t: float) -> tuple[Memory, Command]:
+def track(
+    setup: Setup,
+    memory: Memory,
+    state: State,
+    leg: Leg,
+    jet: Jet,
+    t: float,
+    actuation: Actuation,
+    observed: Observed,
+) -> tuple[Memory, Command]:
     """The cascade in the mode that the leg asks for."""
     law, heading = setup.law, E1
     if leg.control_mode == LOAD_POSITION:
-        return law.load_position(memory, state, Reference(jet, heading))
+        return law.load_position(memory, state, Reference(jet, heading), actuation, observed)
     if leg.control_mode == QUAD_POSITION:
-        return law.quad_position(memory, state, Reference(jet, heading))
+        return law.quad_position(memory, state, Reference(jet, heading), actuation, observed)
     assert isinstance(leg, Swing | Calm)
     lift = held_height(setup, state, leg.anchor)
     upward = leg.upward(t)
     if leg.control_mode == LOAD_ATTITUDE:
-        return law.load_attitude(memory, state, neg(upward), heading, cable_pull(lift, state.q_cable))
+        pull = cable_pull(lift, state.q_cable)
+        return law.load_attitude(memory, state, neg(upward), heading, pull, actuation, observed)
     assert leg.control_mode == QUAD_ATTITUDE
-    return law.quad_attitude(
-        memory, state, attitude_towards(upward, heading, state.R), tilted_thrust(lift, state.R)
-    )
+    R_d, thrust = attitude_towards(upward, heading, state.R), tilted_thrust(lift, state.R)
+    return law.quad_attitude(memory, state, R_d, thrust, actuation, observed)
 
 
 def held_height(setup: Setup, state: State, anchor: Vec3) -> float:

@@ -5,15 +5,16 @@ A leg is data. The supervisor strings legs together; the flight core asks the pr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb, inf, pi, sqrt
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.signals import SignalTable, evaluate
+from missions.shaping import Shaped
 from missions.swing import swing
 from missions.transfer import PEAK_SPEED, transfer, transfer_duration
+from missions.waypoints import Passage, evaluate_path
 
 QUAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
 LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
@@ -30,6 +31,11 @@ _STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k
 
 def _rest(position: Vec3) -> Jet:
     return (position, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
+
+
+def _moved(anchor: Vec3, jet: Jet) -> Jet:
+    x, v, a, j, s, c, p = jet
+    return (add(anchor, x), v, a, j, s, c, p)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +109,77 @@ class Brake:
 
 
 @dataclass(frozen=True, slots=True)
+class Slow:
+    """A stop along the path of another leg: its time goes on ever more slowly and comes to rest.
+
+    x(t) = y(sigma(t)), sigma' = 1 - s(t / stop) with the s of `missions.transfer`: every derivative goes on
+    without a jump and is zero in the end, the path is that of the leg, and no part of it is flown faster.
+    `elapsed_s` of the stop are over when this leg begins.
+    """
+
+    leg: Leg
+    begin_s: float  # time in `leg` at which the stop begins
+    stop_s: float
+    elapsed_s: float = 0.0
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """What is left of the stop."""
+        return self.stop_s - self.elapsed_s
+
+    @property
+    def end(self) -> Vec3:
+        """Where the motion ends."""
+        return self.leg.jet(self._time(self.stop_s))[0]
+
+    def _time(self, t: float) -> float:
+        """sigma: 1 - s integrated term by term."""
+        u = t / self.stop_s
+        gone = u
+        for power, c in _STEP:
+            gone -= c * u ** (power + 1) / (power + 1)
+        return self.begin_s + gone * self.stop_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg; Faa di Bruno's formula."""
+        t = t + self.elapsed_s
+        if t >= self.stop_s:
+            return _rest(self.end)
+        t = max(t, 0.0)
+        a, b, c, d, e, f = (w[0] for w in transfer((1.0, 0.0, 0.0), ZERO, self.stop_s, t)[:6])
+        x, *y = self.leg.jet(self._time(t))
+        weights: tuple[tuple[float, ...], ...] = (
+            (a,),
+            (b, a * a),
+            (c, 3.0 * a * b, a**3),
+            (d, 3.0 * b * b + 4.0 * a * c, 6.0 * a * a * b, a**4),
+            (
+                e,
+                10.0 * b * c + 5.0 * a * d,
+                15.0 * a * b * b + 10.0 * a * a * c,
+                10.0 * a**3 * b,
+                a**5,
+            ),
+            (
+                f,
+                10.0 * c * c + 15.0 * b * d + 6.0 * a * e,
+                15.0 * b**3 + 60.0 * a * b * c + 15.0 * a * a * d,
+                45.0 * a * a * b * b + 20.0 * a**3 * c,
+                15.0 * a**4 * b,
+                a**6,
+            ),
+        )
+        later = []
+        for row in weights:
+            total = ZERO
+            for weight, derivative in zip(row, y, strict=False):
+                total = axpy(weight, derivative, total)
+            later.append(total)
+        return (x, later[0], later[1], later[2], later[3], later[4], later[5])
+
+
+@dataclass(frozen=True, slots=True)
 class Creep:
     """Along a straight line at constant speed, without end: until something is touched or pulled taut."""
 
@@ -118,17 +195,57 @@ class Creep:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """The signals of a mission, from where the load hung when they began."""
+    """The signals of a mission as they are flown, from where the load hung when they began."""
 
     anchor: Vec3
-    table: SignalTable
-    duration_s: float
+    path: Shaped
     control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From getting ready for the signals to coming to rest after them."""
+        return self.path.lead_s + self.path.duration_s + self.path.tail_s
 
     def jet(self, t: float) -> Jet:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
-        x, v, a, j, s, c, p = evaluate(self.table, t)
-        return (add(self.anchor, x), v, a, j, s, c, p)
+        return _moved(self.anchor, self.path.jet(t - self.path.lead_s))
+
+    def asked(self, t: float) -> Jet:
+        """The same of the path that was asked for."""
+        return _moved(self.anchor, self.path.asked(t - self.path.lead_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """A stretch of a path through waypoints, past the last of which it goes on.
+
+    `offset` is by how much the load hung beside the beginning of the path; it fades away in `fade_s`.
+    """
+
+    path: Passage
+    offset: Vec3
+    fade_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From one waypoint to the next."""
+        return self.path.end_s - self.path.begin_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        at = self.path.begin_s + t
+        x, v, a, j, s, c, p = evaluate_path(self.path.table, at)
+        y = transfer(self.offset, ZERO, self.fade_s, at)
+        return (
+            add(x, y[0]),
+            add(v, y[1]),
+            add(a, y[2]),
+            add(j, y[3]),
+            add(s, y[4]),
+            add(c, y[5]),
+            add(p, y[6]),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +296,12 @@ class Calm:
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
-Leg = Hold | Transfer | Brake | Creep | Run | Swing | Calm
+Leg = Hold | Transfer | Brake | Slow | Creep | Run | Pass | Swing | Calm
+
+
+def asked_jet(leg: Leg, t: float) -> Jet:
+    """What was asked for where the leg flies something near it; else what it flies."""
+    return leg.asked(t) if isinstance(leg, Run) else leg.jet(t)
 
 
 def least_move_s(cable_length: float, gravity: float) -> float:
@@ -196,6 +318,14 @@ def brake_leg(begin: Vec3, velocity: Vec3, acceleration: Vec3, accel_limit: floa
     """A stop that takes the velocity away with no more than about `accel_limit` (m/s^2)."""
     duration = max(least_s, PEAK_SPEED * norm(velocity) / accel_limit)
     return Brake(begin, velocity, acceleration, duration)
+
+
+def slow_leg(leg: Leg, t: float, accel_limit: float, least_s: float) -> Slow:
+    """A stop on the path of `leg`, `t` seconds into it, that slows down with no more than about `accel_limit`
+    (m/s^2). Of a stop that is under way: the rest of it."""
+    if isinstance(leg, Slow):
+        return replace(leg, elapsed_s=min(leg.elapsed_s + t, leg.stop_s))
+    return Slow(leg, t, max(least_s, PEAK_SPEED * norm(leg.jet(t)[1]) / accel_limit))
 
 
 def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mode: int) -> Transfer:

@@ -5,20 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
+from autopilot.actuation import Actuation, ActuationConstants, actuation_constants
 from autopilot.control import lqr, plumbline, quad_position, thesis
-from autopilot.control.command_filter import FilterConstants, filter_constants
+from autopilot.control.design import Design, Timing, Wanted, design
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
-from autopilot.geometry.linear import ZERO, Mat3, Vec3, axpy
-from autopilot.rotor_lag import LagConstants, Rotating, hasten, lag_constants
+from autopilot.geometry.linear import Mat3, Vec3, axpy
+from autopilot.observer import Observed, ObserverConstants, observer_constants
+from autopilot.plumbline_tick import PlumblineConstants, ahead_of, hastened, load_position_tick
+from autopilot.rotor_lag import lag_gain
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.parameters import ParameterTable
 
+GREATEST_PUSH = 0.3  # of the weight: more wind than that is not believed
 Memory = Any  # each law's own record; opaque to everyone else
 
 
 class Law(Protocol):
-    """A cascade in its flight modes (3-2) and the vehicle position law of the slack phases."""
+    """A cascade in its flight modes (3-2) and the vehicle position law of the slack phases.
+
+    `actuation` and `observed` are what is believed of rotors and disturbances at this tick.
+    """
+
+    @property
+    def preview_s(self) -> float:
+        """How much later than now the law wants to know its reference."""
 
     @property
     def ramp_lag_s(self) -> float:
@@ -27,18 +38,31 @@ class Law(Protocol):
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
         """Memory of a law that begins now, without a jump of its command."""
 
-    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
+    def quad_attitude(
+        self, memory: Memory, state: State, R_d: Mat3, thrust: float, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
         """The vehicle's attitude follows R_d under a given thrust (N)."""
 
     def load_attitude(
-        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+        self,
+        memory: Memory,
+        state: State,
+        q_d: Vec3,
+        b1_d: Vec3,
+        pull: float,
+        actuation: Actuation,
+        observed: Observed,
     ) -> tuple[Memory, Command]:
         """The cable's direction follows q_d under a given pull (N)."""
 
-    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+    def load_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
         """The load follows a reference."""
 
-    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+    def quad_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
         """The vehicle follows a reference, nothing hanging on it."""
 
 
@@ -54,6 +78,42 @@ def believed_vehicle(table: ParameterTable) -> Vehicle:
         torque_ratio=table["VEH_TORQUE"],
         rotor_min=table["VEH_ROTOR_MIN"],
         rotor_max=table["VEH_ROTOR_MAX"],
+    )
+
+
+def believed_drag(table: ParameterTable) -> Drag:
+    """Drag of the vehicle as the parameters describe it."""
+    return Drag(table["PLB_DRAG"], table["PLB_DRAG_2"])
+
+
+def believed_actuation(table: ParameterTable) -> ActuationConstants:
+    """Delay and lag of the rotors as the parameters describe them."""
+    period = 1.0 / table["CTL_RATE_HZ"]
+    return actuation_constants(1e-3 * table["VEH_ACT_DELAY"], 1e-3 * table["VEH_ROTOR_TAU"], period)
+
+
+def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
+    """The gains of `plumbline` for the vehicle that the parameters describe."""
+    lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
+    return design(
+        Wanted(
+            tolerance=1e-3 * table["PLB_DELAY_TOL"],
+            integral_ratio=table["PLB_RATIO_I"],
+            cable_ratio=table["PLB_RATIO_Q"],
+            attitude_ratio=table["PLB_RATIO_R"],
+            zeta=table["PLB_ZETA"],
+            noise=table["PLB_NOISE"],
+        ),
+        Timing(1e-3 * table["VEH_ACT_DELAY"], lag, min(lag, shown), 1.0 / table["CTL_RATE_HZ"]),
+        vehicle,
+    )
+
+
+def believed_observer(table: ParameterTable, vehicle: Vehicle) -> ObserverConstants:
+    """How fast disturbances are learned."""
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    return observer_constants(
+        table["PLB_T_MASS"], table["PLB_T_PUSH"], GREATEST_PUSH * weight, 1.0 / table["CTL_RATE_HZ"]
     )
 
 
@@ -96,24 +156,41 @@ class ThesisLaw(NamedTuple):
     def ramp_lag_s(self) -> float:
         return self.filters.reference.ramp_lag
 
+    @property
+    def preview_s(self) -> float:
+        return 0.0
+
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
         # on the steady motion of the reference filter, which lags behind what moves; else x_d'' would begin
         # with -2 zeta omega_n v_d
         lag = self.filters.reference.ramp_lag
         return thesis.start(state, axpy(-lag, v_d, x_d), v_d)
 
-    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
+    def quad_attitude(
+        self, memory: Memory, state: State, R_d: Mat3, thrust: float, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
         return thesis.quad_attitude(memory, state, R_d, thrust, self.gains, self.filters, self.vehicle)
 
     def load_attitude(
-        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+        self,
+        memory: Memory,
+        state: State,
+        q_d: Vec3,
+        b1_d: Vec3,
+        pull: float,
+        actuation: Actuation,
+        observed: Observed,
     ) -> tuple[Memory, Command]:
         return thesis.load_attitude(memory, state, q_d, b1_d, pull, self.gains, self.filters, self.vehicle)
 
-    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+    def load_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
         return thesis.load_position(memory, state, reference, self.gains, self.filters, self.vehicle)
 
-    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+    def quad_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
         return quad_position.quad_position(
             memory, state, reference, 0.0, self.position_gains, self.gains, self.filters, self.vehicle
         )
@@ -147,106 +224,135 @@ class LqrLaw(NamedTuple):
     def ramp_lag_s(self) -> float:
         return self.regulator.ramp_lag
 
+    @property
+    def preview_s(self) -> float:
+        return 0.0
+
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
         return self.other_modes.start(state, x_d, v_d)
 
-    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
-        return self.other_modes.quad_attitude(memory, state, R_d, thrust)
+    def quad_attitude(
+        self, memory: Memory, state: State, R_d: Mat3, thrust: float, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
+        return self.other_modes.quad_attitude(memory, state, R_d, thrust, actuation, observed)
 
     def load_attitude(
-        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+        self,
+        memory: Memory,
+        state: State,
+        q_d: Vec3,
+        b1_d: Vec3,
+        pull: float,
+        actuation: Actuation,
+        observed: Observed,
     ) -> tuple[Memory, Command]:
-        return self.other_modes.load_attitude(memory, state, q_d, b1_d, pull)
+        return self.other_modes.load_attitude(memory, state, q_d, b1_d, pull, actuation, observed)
 
-    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
+    def load_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
         return memory, lqr.load_position(state, reference, self.regulator)
 
-    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
-        return self.other_modes.quad_position(memory, state, reference)
+    def quad_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
+        return self.other_modes.quad_position(memory, state, reference, actuation, observed)
 
 
 class PlumblineMemory(NamedTuple):
-    """What the law remembers: of load position, of the other modes, and of the rotors."""
+    """What the law remembers: of load position, and of the other modes."""
 
     position: plumbline.PlumblineMemory
     other_modes: Memory
-    rotors: Rotating
 
 
 class PlumblineLaw(NamedTuple):
-    """Load position with exact derivatives and rotors hastened by their believed lag.
+    """Every mode at the state at which its command will find the vehicle, with rotors hastened by their lag.
 
-    The other modes, which are flown for moments only, are the loops of the thesis's cascade with its
-    parameters.
+    Load position is flown with exact derivatives. The other modes, which are flown for moments only, are the
+    loops of the thesis's cascade with its filters and the gains of the design.
     """
 
-    gains: plumbline.PlumblineGains
-    force_filter: FilterConstants
-    drag: Drag
-    lag: LagConstants
-    limited: float
-    vehicle: Vehicle
+    constants: PlumblineConstants
+    designed: Design
     other_modes: ThesisLaw
 
     @classmethod
     def build(cls, table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
-        """Gains, filter, drag and lag from the PLB_ parameters, the other modes from NGC_ and QP_."""
-        gains = plumbline.PlumblineGains(
-            k_R=_diagonal(table["PLB_KR"]),
-            k_Omega=_diagonal(table["PLB_KOMEGA"]),
-            k_q=table["PLB_KQ"],
-            k_omega=table["PLB_KW"],
-            k_x=_diagonal(table["PLB_KX"]),
-            k_v=_diagonal(table["PLB_KV"]),
-        )
+        """From the PLB_ and VEH_ parameters; the other modes from NGC_ and QP_."""
         period = 1.0 / table["CTL_RATE_HZ"]
-        force_filter = filter_constants(table["PLB_WN_F"], plumbline.ZETA, period)
-        drag = Drag(table["PLB_DRAG"], table["PLB_DRAG_2"])
-        lag = lag_constants(1e-3 * table["PLB_LAG_MS"], 1e-3 * table["PLB_LAG_TO_MS"], period)
-        other_modes = ThesisLaw.build(table, vehicle)
-        return cls(gains, force_filter, drag, lag, table["VEH_ROTOR_LIM"], vehicle, other_modes)
+        lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
+        designed = believed_design(table, vehicle)
+        constants = PlumblineConstants(
+            designed.gains,
+            believed_drag(table),
+            believed_actuation(table),
+            lag_gain(lag, shown, period),
+            period,
+            vehicle,
+        )
+        gains = designed.gains
+        others = ThesisLaw.build(table, vehicle)
+        others = others._replace(
+            gains=others.gains._replace(
+                k_R=gains.k_R, k_Omega=gains.k_Omega, k_q=gains.k_q, k_omega=gains.k_omega, epsilon=1.0
+            )
+        )
+        return cls(constants, designed, others)
 
     @property
     def ramp_lag_s(self) -> float:
         # the reference's velocity is fed forward: nothing is left behind on a ramp
         return 0.0
 
-    def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
-        hover = (self.vehicle.quad_mass + self.vehicle.load_mass) * self.vehicle.gravity
-        return PlumblineMemory(
-            plumbline.start(), self.other_modes.start(state, x_d, v_d), Rotating(hover, ZERO)
-        )
+    @property
+    def preview_s(self) -> float:
+        return self.constants.actuation.whole * self.constants.period + self.constants.actuation.late
 
-    def quad_attitude(self, memory: Memory, state: State, R_d: Mat3, thrust: float) -> tuple[Memory, Command]:
-        other, command = self.other_modes.quad_attitude(memory.other_modes, state, R_d, thrust)
-        return memory._replace(other_modes=other), command
+    def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
+        return PlumblineMemory(plumbline.start(), self.other_modes.start(state, x_d, v_d))
+
+    def quad_attitude(
+        self, memory: Memory, state: State, R_d: Mat3, thrust: float, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
+        ahead = ahead_of(state, 1.0, actuation, observed, self.constants)
+        other, wanted = self.other_modes.quad_attitude(
+            memory.other_modes, ahead.state, R_d, thrust, actuation, observed
+        )
+        return memory._replace(other_modes=other), hastened(wanted, ahead, self.constants)
 
     def load_attitude(
-        self, memory: Memory, state: State, q_d: Vec3, b1_d: Vec3, pull: float
+        self,
+        memory: Memory,
+        state: State,
+        q_d: Vec3,
+        b1_d: Vec3,
+        pull: float,
+        actuation: Actuation,
+        observed: Observed,
     ) -> tuple[Memory, Command]:
-        other, command = self.other_modes.load_attitude(memory.other_modes, state, q_d, b1_d, pull)
-        return memory._replace(other_modes=other), command
-
-    def load_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
-        position, wanted = plumbline.load_position(
-            memory.position,
-            state,
-            reference,
-            memory.rotors.thrust,
-            self.gains,
-            self.force_filter,
-            self.drag,
-            self.vehicle,
+        ahead = ahead_of(state, 1.0, actuation, observed, self.constants)
+        other, wanted = self.other_modes.load_attitude(
+            memory.other_modes, ahead.state, q_d, b1_d, pull, actuation, observed
         )
-        rotors, thrust, moment = hasten(
-            memory.rotors, wanted.thrust, wanted.moment, self.lag, self.vehicle, self.limited
-        )
-        command = wanted._replace(thrust=thrust, moment=moment)
-        return PlumblineMemory(position, memory.other_modes, rotors), command
+        return memory._replace(other_modes=other), hastened(wanted, ahead, self.constants)
 
-    def quad_position(self, memory: Memory, state: State, reference: Reference) -> tuple[Memory, Command]:
-        other, command = self.other_modes.quad_position(memory.other_modes, state, reference)
-        return memory._replace(other_modes=other), command
+    def load_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
+        position, command = load_position_tick(
+            memory.position, state, reference, actuation, observed, self.constants
+        )
+        return memory._replace(position=position), command
+
+    def quad_position(
+        self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
+    ) -> tuple[Memory, Command]:
+        ahead = ahead_of(state, 0.0, actuation, observed, self.constants)
+        other, wanted = self.other_modes.quad_position(
+            memory.other_modes, ahead.state, reference, actuation, observed
+        )
+        return memory._replace(other_modes=other), hastened(wanted, ahead, self.constants)
 
 
 _BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {

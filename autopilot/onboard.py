@@ -13,8 +13,18 @@ from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
 from autopilot.flight import Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
+<<<<<<< HEAD
 from autopilot.flight_log import FlightLog, LogChunk, Sample
 from autopilot.laws import believed_vehicle, build_law
+=======
+from autopilot.laws import (
+    believed_actuation,
+    believed_drag,
+    believed_observer,
+    believed_vehicle,
+    build_law,
+)
+>>>>>>> main
 from autopilot.loss import Loss
 from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
@@ -34,14 +44,38 @@ from autopilot.services.records import (
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import HilGps, hil_actuator_controls_message
+from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import WorldParameters
+from missions.planning import Limits, prepare
 
 GROUND_WINDOW_US = 20_000
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
+
+
+def build_setup(table: ParameterTable, control_every: int) -> Setup:
+    """What the flight core is given, from the parameters and the ticks between two runs of the law."""
+    law, vehicle = build_law(table), believed_vehicle(table)
+    return Setup(
+        vehicle=vehicle,
+        limited=table["VEH_ROTOR_LIM"],
+        law=law,
+        actuation=believed_actuation(table),
+        observer=believed_observer(table, vehicle),
+        drag=believed_drag(table),
+        tuning=estimator_tuning(table),
+        settings=settings_from(table, law.ramp_lag_s),
+        control_every=control_every,
+    )
+
+
+def plan_of(mission: StoredMission, home: Home, limits: Limits) -> Plan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits."""
+    steps = located_steps(mission.items, home)
+    flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+    return Plan(flown, sequence, len(mission.items), prepare(flown, sequence, limits))
 
 
 class Onboard:
@@ -73,7 +107,7 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
-        self._setup = self._build_setup(1)
+        self._setup = build_setup(parameters, 1)
         self._take_plan(self.endpoint.mission)
         self._log: FlightLog | None = None
         if options.log:
@@ -106,9 +140,14 @@ class Onboard:
         return self._answer
 
     @property
+    def phase(self) -> Phase:
+        """The phase of flight."""
+        return self._state.flight.phase
+
+    @property
     def armed(self) -> bool:
         """Whether rotors may turn."""
-        return self._state.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE)
+        return self.phase not in (Phase.DISARMED, Phase.FAILSAFE)
 
     def _run(self, tick: Tick) -> None:
         period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
@@ -181,18 +220,6 @@ class Onboard:
 
     # ---- parameters
 
-    def _build_setup(self, control_every: int) -> Setup:
-        table = self.parameters
-        law = build_law(table)
-        return Setup(
-            vehicle=believed_vehicle(table),
-            limited=table["VEH_ROTOR_LIM"],
-            law=law,
-            tuning=estimator_tuning(table),
-            settings=settings_from(table, law.ramp_lag_s),
-            control_every=control_every,
-        )
-
     def _follow_parameters(self) -> None:
         self._version = self.parameters.version
         try:
@@ -203,7 +230,7 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
             return
         self.fault = ""
-        self._setup = self._build_setup(every)
+        self._setup = build_setup(self.parameters, every)
 
     # ---- ground
 
@@ -260,8 +287,9 @@ class Onboard:
         return verdict
 
     def _take_plan(self, mission: StoredMission) -> None:
-        steps = located_steps(mission.items, self._options.home)
-        plan = Plan(tuple(s.step for s in steps), tuple(s.last for s in steps), len(mission.items))
+        plan = plan_of(mission, self._options.home, self._setup.settings.limits)
+        for note in plan.prepared.notes:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
 
     def _snapshot(self) -> Snapshot:

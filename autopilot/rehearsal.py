@@ -20,8 +20,9 @@ from autopilot.guidance import (
     transfer_leg,
 )
 from autopilot.mixer import mix
-from missions.model import Sine, Term
-from missions.signals import signal_table
+from autopilot.observer import nominal
+from missions.model import Signals, Sine, Term
+from missions.shaping import shape
 
 
 def rehearse(setup: Setup) -> None:
@@ -38,17 +39,19 @@ def rehearse(setup: Setup) -> None:
     for tick in range(3):
         state, _ = step(state, history, readings, setup, tick * 4000, tick, 0.004)
     motion = control_state(state.estimator)
-    table = signal_table((Term("x", 1.0, 0.0, 1.0, None, 0.0, (Sine(1.0),)),))
+    wave = Signals(
+        1.0, (Term("x", 0.01, 0.0, 1.0, None, 0.0, (Sine(1.0),)), Term("x", 0.1, 0.0, 1.0, None, 0.0))
+    )
     legs: tuple[Leg, ...] = (
         Hold(load),
         transfer_leg(load, over, 1.0, 1.0, LOAD_POSITION),
         Creep(over, ZERO, QUAD_POSITION),
-        Run(load, table, 1.0),
+        Run(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
         Swing(load, 0.1, 0.1, 1.0, LOAD_ATTITUDE),
         Swing(load, 0.1, 0.1, 1.0, QUAD_ATTITUDE),
     )
     for leg in legs:
         jet = leg.jet(0.5)
         memory = setup.law.start(motion, jet[0], jet[1])
-        _, command = track(setup, memory, motion, leg, jet, 0.5)
+        _, command = track(setup, memory, motion, leg, jet, 0.5, state.actuation, nominal(setup.vehicle))
         mix(command.thrust, command.moment, setup.vehicle, setup.limited)

@@ -1,10 +1,10 @@
-"""Rotors that follow slowly: what they give now, and the demand that makes them follow faster.
+"""The demand that makes slow rotors follow faster.
 
 | symbol  | code name      | frame | unit   | meaning                                       |
 |---------|----------------|-------|--------|-----------------------------------------------|
-| r       | thrust, moment | B     | N, N m | what the rotors give, by belief               |
-| u       | thrust, moment | B     | N, N m | what they are asked to give                   |
-| p       | thrust, moment | B     | N, N m | what the law wants                            |
+| r       | now            | B     | N, N m | what the rotors give when the demand is in force |
+| u       |                | B     | N, N m | what they are asked to give                   |
+| p       | wanted         | B     | N, N m | what the law wants                            |
 | tau     | lag            |       | s      | r' = (u - r) / tau                            |
 | tau_a   | lag_wanted     |       | s      | r' = (p - r) / tau_a, as it should look       |
 
@@ -12,59 +12,29 @@ A demand u held for a period dt moves r by (1 - exp(-dt/tau)) (u - r). It moves 
 
     u = r + gain (p - r),    gain = (1 - exp(-dt/tau_a)) / (1 - exp(-dt/tau))
 
-(2-13) is linear and the rotors are alike, so that thrust and moment lag as each rotor does. What the mixer
-cuts off is known and goes into the belief. By the gain the law's noise grows, too, on its way to the rotors.
+(2-13) is linear and the rotors are alike, so that thrust and moment lag as each rotor does. What the
+rotors give is known from `actuation`. By the gain the law's noise grows, too, on its way to the rotors.
 """
 
 from __future__ import annotations
 
 from math import exp
-from typing import NamedTuple
 
-from autopilot.control.records import Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, axpy, sub
-from autopilot.mixer import mix
 
 
-class LagConstants(NamedTuple):
-    """For one control period."""
-
-    follow: float  # 1 - exp(-dt / tau)
-    gain: float
-
-
-class Rotating(NamedTuple):
-    """What the rotors give, by belief."""
-
-    thrust: float  # N
-    moment: Vec3  # N m, body
-
-
-def lag_constants(lag: float, lag_wanted: float, dt: float) -> LagConstants:
+def lag_gain(lag: float, lag_wanted: float, dt: float) -> float:
     """For rotors of this lag (s), wanted to be of that; a wanted lag that is no shorter changes nothing."""
-    follow = 1.0 - exp(-dt / lag) if lag > 0.0 else 1.0
     if lag_wanted >= lag:
-        return LagConstants(follow, 1.0)
+        return 1.0
     wanted = 1.0 - exp(-dt / lag_wanted) if lag_wanted > 0.0 else 1.0
-    return LagConstants(follow, wanted / follow)
+    return wanted / (1.0 - exp(-dt / lag))
 
 
 @kernel
 def hasten(
-    rotors: Rotating,
-    thrust: float,
-    moment: Vec3,
-    constants: LagConstants,
-    vehicle: Vehicle,
-    limited: float,
-) -> tuple[Rotating, float, Vec3]:
-    """What the rotors will give a period later, and the thrust (N) and moment (N m) to ask of them now."""
-    asked = rotors.thrust + constants.gain * (thrust - rotors.thrust)
-    asked_moment = axpy(constants.gain, sub(moment, rotors.moment), rotors.moment)
-    mixed = mix(asked, asked_moment, vehicle, limited)
-    after = Rotating(
-        rotors.thrust + constants.follow * (mixed.thrust_done - rotors.thrust),
-        axpy(constants.follow, sub(mixed.moment_done, rotors.moment), rotors.moment),
-    )
-    return after, asked, asked_moment
+    thrust_now: float, moment_now: Vec3, thrust: float, moment: Vec3, gain: float
+) -> tuple[float, Vec3]:
+    """The thrust (N) and moment (N m) to ask for, where `thrust` and `moment` are wanted."""
+    return thrust_now + gain * (thrust - thrust_now), axpy(gain, sub(moment, moment_now), moment_now)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from math import nan
 from typing import Any, NamedTuple
 
 from autopilot.estimation.filter import Readings
-from autopilot.estimation.records import ImuReading, LoadReading, PoseReading
-from autopilot.geometry.linear import ZERO, norm
+from autopilot.estimation.records import DirectionReading, GnssReading, ImuReading, LoadReading, PoseReading
+from autopilot.geometry.linear import ZERO, norm, scale
 from autopilot.wire.codec import decode
 from autopilot.wire.convert import (
+    MAG,
+    PRESSURE,
     HilGps,
     Home,
     read_hil_gps,
@@ -23,6 +26,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 LEAST_POSITION_STD_M = 2e-5
 LEAST_ANGLE_STD_RAD = 2e-5
 LEAST_VELOCITY_STD_M_S = 2e-4
+LEAST_FIX_STD_M = 2e-3
+LEAST_DIRECTION_STD_RAD = 1e-4
 OLDEST_READING_S = 0.3  # older ones are dropped: the estimator's memory is no longer
 GREATEST_ACCEL_M_S2, GREATEST_RATE_RAD_S = 2000.0, 500.0
 
@@ -63,10 +68,23 @@ def read_tick(datagram: bytes, home: Home) -> Tick | None:
     now_us = sensor.time_us
     poses = tuple(pose for pose in (_pose(o, now_us) for o in odometry) if pose is not None)
     loads = tuple(reading for reading in (_load(r, now_us) for r in load) if reading is not None)
+    seen = tuple(reading for reading in (_direction(r, now_us) for r in load) if reading is not None)
+    fix = None if gps is None else _fix(gps, now_us)
+    height = sensor.pressure_altitude_m - home.altitude_m if sensor.fields & PRESSURE else nan
+    field = sensor.mag_body_gauss if sensor.fields & MAG else (nan, nan, nan)
     # written so that NaN fails
     sane = norm(sensor.accel_body) < GREATEST_ACCEL_M_S2 and norm(sensor.gyro_body) < GREATEST_RATE_RAD_S
     imu = ImuReading(sensor.gyro_body, sensor.accel_body) if sane else None
-    return Tick(now_us, Readings(imu, poses, loads), gps, sensor.fields, tuple(aside))
+    readings = Readings(
+        imu,
+        poses,
+        loads,
+        () if fix is None else (fix,),
+        seen,
+        height if math.isfinite(height) else None,
+        field if math.isfinite(norm(field)) and norm(field) > 0.0 else None,
+    )
+    return Tick(now_us, readings, gps, sensor.fields, tuple(aside))
 
 
 def _age_s(now_us: int, time_us: int) -> float | None:
@@ -105,4 +123,33 @@ def _load(r: Any, now_us: int) -> LoadReading | None:
         r.velocity or ZERO,
         _at_least(r.position_std, LEAST_POSITION_STD_M),
         -1.0 if r.velocity is None else _at_least(r.velocity_std, LEAST_VELOCITY_STD_M_S),
+    )
+
+
+def _fix(gps: HilGps, now_us: int) -> GnssReading | None:
+    age = _age_s(now_us, gps.time_us)
+    values = (*gps.position, *gps.velocity, gps.horizontal_std, gps.vertical_std)
+    if age is None or gps.fix_type < mavlink.GPS_FIX_TYPE_3D_FIX or not all(map(math.isfinite, values)):
+        return None
+    return GnssReading(
+        age,
+        gps.position,
+        gps.velocity,
+        _at_least(gps.horizontal_std, LEAST_FIX_STD_M),
+        _at_least(gps.vertical_std, LEAST_FIX_STD_M),
+        1.0 if gps.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT else 0.0,
+    )
+
+
+def _direction(r: Any, now_us: int) -> DirectionReading | None:
+    age = _age_s(now_us, r.time_us)
+    if age is None or r.direction_body is None:
+        return None
+    length = norm(r.direction_body)
+    if not 0.5 < length < 2.0:  # also for NaN
+        return None
+    return DirectionReading(
+        age,
+        scale(1.0 / length, r.direction_body),
+        _at_least(r.direction_std, LEAST_DIRECTION_STD_RAD),
     )

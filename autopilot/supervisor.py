@@ -35,10 +35,12 @@ from autopilot.guidance import (
     Creep,
     Hold,
     Leg,
+    Pass,
     Run,
     Swing,
     brake_leg,
     carry_leg,
+    slow_leg,
     transfer_leg,
 )
 from autopilot.wire.dialect import plumbline as mavlink
@@ -53,7 +55,8 @@ from missions.model import (
     Takeoff,
     Waypoint,
 )
-from missions.signals import signal_table
+from missions.shaping import Shaped, unshaped
+from missions.waypoints import Passage
 
 P, E = Phase, Event
 TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
@@ -105,6 +108,7 @@ STILL_SPEED, STILL_US = 0.05, 200_000
 IDLE_DISARM_US = 10_000_000
 FAILSAFE_DISARM_US = 3_000_000
 SETTLE_S = 3.0  # hold after an attitude run
+NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
 LEAST_HEIGHT = 0.3  # m over home, at which a load that was being lifted or lowered is held or carried
 STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load accelerates
@@ -118,14 +122,16 @@ def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Fligh
         legs = (_calm(flight.legs[0], view, settings, ends_step=False),)
     else:
         legs = _ENTRY[phase](flight, view, settings) if phase in _ENTRY else ()
-    return replace(
+    entered = replace(
         flight,
         phase=phase,
         phase_start_us=view.now_us,
         legs=legs,
         leg_start_us=view.now_us,
         still_since_us=-1,
+        following=(),
     )
+    return replace(entered, following=_following(entered, settings))
 
 
 def happen(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
@@ -169,6 +175,10 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     x, v, a = load_motion(flight, view, settings)
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
+    if flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
+        t = leg_time_s(flight, view.now_us)
+        slow = slow_leg(flight.legs[0], t, settings.accel_m_s2, settings.least_move_s)
+        return (slow,), slow.end
     brake = brake_leg(x, v, a, settings.accel_m_s2, settings.least_move_s)
     return (brake,), brake.end
 
@@ -253,14 +263,20 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
             return (_carry(here, (here[0], here[1], altitude), settings.lift_speed_m_s, settings),)
         case Waypoint(east_m=east, north_m=north, altitude_m=altitude, hold_s=hold):
             there = (east, north, altitude)
-            go = _carry(here, there, flight.speed_m_s, settings)
-            return (go, Hold(there, hold)) if hold > 0.0 else (go,)
+            path = _made(flight, flight.step)
+            go: Leg
+            if isinstance(path, Passage) and path.begin_s == 0.0 and norm(sub(here, path.start)) < NEAR_START:
+                fade = min(settings.least_move_s, float(path.table[-1, 1]))
+                go = Pass(path, sub(here, path.start), fade)
+            else:
+                go = _carry(here, there, flight.speed_m_s, settings)
+            return (go, Hold(there, max(hold - _borrowed(flight), 0.0))) if hold > 0.0 else (go,)
         case Delay(duration_s=duration):
-            return (Hold(here, duration),)
+            return (Hold(here, max(duration - _borrowed(flight), 0.0)),)
         case ReturnHome():
             return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings),)
-        case Signals(duration_s=duration, terms=terms):
-            return (Run(here, signal_table(terms), duration),)
+        case Signals():
+            return (Run(here, _path_of(flight, flight.step) or unshaped(step)),)
         case AttitudeRun(
             controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
         ):
@@ -271,6 +287,40 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
         case Land():
             return ()
     raise AssertionError(step)
+
+
+def _made(flight: Flight, step: int) -> Shaped | Passage | None:
+    """What was made ready for a step of the plan, if anything was."""
+    made = flight.plan.prepared.made
+    return made[step] if 0 <= step < len(made) else None
+
+
+def _path_of(flight: Flight, step: int) -> Shaped | None:
+    """The signals that were made ready for a step of the plan, if it is one of these."""
+    found = _made(flight, step)
+    return found if isinstance(found, Shaped) else None
+
+
+def _borrowed(flight: Flight) -> float:
+    """Time (s) that the paths before and after the present step take from its hold: to come to rest, and to
+    get ready."""
+    before, after = _path_of(flight, flight.step - 1), _path_of(flight, flight.step + 1)
+    return (before.tail_s if before else 0.0) + (after.lead_s if after else 0.0)
+
+
+def _following(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
+    """The legs of the step after the present one, where it begins at rest where this one ends."""
+    step = flight.step + 1
+    if not flight.on_mission or flight.phase not in (P.LIFT, P.MISSION) or step >= len(flight.plan.steps):
+        return ()
+    last = flight.legs[-1] if flight.legs else None
+    if last is None or last.control_mode != LOAD_POSITION or not isfinite(last.duration_s):
+        return ()
+    end = last.jet(last.duration_s)
+    coming = flight.plan.steps[step]
+    if norm(end[1]) > AT_REST or not isinstance(coming, Waypoint | Delay | ReturnHome | Signals):
+        return ()
+    return _step_legs(coming, end[0], replace(flight, step=step), settings)
 
 
 _ENTRY = {
@@ -385,6 +435,17 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
         return enter(rewound, P.HOLD, view, settings), Report(
             ((INFO, "Mission complete, holding"),), done.reached
         )
+    ahead = _made(flight, flight.step)
+    if isinstance(swung, Pass) and isinstance(ahead, Passage) and ahead.table is swung.path.table:
+        # past the waypoint without a stop; the clock goes on from where the stretch ended
+        assert isinstance(following, Waypoint)
+        legs = (replace(swung, path=ahead),)
+        if following.hold_s > 0.0:
+            there = (following.east_m, following.north_m, following.altitude_m)
+            legs += (Hold(there, max(following.hold_s - _borrowed(flight), 0.0)),)
+        passed = flight.leg_start_us + round(swung.duration_s * 1e6)
+        gone = replace(flight, legs=legs, leg_start_us=passed)
+        return replace(gone, following=_following(gone, settings)), done
     if isinstance(swung, Swing):
         # the next run takes the motion over as it is; only the height is still that of the first
         here = (view.x_load[0], view.x_load[1], swung.anchor[2])

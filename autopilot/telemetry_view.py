@@ -7,11 +7,12 @@ from math import inf, nan
 
 from autopilot.decisions import arming_complaints
 from autopilot.estimation.filter import control_state
+from autopilot.estimation.records import TRACKER
 from autopilot.flight import CARRYING, ON_GROUND, Flight, Phase, Selected, leg_time_s
 from autopilot.flight_core import FlightState, Setup, view_of
 from autopilot.geometry.linear import ZERO, norm, sub
 from autopilot.geometry.so3 import quat_from_rotation
-from autopilot.guidance import LOAD_POSITION, QUAD_POSITION
+from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, asked_jet
 from autopilot.sensor_link import Tick
 from autopilot.services import identity, snapshot
 from autopilot.services.mission_store import StoredMission
@@ -113,7 +114,7 @@ def sensor_bits(tick: Tick | None, state: FlightState, gps: HilGps | None, ready
             present |= bit
             healthy |= bit
     estimator = state.estimator
-    if estimator.vehicle.age_s < inf:
+    if estimator.vehicle.source == TRACKER:
         present |= snapshot.TRACKER
         if estimator.vehicle.age_s < FRESH_S and estimator.load.age_s < FRESH_S:
             healthy |= snapshot.TRACKER
@@ -143,6 +144,7 @@ def make_snapshot(
 
     leg = flight.legs[0] if flight.legs else None
     x_d, v_d, a_d, x_quad_d = control.x_load, ZERO, ZERO, (nan, nan, nan)
+    x_asked, v_asked = x_d, v_d
     elapsed, duration = (now_us - flight.phase_start_us) * 1e-6, nan
     if leg is not None:
         elapsed = leg_time_s(flight, now_us)
@@ -150,6 +152,8 @@ def make_snapshot(
         jet = leg.jet(elapsed)
         if leg.control_mode == LOAD_POSITION:
             x_d, v_d, a_d = jet[0], jet[1], jet[2]
+            asked = asked_jet(leg, elapsed)
+            x_asked, v_asked = asked[0], asked[1]
         elif leg.control_mode == QUAD_POSITION:
             x_quad_d = jet[0]
     sequence = flight.plan.sequence
@@ -170,8 +174,8 @@ def make_snapshot(
         quat_wxyz=estimator.vehicle.quat_wxyz,
         omega_body=control.omega_body,
         estimator_flags=0 if view.complaints else _ESTIMATING,
-        horizontal_std=estimator.vehicle.covariance[0] ** 0.5,
-        vertical_std=estimator.vehicle.covariance[0] ** 0.5,
+        horizontal_std=estimator.doubt.horizontal,
+        vertical_std=estimator.doubt.vertical,
         x_load=control.x_load,
         v_load=control.v_load,
         q_cable=control.q_cable,
@@ -187,6 +191,8 @@ def make_snapshot(
         x_load_d=x_d,
         v_load_d=v_d,
         a_load_d=a_d,
+        x_load_asked=x_asked,
+        v_load_asked=v_asked,
         q_cable_c=command.q_c,
         x_quad_d=x_quad_d,
         quat_c_wxyz=quat_from_rotation(command.R_c),

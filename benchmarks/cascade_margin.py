@@ -11,8 +11,10 @@ circle, all commands delayed alike.
 `delay` is all that passes between a motion and the command that answers it, besides the hold: sensor latency,
 computation, transport.
 
-The law `plumbline` knows the rotors' lag, unless told otherwise by `believed_tau`; its force filter is
-`omega_force`, the lag it makes the rotors show `wanted_tau`.
+The law `plumbline` knows delay and lag of the rotors, unless told otherwise by `believed_delay` and
+`believed_tau`; the lag it makes the rotors show is `wanted_tau`, its gains are those of the design
+unless others than those of Table 4-3 are given. Where a delay is believed, "sooner" is by how much
+the true delay may be less.
 
     python benchmarks/cascade_margin.py [--loop attitude|position|vehicle|plumbline] [--set k_R=0.45 ...]
 """
@@ -30,12 +32,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
+from autopilot.actuation import Actuation, actuation_constants, advance
 from autopilot.control import plumbline, thesis
-from autopilot.control.command_filter import FilterState, filter_constants
+from autopilot.control.command_filter import FilterState
+from autopilot.control.design import Timing, Wanted, design
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Reference, State, Vehicle
-from autopilot.rotor_lag import Rotating, hasten, lag_constants
+from autopilot.observer import nominal
+from autopilot.plumbline_tick import PlumblineConstants, load_position_tick
+from autopilot.rotor_lag import lag_gain
 
 Array = NDArray[np.float64]
 
@@ -50,13 +56,16 @@ STEP = 1e-5
 # position of the law `plumbline`
 LOOPS = ("attitude", "position", "vehicle", "plumbline")
 WANTED_TAU = 0.010  # s, PLB_LAG_TO_MS
+WANTED = Wanted(
+    0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0
+)  # PLB_ defaults
 FILTERS = (
     "omega_attitude",
     "omega_direction",
     "omega_reference",
     "zeta",
-    "omega_force",
     "believed_tau",
+    "believed_delay",
     "wanted_tau",
 )
 GREATEST_DELAY = 0.2  # s; more is reported as this
@@ -100,6 +109,7 @@ class Margin:
     phase_deg: float
     crossover: float
     delay: float
+    sooner: float  # s, by which the delay may be less
 
     @property
     def stable(self) -> bool:
@@ -194,56 +204,83 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     return tick
 
 
-def plumbline_law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
-    """As `law`; its memory is the force filter, the thrust's rate, and what the rotors give."""
-    options = {
-        "omega_force": plumbline.OMEGA_FORCE,
+def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConstants:
+    """What the law is told: the delay and lag of the settings, unless others are believed."""
+    told = {
         "believed_tau": settings.rotor_tau,
+        "believed_delay": settings.delay,
         "wanted_tau": WANTED_TAU,
         **settings.filters,
     }
-    gains = plumbline.PlumblineGains(
-        **{n: getattr(settings.gains, n) for n in plumbline.PlumblineGains._fields}
+    if settings.gains == thesis.THESIS_GAINS:
+        shown = min(told["believed_tau"], told["wanted_tau"])
+        timing = Timing(told["believed_delay"], told["believed_tau"], shown, settings.period)
+        gains = design(WANTED, timing, vehicle).gains
+    else:
+        gains = plumbline.PlumblineGains(
+            **{n: getattr(settings.gains, n, ZERO) for n in plumbline.PlumblineGains._fields}
+        )
+    return PlumblineConstants(
+        gains,
+        Drag(0.0, 0.0),
+        actuation_constants(told["believed_delay"], told["believed_tau"], settings.period),
+        lag_gain(told["believed_tau"], told["wanted_tau"], settings.period),
+        settings.period,
+        vehicle,
     )
-    force_filter = filter_constants(options["omega_force"], plumbline.ZETA, settings.period)
-    lag = lag_constants(options["believed_tau"], options["wanted_tau"], settings.period)
+
+
+LAW_MEMORY = 8  # thrust rate, rotors' thrust and moment, integral; then the commands on their way
+
+
+def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array], Array], Array]:
+    """As `law`, and its memory at hover: the thrust's rate, rotors, integral, commands on their way.
+
+    Mass and wind are not observed here: across the cable what is observed does not depend on the rotors, and
+    along it the mass is learned slowly.
+    """
+    constants = plumbline_constants(settings, vehicle)
     reference = Reference((ZERO,) * 7, HEADING)
+    observed = nominal(vehicle)._replace(support=0.0)
+    rows = constants.actuation.whole + 1
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def tick(numbers: Array) -> Array:
         state = state_at(numbers[-MOTION:], vehicle)
-        filtered = FilterState(_vec(numbers[0:3]), _vec(numbers[3:6]), _vec(numbers[6:9]))
-        rotors = Rotating(float(numbers[10]), _vec(numbers[11:14]))
-        memory, wanted = plumbline.load_position(
-            plumbline.PlumblineMemory(filtered, float(numbers[9]), 1.0),
+        queue = np.zeros((rows + 1, 4))
+        queue[:rows] = numbers[LAW_MEMORY:-MOTION].reshape(rows, 4)
+        actuation = Actuation(queue, float(numbers[1]), _vec(numbers[2:5]))
+        memory, command = load_position_tick(
+            plumbline.PlumblineMemory(float(numbers[0]), _vec(numbers[5:8])),
             state,
             reference,
-            rotors.thrust,
-            gains,
-            force_filter,
-            Drag(0.0, 0.0),
-            vehicle,
+            actuation,
+            observed,
+            constants,
         )
-        after, thrust, moment = hasten(rotors, wanted.thrust, wanted.moment, lag, vehicle, 0.0)
+        after = advance(actuation, command.thrust, command.moment, constants.actuation)
         return np.array(
             [
-                *(number for vector in memory.force for number in vector),
                 memory.thrust_rate,
                 after.thrust,
                 *after.moment,
-                thrust,
-                *moment,
+                *memory.integral,
+                *after.queue[:rows].ravel(),
+                command.thrust,
+                *command.moment,
             ]
         )
 
-    return tick
+    hover = np.zeros(LAW_MEMORY + 4 * rows)
+    hover[1] = weight
+    hover[LAW_MEMORY::4] = weight
+    return tick, hover
 
 
 def linearised_law(settings: Settings, vehicle: Vehicle) -> tuple[Array, Array, Array, Array]:
     """(A, B, C, D) of the law at hover: memory, motion in; memory, (f, M) out."""
     if settings.loop == "plumbline":
-        tick = plumbline_law(settings, vehicle)
-        hover = np.zeros(14)
-        hover[10] = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+        tick, hover = plumbline_law(settings, vehicle)
     else:
         tick = law(settings, vehicle)
         hover = _flat(thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO))
@@ -350,6 +387,7 @@ def margin(settings: Settings, vehicle: Vehicle = BEBOP) -> Margin:
         phase_deg=float(phases[least]),
         crossover=float(crossings[least]),
         delay=boundary(delayed, 0.0, GREATEST_DELAY) if stable else 0.0,
+        sooner=-boundary(delayed, 0.0, -settings.delay) if stable and settings.delay > 0.0 else 0.0,
     )
 
 
@@ -408,14 +446,14 @@ def row(settings: Settings) -> str:
         return f"{head}   lost: grows by e every {growth * 1e3:6.0f} ms"
     return (
         f"{head} {result.gain_up:7.2f} {result.gain_down:7.2f} {result.phase_deg:7.1f}"
-        f" {result.crossover:8.1f} {result.delay * 1e3:8.1f}"
+        f" {result.crossover:8.1f} {result.delay * 1e3:8.1f} {result.sooner * 1e3:8.1f}"
     )
 
 
 def table(grid: Iterable[Settings]) -> str:
     title = (
-        " tau_ms     Hz  delay gain up    down   phase crossing    delay\n"
-        "                    ms  factor  factor     deg    rad/s  left ms"
+        " tau_ms     Hz  delay gain up    down   phase crossing    delay   sooner\n"
+        "                    ms  factor  factor     deg    rad/s  left ms       ms"
     )
     return "\n".join([title, *(row(settings) for settings in grid)])
 
@@ -455,16 +493,18 @@ def main() -> None:
                 *((tau, 1000, 0) for tau in (0, 10, 20, 30)),
                 *((tau, 100, 0) for tau in (0, 10, 20)),
                 *((tau, 250, delay) for tau in (0, 10, 20) for delay in (4, 8, 12)),
+                *(((30, 250, 12), (20, 250, 72)) if loop == "plumbline" else ()),
             )
         ]
         print(table(grid))
     for loop in loops:
         if loop in ("position", "plumbline"):
-            print(f"\n{loop} loop: {NOISE_TITLE}")
-            print_noise(Settings(0.02, 0.004, 0.0, loop, gains, filters))
+            for tau, delay in ((20, 0), (30, 12), (20, 72)) if loop == "plumbline" else ((20, 0),):
+                print(f"\n{loop} loop: {NOISE_TITLE}, rotor lag {tau} ms, delay {delay} ms")
+                print_noise(Settings(1e-3 * tau, 0.004, 1e-3 * delay, loop, gains, filters))
 
 
-NOISE_TITLE = "rotor command, standard deviation, for noise white from tick to tick; 250 Hz, rotor lag 20 ms"
+NOISE_TITLE = "rotor command, standard deviation, for noise white from tick to tick; 250 Hz"
 
 
 def print_noise(settings: Settings) -> None:

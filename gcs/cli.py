@@ -25,6 +25,7 @@ COMMANDS = {
         "experiments",
         "Repeat published experiments beside their printed results.",
     ),
+    "sweep": ("sweep", "Fly a mission thousands of times under varied conditions."),
     "status": ("status", "Show what the vehicle says of itself."),
     "capture": ("capture", "Capture telemetry until Ctrl-C."),
     "upload": ("transfer", "Put a mission on the vehicle."),

@@ -6,7 +6,7 @@ flown over UDP in lockstep leave the same log, byte for byte. This is the one mo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from autopilot.onboard import Onboard
@@ -52,8 +52,14 @@ def build_simulator(conditions: Conditions, home: Home) -> HilSimulator:
     )
 
 
-def fly(mission: Mission, conditions: Conditions, log: FrameLog) -> Outcome:
-    """Fly a mission from take-off to landing; the log gets what `gcs fly --lockstep` writes."""
+Watch = Callable[[Onboard, HilSimulator], bool]
+
+
+def fly(mission: Mission, conditions: Conditions, log: FrameLog, watch: Watch | None = None) -> Outcome:
+    """Fly a mission from take-off to landing; the log gets what `gcs fly --lockstep` writes.
+
+    `watch` is shown the cores at every tick, before the world moves on; False from it ends the flight.
+    """
     home = Home()
     onboard = build_onboard(conditions, home)
     onboard.add_link(_GROUND)
@@ -77,6 +83,8 @@ def fly(mission: Mission, conditions: Conditions, log: FrameLog) -> Outcome:
             for datagram in (*sent, turns.answer(now_us * 1000)):
                 onboard.receive_ground(datagram, _GROUND)
             capture.flush(now_us)
+        if watch is not None and not watch(onboard, simulator):
+            client.interrupt("stopped by who watched it")
         if answer is not None:
             simulator.receive(answer)
         simulator.advance()

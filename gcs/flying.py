@@ -53,6 +53,8 @@ _EXIT = {
     "lost": EXIT_ERROR,
 }
 
+_REFUSED = 2.0  # MIS_INFEASIBLE
+
 
 @dataclass(frozen=True)
 class FlightOptions:
@@ -88,7 +90,9 @@ class Flight:
 
 def fly(options: FlightOptions) -> Flight:
     """The whole flight; GcsError if there was none."""
-    mission = load_checked(options.mission, options.vehicle, options.force)
+    mission = load_checked(
+        options.mission, options.vehicle, options.force or _tried_anyway(options), options.law == "plumbline"
+    )
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with _Folder(out) as folder, StopRequest("stopping; Ctrl-C again abandons the report") as stop:
         watch = _Stopwatch()
@@ -168,6 +172,8 @@ def _start(
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
     both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS[options.law]}"]
+    if options.force:
+        both += ["--set", "MIS_INFEASIBLE=0"]
     for setting in options.settings:
         both += ["--set", setting]
     world = [
@@ -261,6 +267,12 @@ def _meta(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: fl
         version=version("plumbline"),
         settings=settings,
     )
+
+
+def _tried_anyway(options: FlightOptions) -> bool:
+    """Whether the autopilot is told to fly, or to slow down, what it cannot fly as asked."""
+    name = "MIS_INFEASIBLE="
+    return any(s.startswith(name) and float(s.removeprefix(name)) < _REFUSED for s in options.settings)
 
 
 def _command_line(options: FlightOptions) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gcs.errors import GcsError
 from gcs.vehicle_limits import load_limits
-from missions.feasibility import Violation, check
+from missions.feasibility import PathReport, Violation, check, paths
 from missions.fileformat import MissionFileError, load_mission
 from missions.model import Mission
 
@@ -17,17 +17,22 @@ def load(name_or_path: str) -> Mission:
         raise GcsError(str(error)) from None
 
 
-def violations(mission: Mission, vehicle: str) -> list[Violation]:
-    """What the vehicle cannot do of it."""
-    return list(check(mission, load_limits(vehicle)))
+def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
+    """What the vehicle cannot do of it; with paths `shaped` by the autopilot or as they are asked."""
+    return check(mission, load_limits(vehicle), shaped)
 
 
-def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
+def path_reports(mission: Mission, vehicle: str) -> list[PathReport]:
+    """How the vehicle flies it, its paths shaped by the autopilot."""
+    return paths(mission, load_limits(vehicle))
+
+
+def load_checked(name_or_path: str, vehicle: str, force: bool, shaped: bool = True) -> Mission:
     """The mission, which the vehicle can fly unless `force` says that it need not."""
     mission = load(name_or_path)
     if force:
         return mission
-    found = violations(mission, vehicle)
+    found = violations(mission, vehicle, shaped)
     if found:
         more = f" (and {len(found) - 1} more, see gcs check)" if len(found) > 1 else ""
         raise GcsError(

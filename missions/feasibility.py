@@ -1,27 +1,47 @@
 """Can the vehicle fly it? Answered before take-off, for every step of a mission.
 
 What is checked: the cable stays taut, total thrust (with a reserve) and each single rotor stay within their
-limits, so does the tilt of the vehicle, the load stays above the ground, and a path has no jump in position
-or velocity. What is not: at the joints of half-sine envelopes the acceleration jumps, and to follow a jump
-exactly would take an unbounded moment for an instant. No vehicle does, and the flight is none the worse; both
-sides of a joint are checked, the jump itself is not. Nor does the check know of wind, delay or noise: what
-passes can be flown in principle.
+limits, so does the tilt of the vehicle, the load is carried at a height and stays above the ground, and a
+path has no jump in position or velocity. Drag of the vehicle is part of it. What is not checked: at the
+joints of half-sine envelopes the acceleration jumps, and to follow a jump exactly would take an unbounded
+moment for an instant; both sides of a joint are checked, the jump itself is not. An autopilot that shapes its
+paths flies near the jump (`missions.shaping`), others err there and are none the worse. Nor does the check
+know of wind, delay or noise: what passes can be flown in principle.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import degrees, inf, nextafter, radians
+from math import cos, degrees, inf, nextafter, radians
+
+from numpy import linspace
 
 from autopilot.geometry.linear import Vec3, norm, sub
+from missions.demand import Bounds
 from missions.legs import Leg, legs
 from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint
+from missions.planning import REFUSE, Limits, prepare, trouble_of
+from missions.shaping import Shaped, path_jets, shape
 from missions.signals import evaluate, joints, signal_table
-from missions.survey import Body, Extreme, Peaks, survey_attitude, survey_signals, survey_transfer
+from missions.survey import (
+    Body,
+    Extreme,
+    Peaks,
+    survey_attitude,
+    survey_path,
+    survey_signals,
+    survey_transfer,
+)
+from missions.waypoints import Passage, passage_jets
 
-__all__ = ["Peaks", "VehicleLimits", "Violation", "check", "peaks"]
+__all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
 
+ROTOR_MARGIN = 0.15  # MIS_ROTOR_MARG, MIS_TENSION and MIS_SHAPE_ERR as delivered
+LEAST_TENSION = 0.3
+SHAPING_M = 0.05
+LEAST_HEIGHT_M = 0.3  # above home, at which a load is carried
+_REPORT_SAMPLES = 4001
 # Jumps of the path below these (m, m/s) are smaller than the error of any flight.
 _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
@@ -50,6 +70,9 @@ class VehicleLimits:
     tilt_max_rad: float = radians(45.0)
     speed_m_s: float = 1.5
     accel_m_s2: float = 1.5
+    quad_drag_n_s_m: float = 0.0
+    quad_drag_quadratic_n_s2_m2: float = 0.0
+    rotor_tau_s: float = 0.0
 
     @property
     def body(self) -> Body:
@@ -62,6 +85,48 @@ class VehicleLimits:
             self.gravity_m_s2,
             self.arm_m,
             self.torque_ratio_m,
+            self.quad_drag_n_s_m,
+            self.quad_drag_quadratic_n_s2_m2,
+        )
+
+    @property
+    def shaping(self) -> Limits:
+        """What the autopilot shapes paths to, as delivered: its MIS_ parameters."""
+        margin = ROTOR_MARGIN * (self.rotor_max_n - self.rotor_min_n)
+        limited = self.rotor_max_n < inf
+        bounds = Bounds(
+            self.rotor_min_n + margin if limited else -inf,
+            self.rotor_max_n - margin if limited else inf,
+            LEAST_TENSION * self.load_mass_kg * self.gravity_m_s2,
+            cos(self.tilt_max_rad),
+            self.rotor_tau_s,
+        )
+        return Limits(
+            self.body, bounds, True, SHAPING_M, REFUSE, self.speed_m_s, self.accel_m_s2, time_optimal=False
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PathReport:
+    """How a step is flown: signals as shaped, waypoints as passed.
+
+    `distance_m` is between the flown and the asked path, at most; forces in N, `tilt_deg` of the vehicle.
+    """
+
+    item: int
+    kind: str
+    duration_s: float
+    distance_m: float
+    rotor_low_n: float
+    rotor_high_n: float
+    tension_low_n: float
+    tilt_deg: float
+
+    def __str__(self) -> str:
+        return (
+            f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s, at most "
+            f"{1e3 * self.distance_m:.1f} mm from the path asked; rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, tension from "
+            f"{self.tension_low_n:.2f} N, tilt to {self.tilt_deg:.0f} deg"
         )
 
 
@@ -80,15 +145,70 @@ class Violation:
         return self.text
 
 
-def check(mission: Mission, limits: VehicleLimits) -> list[Violation]:
-    """All that the mission asks and the vehicle cannot do, step by step; empty if it can be flown."""
+def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list[Violation]:
+    """All that the mission asks and the vehicle cannot do, step by step; empty if it can be flown.
+
+    `shaped`: signals are flown by an autopilot that shapes them; what it can fly near the asked path passes.
+    """
     found: list[Violation] = []
     for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2):
+        if isinstance(leg.step, Takeoff | Waypoint) and leg.end[2] < LEAST_HEIGHT_M:
+            text = (
+                f"items[{leg.item}] ({_kind(leg)}): the load would be carried {leg.end[2]:.2f} m above the "
+                f"ground; it must be at least {LEAST_HEIGHT_M:g} m: raise altitude_m"
+            )
+            found.append(Violation(leg.item, "height", leg.end[2], LEAST_HEIGHT_M, leg.transfer_s, text))
         if isinstance(leg.step, Signals):
-            found += _jumps(leg.item, leg.step)
+            jumps = list(_jumps(leg.item, leg.step))
+            found += jumps
+            if shaped and not jumps:
+                along = _survey(leg, limits)
+                assert along is not None
+                trouble = trouble_of(shape(leg.step, limits.body, limits.shaping.bounds), limits.shaping)
+                low = list(_judge(leg, along, limits))
+                if not trouble:
+                    found += [v for v in low if v.quantity == "height"]
+                elif low:
+                    found += low
+                else:
+                    text = f"items[{leg.item}] (signals): {trouble}"
+                    found.append(Violation(leg.item, "shaping", inf, SHAPING_M, 0.0, text))
+                continue
         along = _survey(leg, limits)
         if along is not None:
             found += _judge(leg, along, limits)
+    return found
+
+
+def paths(mission: Mission, limits: VehicleLimits) -> list[PathReport]:
+    """How each step is flown that signals describe, or that waypoints without a hold are passed in."""
+    shaping = limits.shaping
+    prepared = prepare(mission.steps, range(len(mission.steps)), shaping)
+    found = []
+    for item, made in enumerate(prepared.made):
+        if isinstance(made, Shaped):
+            kind, distance = "signals", made.distance_m
+            times = linspace(-made.lead_s, made.duration_s + made.tail_s, _REPORT_SAMPLES)
+            jets = path_jets(made, times)
+        elif isinstance(made, Passage):
+            kind, distance = "waypoint", 0.0
+            times = linspace(made.begin_s, made.end_s, _REPORT_SAMPLES)
+            jets = passage_jets(made.table, times)
+        else:
+            continue
+        along = survey_path(times, jets, 0.0, shaping.body)
+        found.append(
+            PathReport(
+                item,
+                kind,
+                float(times[-1] - times[0]),
+                distance,
+                along.rotor_low.value,
+                along.rotor_high.value,
+                along.tension_low.value,
+                degrees(along.tilt.value),
+            )
+        )
     return found
 
 

@@ -13,12 +13,14 @@ f R e3     F                   thrust force (N)
 R          R                   attitude, body FLU -> world; columns b1, b2, b3
 Omega      omega_body          body rate (rad/s), body frame
 M          moment              moment (N m), body frame, (2-35)
+D          air                 drag of the vehicle (N), -(c_1 + c_2 |x_Q'|) x_Q'
 =========  ==================  ======================================================================
 
 Newton for the load gives T q = -m_L (x_L'' + g e3), hence q and T. Newton for both together (the sum of the
 two, equivalent to (2-31) and (2-33)) gives F = (m_Q + m_L)(x_L'' + g e3) - m_Q L q''. The moment needs F'',
-thus q'''' and the sixth derivative of x_L. Model: the cable is massless, inextensible, taut and attached at
-the centre of mass. The map is singular where the load falls freely and where F is parallel to the heading.
+thus q'''' and the sixth derivative of x_L. In air the rotors give F - D in place of F. Model: the cable is
+massless, inextensible, taut and attached at the centre of mass; the air does not hold the load. The map is
+singular where the load falls freely and where F is parallel to the heading.
 """
 
 from __future__ import annotations
@@ -84,6 +86,22 @@ def unit_derivatives_4(
 
 
 @kernel
+def _against_air(v: Vec3, a: Vec3, j: Vec3, linear: float, quadratic: float) -> tuple[Vec3, Vec3, Vec3]:
+    """-D, -D', -D'' for a vehicle with velocity v, acceleration a and jerk j in air at rest."""
+    s = norm(v)
+    # s' and s'' have no limit at rest, but only products with v and s enter, which vanish there
+    r = 1.0 / s if s > 1e-9 else 0.0
+    s1 = r * dot(v, a)
+    s2 = r * (dot(a, a) + dot(v, j) - s1 * s1)
+    k = linear + quadratic * s
+    return (
+        scale(k, v),
+        axpy(quadratic * s1, v, scale(k, a)),
+        axpy(quadratic * s2, v, axpy(2.0 * quadratic * s1, a, scale(k, j))),
+    )
+
+
+@kernel
 def _attitude(F: Vec3, F1: Vec3, F2: Vec3, heading: float) -> tuple[Mat3, Vec3, Vec3]:
     """R with b3 along F and b1 as near as can be to the heading, Omega and Omega' (body frame).
 
@@ -114,11 +132,13 @@ def flat_outputs(
     cable_length: float,
     inertia: Vec3,
     gravity: float,
+    drag_linear: float = 0.0,
+    drag_quadratic: float = 0.0,
 ) -> FlatState:
     """State and inputs that fly the load's path `jet` exactly, with a constant heading (rad).
 
     The heading is counted from east to north. Masses in kg, `cable_length` in m, `inertia` the principal
-    moments (kg m^2), `gravity` in m/s^2.
+    moments (kg m^2), `gravity` in m/s^2; drag of the vehicle in N s/m and N s^2/m^2.
     """
     pull = axpy(gravity, E3, jet[2])
     u, u1, u2, u3, u4 = unit_derivatives_4(pull, jet[3], jet[4], jet[5], jet[6])
@@ -128,6 +148,11 @@ def flat_outputs(
     F = axpy(reach, u2, scale(mass, pull))
     F1 = axpy(reach, u3, scale(mass, jet[3]))
     F2 = axpy(reach, u4, scale(mass, jet[4]))
+    v_quad = axpy(cable_length, u1, jet[1])
+    a_quad = axpy(cable_length, u2, jet[2])
+    j_quad = axpy(cable_length, u3, jet[3])
+    air, air1, air2 = _against_air(v_quad, a_quad, j_quad, drag_linear, drag_quadratic)
+    F, F1, F2 = add(F, air), add(F1, air1), add(F2, air2)
     R, omega, omega_dot = _attitude(F, F1, F2, heading)
     moment = add(times(inertia, omega_dot), cross(omega, times(inertia, omega)))
     return FlatState(
@@ -135,7 +160,7 @@ def flat_outputs(
         scale(-1.0, u1),
         scale(-1.0, u2),
         axpy(cable_length, u, jet[0]),
-        axpy(cable_length, u1, jet[1]),
+        v_quad,
         R,
         omega,
         omega_dot,

@@ -69,6 +69,9 @@ class Term:
 
     The envelope is 0 before `start_s`, rises to 1 along half a cosine in `rise_s`, stays for `hold_s` (None:
     for ever), and falls back to 0 along half a cosine in `fall_s`. A rise or fall of 0 s is a jump.
+
+    `rise_90_by_s` (None: as the envelope has it) asks that nine tenths of the rise be made so many seconds
+    after `start_s` at the latest: a path that is shaped for the vehicle keeps to it. Only without factors.
     """
 
     axis: Axis
@@ -78,6 +81,7 @@ class Term:
     hold_s: float | None
     fall_s: float
     factors: tuple[Sine, ...] = ()
+    rise_90_by_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,6 +100,9 @@ class TermSpec(Spec):
     hold_s: Seconds | None = Field(None, description="time at the top; leave out with fall_s to stay there")
     fall_s: EdgeSeconds | None = Field(None, description="duration of the half-cosine fall")
     factors: list[SineSpec] = Field(default_factory=list, max_length=3)
+    rise_90_by_s: EdgeSeconds | None = Field(
+        None, description="time after start_s by which nine tenths of the rise are to be made"
+    )
 
     @model_validator(mode="after")
     def _hold_and_fall_belong_together(self) -> TermSpec:
@@ -107,11 +110,24 @@ class TermSpec(Spec):
             raise ValueError("needs hold_s and fall_s, both or neither (neither: it stays at the top)")
         return self
 
+    @model_validator(mode="after")
+    def _arrival_is_of_a_bare_edge(self) -> TermSpec:
+        if self.rise_90_by_s is not None and self.factors:
+            raise ValueError("has rise_90_by_s and factors; a wave makes no rise that could be timed")
+        return self
+
     def term(self) -> model.Term:
         factors = tuple(factor.sine() for factor in self.factors)
         fall_s = 0.0 if self.fall_s is None else self.fall_s
         return model.Term(
-            self.axis, self.amplitude_m, self.start_s, self.rise_s, self.hold_s, fall_s, factors
+            self.axis,
+            self.amplitude_m,
+            self.start_s,
+            self.rise_s,
+            self.hold_s,
+            fall_s,
+            factors,
+            self.rise_90_by_s,
         )
 
 

@@ -28,7 +28,10 @@ _COLUMNS = 9
 
 
 class Body(NamedTuple):
-    """The vehicle's numbers that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, see (2-13)."""
+    """The vehicle's numbers that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, see (2-13).
+
+    Drag of the vehicle in N s/m and N s^2/m^2.
+    """
 
     quad_mass: float
     load_mass: float
@@ -37,6 +40,8 @@ class Body(NamedTuple):
     gravity: float
     arm: float
     torque_ratio: float
+    drag_linear: float = 0.0
+    drag_quadratic: float = 0.0
 
 
 class Extreme(NamedTuple):
@@ -76,7 +81,15 @@ def _rotor_range(thrust: float, moment: Vec3, arm: float, torque_ratio: float) -
 def _fill(row: Samples, jet: Jet, body: Body) -> None:
     """One sample: the columns named above, for a heading of 0; TILT as the cosine of the angle."""
     flat = flat_outputs(
-        jet, 0.0, body.quad_mass, body.load_mass, body.cable_length, body.inertia, body.gravity
+        jet,
+        0.0,
+        body.quad_mass,
+        body.load_mass,
+        body.cable_length,
+        body.inertia,
+        body.gravity,
+        body.drag_linear,
+        body.drag_quadratic,
     )
     low, high = _rotor_range(flat.thrust, flat.moment, body.arm, body.torque_ratio)
     row[0] = norm(jet[1])
@@ -100,6 +113,24 @@ def _fill_signals(table: SignalTable, times: Samples, body: Body, rows: Samples)
 def _fill_transfer(p0: Vec3, p1: Vec3, duration: float, times: Samples, body: Body, rows: Samples) -> None:
     for i in range(times.shape[0]):
         _fill(rows[i], transfer(p0, p1, duration, times[i]), body)
+
+
+@kernel
+def _fill_jets(jets: Samples, body: Body, rows: Samples) -> None:
+    for i in range(jets.shape[1]):
+        _fill(
+            rows[i],
+            (
+                (jets[0, i, 0], jets[0, i, 1], jets[0, i, 2]),
+                (jets[1, i, 0], jets[1, i, 1], jets[1, i, 2]),
+                (jets[2, i, 0], jets[2, i, 1], jets[2, i, 2]),
+                (jets[3, i, 0], jets[3, i, 1], jets[3, i, 2]),
+                (jets[4, i, 0], jets[4, i, 1], jets[4, i, 2]),
+                (jets[5, i, 0], jets[5, i, 1], jets[5, i, 2]),
+                (jets[6, i, 0], jets[6, i, 1], jets[6, i, 2]),
+            ),
+            body,
+        )
 
 
 def _peaks(times: Samples, rows: Samples) -> Peaks:
@@ -147,6 +178,14 @@ def survey_transfer(p0: Vec3, p1: Vec3, duration: float, body: Body) -> Peaks:
     times = np.linspace(0.0, duration, _STILL_SAMPLES)
     rows = np.empty((times.size, _COLUMNS))
     _fill_transfer(p0, p1, duration, times, body, rows)
+    return _peaks(times, rows)
+
+
+def survey_path(times: Samples, jets: Samples, height: float, body: Body) -> Peaks:
+    """Extremes along a path given by samples (7, n, 3), `height` m above home."""
+    rows = np.empty((times.size, _COLUMNS))
+    _fill_jets(jets, body, rows)
+    rows[:, HEIGHT] += height
     return _peaks(times, rows)
 
 

@@ -22,7 +22,7 @@ from sitl.plant.records import Rotors, Truth
 from sitl.sensors.files import load_profile
 from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
-from sitl.sim_core import STOPPED, Readings, SimCore, settings_of
+from sitl.sim_core import SECOND_US, STOPPED, Readings, SimCore, settings_of
 from sitl.truth.files import load_truth
 from sitl.truth.parameters import apply as apply_parameters
 from sitl.truth.parameters import sim_parameters
@@ -32,6 +32,7 @@ SIMULATOR_COMPONENT = 26
 STATUS_PERIOD_US = 200_000
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
 COMMAND_TIMEOUT_US = 500_000
+LEAST_SNAP = 1e-3  # m/s, closing speed from which a cable that comes taut is told of
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 _DIVERGED = mavlink.MAVLink_statustext_message(
@@ -103,6 +104,7 @@ class HilSimulator:
         self._sensors = self._sensor_frames(core.readings)
         self._truth: bytes | None = None
         self._truth_made = False
+        self._gust_told = _ZERO
 
     @classmethod
     def build(
@@ -197,6 +199,10 @@ class HilSimulator:
     def _retune(self) -> None:
         """A parameter has changed."""
         table = self._parameters.table
+        if table["SIM_GUST_NOW"] > 0.0:
+            # the truth of this tick may be told already
+            self._parameters.tell("SIM_GUST_AT_S", (self._core.now_us + self.tick_us) / SECOND_US)
+            self._parameters.tell("SIM_GUST_NOW", 0.0)
         settings = settings_of(table)
         self._core.retune(apply_parameters(self._file_truth, table), settings)
         self._stated = stated_of(self._profile, settings.noise_scale)
@@ -284,7 +290,9 @@ class HilSimulator:
         core = self._core
         due = core.tick_count % self._truth_every == 0
         status_due = core.now_us % STATUS_PERIOD_US == 0
-        if not (due or status_due):
+        wind_due = status_due or core.pulse != self._gust_told
+        snapped = core.snap_speed > LEAST_SNAP
+        if not (due or wind_due or snapped):
             return None
         frame = self._truth_writer.frame
         frames = []
@@ -320,6 +328,13 @@ class HilSimulator:
                 now_us, mavlink.PLUMBLINE_SOURCE_TRUTH, state.rotor_force, low, high, cut
             )
             frames = [frame(vehicle), frame(load), frame(rotors)]
+        if wind_due:
+            self._gust_told = core.pulse
+            frames.append(frame(convert.wind_state_message(now_us, core.settings.wind, core.pulse)))
+        if snapped:
+            reduced_mass = truth.quad_mass * truth.load_mass / (truth.quad_mass + truth.load_mass)
+            snap = mavlink.MAVLink_cable_snap_message(now_us, core.snap_speed, reduced_mass * core.snap_speed)
+            frames.append(frame(snap))
         if status_due:
             frames.append(frame(self._status()))
             if self.diverged:

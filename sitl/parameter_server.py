@@ -37,6 +37,11 @@ class ParameterServer:
         """The messages that go out with this tick."""
         return [self._waiting.popleft() for _ in range(min(VALUES_PER_TICK, len(self._waiting)))]
 
+    def tell(self, name: str, value: float) -> None:
+        """Change a value ourselves, and say so."""
+        self.table.set(name, value)
+        self._waiting.append(self._value(name))
+
     def _set(self, name: str, value: float) -> bool:
         before = self.table[name]
         try:

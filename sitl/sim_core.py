@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Any, NamedTuple
 
-from autopilot.geometry.linear import Vec3, add
+from autopilot.geometry.linear import ZERO, Vec3, add
 from autopilot.wire.parameters import ParameterError, ParameterTable
 from sitl.plant.records import PlantState, Rotors, Truth
 from sitl.plant.step import advance, initial_state
@@ -65,6 +65,9 @@ class Settings(NamedTuple):
     wind: Vec3  # mean, ENU, m/s
     gust_std: float  # m/s, each axis
     gust_tau_s: float
+    pulse: Vec3  # ENU, m/s, added to the wind for a while
+    pulse_at_us: int  # when it begins; negative: never
+    pulse_for_us: int
 
 
 class Readings(NamedTuple):
@@ -99,6 +102,9 @@ def settings_of(table: ParameterTable) -> Settings:
         wind=(table["SIM_WIND_E"], table["SIM_WIND_N"], table["SIM_WIND_U"]),
         gust_std=table["SIM_GUST_STD"],
         gust_tau_s=table["SIM_GUST_TAU_S"],
+        pulse=(table["SIM_GUST_E"], table["SIM_GUST_N"], table["SIM_GUST_U"]),
+        pulse_at_us=round(table["SIM_GUST_AT_S"] * SECOND_US),
+        pulse_for_us=round(table["SIM_GUST_FOR_S"] * SECOND_US),
     )
 
 
@@ -113,6 +119,8 @@ class SimCore:
         self.now_us = 0
         self.command = STOPPED  # in force, N
         self.wind = settings.wind  # ENU, m/s
+        self.snap_speed = 0.0  # m/s, at which the cable came taut in the last tick; 0: it did not
+        self._pulse_at_us = settings.pulse_at_us
         self._commands: deque[tuple[int, Rotors]] = deque()  # (takes effect at, forces)
         self._seed = seed
         self._gust = gaussian(Noise(seed, Streams().gusts, 0, settings.gust_std), 1)
@@ -122,7 +130,12 @@ class SimCore:
         self.readings = self._collect()
 
     def retune(self, truth: Truth, settings: Settings) -> None:
-        """Go on under another truth and other settings; tick, latency and cable length stay as they were."""
+        """Go on under another truth and other settings; tick, latency and cable length stay as they were.
+
+        A gust pulse whose time is moved to a tick that has begun does not blow.
+        """
+        if settings.pulse_at_us != self.settings.pulse_at_us:
+            self._pulse_at_us = settings.pulse_at_us if settings.pulse_at_us > self.now_us else -1
         later_us = settings.actuator_delay_us - self.settings.actuator_delay_us
         self._commands = deque((effect_us + later_us, command) for effect_us, command in self._commands)
         self.truth = truth
@@ -141,6 +154,7 @@ class SimCore:
         commands = self._commands
         commands.append((now_us + self.settings.actuator_delay_us, command))
         wind = self.wind = self._next_wind()
+        snap_speed = 0.0
         while now_us < end_us:
             while commands and commands[0][0] <= now_us:
                 self.command = commands.popleft()[1]
@@ -150,22 +164,33 @@ class SimCore:
             for channel in self._fitted:
                 stop_us = min(stop_us, channel.due_us)
             self.state = advance(self.state, self.truth, self.command, wind, (stop_us - now_us) / SECOND_US)
+            snap_speed = max(snap_speed, self.state.snap_speed)
             now_us = stop_us
             self._measure(now_us)
+        self.snap_speed = snap_speed
         self.now_us = end_us
         self.tick_count += 1
         self.readings = self._collect()
         return self.readings
 
+    @property
+    def pulse(self) -> Vec3:
+        """The gust pulse that blows from this tick to the next; it begins and ends at the first tick that is
+        not before its time."""
+        begin_us, settings = self._pulse_at_us, self.settings
+        blows = begin_us >= 0 and begin_us <= self.now_us < begin_us + settings.pulse_for_us
+        return settings.pulse if blows else ZERO
+
     def _next_wind(self) -> Vec3:
-        """Wind of this tick: the mean and a gust."""
+        """Wind of this tick: the mean, the pulse and a random gust."""
         settings = self.settings
+        steady = add(settings.wind, self.pulse)
         if settings.gust_std == 0.0:
-            return settings.wind
+            return steady
         normals = gaussian(Noise(self._seed, Streams().gusts, self.tick_count, 1.0), 0)
         tick_s = settings.tick_us / SECOND_US
         self._gust = gust(self._gust, settings.gust_std, settings.gust_tau_s, tick_s, normals)
-        return add(settings.wind, self._gust)
+        return add(steady, self._gust)
 
     def _measure(self, now_us: int) -> None:
         for channel in self._fitted:

@@ -7,12 +7,13 @@
 | e_a, e_j     | e_a, e_j           | I     | m/s^2, m/s^3  | e_v', e_v'' |
 | x_d .. x_d'''' | jet[0] .. jet[4] | I     | m .. m/s^4    | (3-12)   |
 | k_x, k_v     | k_x, k_v           | I     | N/m, N s/m    | (3-43)   |
+| e_i, k_i     | e_i, k_i           | I     | m s, N/m/s    | e_i' = e_x |
 | s            | s                  |       | 1/s^2         | q' . q'  |
 | q_c          | q_c                | I     |               | (3-42)   |
 
-    A   = -k_x e_x - k_v e_v + m (x_d'' + g e_3) + m_Q L s q
-    A'  = -k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
-    A'' = -k_x e_a - k_v e_j + m x_d''''         + m_Q L (s'' q + 2 s' q' + s q'')
+    A   = -k_i e_i - k_x e_x - k_v e_v + m (x_d'' + g e_3) + m_Q L s q
+    A'  = -k_i e_x - k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
+    A'' = -k_i e_v - k_x e_a - k_v e_j + m x_d''''         + m_Q L (s'' q + 2 s' q' + s q'')
 
 e_a = x_L'' - x_d'' and e_j = x_L''' - x_d''' are what the model says of the load (`load_motion`), not
 differences of what was measured; s' = 2 q'.q'', s'' = 2 (q''.q'' + q'.q'''). The derivatives of q_c = -A/|A|
@@ -48,9 +49,19 @@ class PositionJet(NamedTuple):
 
 @kernel
 def position_jet(
-    state: State, motion: LoadMotion, jet: Jet, k_x: Vec3, k_v: Vec3, vehicle: Vehicle
+    state: State,
+    motion: LoadMotion,
+    jet: Jet,
+    e_i: Vec3,
+    k_i: Vec3,
+    k_x: Vec3,
+    k_v: Vec3,
+    vehicle: Vehicle,
 ) -> PositionJet:
-    """A, A', A'' along the motion of the model; the gains are diagonals in the world frame."""
+    """A, A', A'' along the motion of the model; the gains are diagonals in the world frame.
+
+    With k_i = 0 it is (3-43).
+    """
     q, q_dot = state.q_cable, state.q_cable_dot
     at = load_position_force(
         state.x_load,
@@ -76,9 +87,16 @@ def position_jet(
     s_ddot = 2.0 * (dot(motion.q_ddot, motion.q_ddot) + dot(q_dot, motion.q_dddot))
     swing_dot = add(scale(s_dot, q), scale(s, q_dot))
     swing_ddot = add3(scale(s_ddot, q), scale(2.0 * s_dot, q_dot), scale(s, motion.q_ddot))
-    A_dot = sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), add(times(k_x, at.e_v), times(k_v, e_a)))
-    A_ddot = sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), add(times(k_x, e_a), times(k_v, e_j)))
-    return PositionJet(at.A, A_dot, A_ddot, at.e_x, at.e_v)
+    asked, asked_dot = scale(mass, jet[3]), scale(mass, jet[4])
+    closed_dot = add3(times(k_i, at.e_x), times(k_x, at.e_v), times(k_v, e_a))
+    closed_ddot = add3(times(k_i, at.e_v), times(k_x, e_a), times(k_v, e_j))
+    return PositionJet(
+        sub(at.A, times(k_i, e_i)),
+        sub(add(asked, scale(reach, swing_dot)), closed_dot),
+        sub(add(asked_dot, scale(reach, swing_ddot)), closed_ddot),
+        at.e_x,
+        at.e_v,
+    )
 
 
 @kernel

@@ -1,57 +1,75 @@
 """The law `plumbline`: the cascade of the thesis with exact derivatives in place of its command filters.
 
     x_d .. x_d'''' --> A, A', A'' (3-43) -> q_c, q_c', q_c'' (3-42) -> F (3-31) -> R_c (3-27) -+-> M (3-36),
-    x_d'' .. x_d^(6) -> F_d, F_d', F_d'' by flatness, (F - F_d)', (F - F_d)'' by filter -------+   f (3-35)
+    the same a moment before and after, along the motion of the model --> F', F'' --------------+   f (3-35)
 
 | symbol         | code name     | value    | unit       | equation |
 |----------------|---------------|----------|------------|----------|
-| k_R, k_Omega   | k_R, k_Omega  | 0.9, 0.1 | N m, N m s | (3-21)   |
-| k_q, k_w       | k_q, k_omega  | 3.9, 2   | N, N s     | (3-33)   |
-| k_x, k_v       | k_x, k_v      | 6, 2.75  | N/m, N s/m | (3-43)   |
+| k_R, k_Omega   | k_R, k_Omega  | `design` | N m, N m s | (3-21)   |
+| k_q, k_w       | k_q, k_omega  | `design` | N, N s     | (3-33)   |
+| k_x, k_v       | k_x, k_v      | `design` | N/m, N s/m | (3-43)   |
+| e_i, k_i       | integral, k_i | `design` | m s, N/m/s | e_i' = e_x |
 | F              | F             |          | N          | (3-31)   |
 | F_d            | F_d           |          | N          | m (x_d'' + g e_3) - m_Q L q_d'' |
-| omega_n, zeta  | force         | 25, 0.98 | rad/s      | (4-3)    |
 | f, f'          | thrust, thrust_rate |    | N, N/s     | (3-35)   |
-| D              | air           | `PLB_DRAG`, `PLB_DRAG_2` | N | drag of the vehicle |
+| D              | air           | `PLB_DRAG`, `PLB_DRAG_2` | N | drag and wind on the vehicle |
 
 What the thesis filters is computed here:
 
 * e_x, e_v and all that follows are taken from the reference itself, with its derivatives up to the sixth.
 * q_c' and q_c'' are those of (3-42) along the motion of the model under the thrust that the rotors give now
   (`load_motion`, `direction_jet`), feedback and all.
-* Of F, whose derivatives would need those of the moment, the part F_d that the reference alone asks for has
-  exact derivatives by flatness. Only the rest, which vanishes with the errors, is passed through a command
-  filter (4-2) for its two; F itself is not filtered. R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
-* The rotors are asked for F - D, so that the drag D of the vehicle, as far as it is known, does not count.
+* F' and F'' are differences of F along the motion of the model, under the thrust and moment that the rotors
+  give now; of the thrust's second derivative only what the reference asks for is counted. Near hover F
+  depends on load and cable alone, F' on the attitude, F'' on the body rate besides: so the poles are those of
+  the three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
+* The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
+  count.
 * f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
 
 Memory comes in and goes out. `thrust` of `load_position` is what the rotors give at this instant, which the
-caller knows better than the law: `autopilot.rotor_lag`.
+caller knows better than the law: `autopilot.actuation`.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.control.command_filter import (
-    FilterConstants,
-    FilterState,
-    filter_acceleration,
-    filter_start,
-    filter_step,
+from autopilot.control.direction_jet import PositionJet, direction_jet, position_jet
+from autopilot.control.load_attitude import (
+    DirectionCommand,
+    DirectionResult,
+    load_attitude_force,
+    normal_force_tracking,
+    thrust_along,
 )
-from autopilot.control.direction_jet import direction_jet, position_jet
-from autopilot.control.load_attitude import load_attitude_force, normal_force_tracking, thrust_along
-from autopilot.control.load_motion import Drag, air_force, load_motion
+from autopilot.control.load_motion import Drag, LoadMotion, air_force, load_motion
 from autopilot.control.quad_attitude import AttitudeCommand, attitude_from_axes, attitude_moment
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, apply, axpy, column, cross, dot, norm, scale, sub
+from autopilot.geometry.linear import (
+    Vec3,
+    add,
+    add3,
+    apply,
+    axpy,
+    column,
+    cross,
+    dot,
+    mul,
+    norm,
+    scale,
+    sub,
+    times,
+)
+from autopilot.geometry.s2 import normalise, unit_derivatives
+from autopilot.geometry.so3 import exp
 from missions.flatness import unit_derivatives_4
 
-OMEGA_FORCE = 25.0  # rad/s
-ZETA = 0.98
+STEP = 2e-3  # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
+
+GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask for
 
 # N; a shorter force has no direction to follow, and a load falling freely no cable direction
 _LEAST_FORCE = 1e-3
@@ -68,14 +86,23 @@ class PlumblineGains(NamedTuple):
     k_omega: float  # N s
     k_x: Vec3  # N/m
     k_v: Vec3  # N s/m
+    k_i: Vec3  # N/m/s
 
 
 class PlumblineMemory(NamedTuple):
     """All that load position remembers from one tick to the next."""
 
-    force: FilterState  # of F - F_d
     thrust_rate: float  # f', N/s
-    begun: float  # 0.0: nothing is remembered yet
+    integral: Vec3  # e_i, of e_x, m s
+
+
+class WantedForce(NamedTuple):
+    """The force that the vehicle should exert, and what it is made from."""
+
+    F: Vec3  # N, world
+    position: PositionJet
+    direction: DirectionResult
+    q_c: DirectionCommand
 
 
 PLUMBLINE_GAINS = PlumblineGains(
@@ -85,14 +112,14 @@ PLUMBLINE_GAINS = PlumblineGains(
     k_omega=2.0,
     k_x=(6.0, 6.0, 6.0),
     k_v=(2.75, 2.75, 2.75),
+    k_i=(0.0, 0.0, 0.0),
 )
 
 
 @kernel
 def start() -> PlumblineMemory:
-    """Memory of a law that begins now: its first tick starts the filter at the force of that tick."""
-    zero: Vec3 = (0.0, 0.0, 0.0)
-    return PlumblineMemory(filter_start(zero, zero), 0.0, 0.0)
+    """Memory of a law that begins now: the thrust is taken for steady."""
+    return PlumblineMemory(0.0, (0.0, 0.0, 0.0))
 
 
 @kernel
@@ -127,24 +154,55 @@ def commanded_attitude(F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: St
 
 
 @kernel
-def load_position(
-    memory: PlumblineMemory,
-    state: State,
-    reference: Reference,
-    thrust: float,
-    gains: PlumblineGains,
-    force_filter: FilterConstants,
-    drag: Drag,
-    vehicle: Vehicle,
-) -> tuple[PlumblineMemory, Command]:
-    """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
+def shifted_jet(jet: Jet, h: float) -> Jet:
+    """The reference h seconds later, as far as its six derivatives say."""
+    h2, h3, h4 = 0.5 * h * h, h * h * h / 6.0, h * h * h * h / 24.0
+    x, v, a, j, s, c, p = jet
+    return (
+        add(add3(x, scale(h, v), scale(h2, a)), add(scale(h3, j), scale(h4, s))),
+        add(add3(v, scale(h, a), scale(h2, j)), add(scale(h3, s), scale(h4, c))),
+        add(add3(a, scale(h, j), scale(h2, s)), add(scale(h3, c), scale(h4, p))),
+        add(add3(j, scale(h, s), scale(h2, c)), scale(h3, p)),
+        add3(s, scale(h, c), scale(h2, p)),
+        axpy(h, p, c),
+        p,
+    )
 
-    `thrust`, N: what the rotors give at this instant.
-    """
-    jet = reference.jet
-    air = air_force(state.v_quad, drag)
-    motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
-    position = position_jet(state, motion, jet, gains.k_x, gains.k_v, vehicle)
+
+@kernel
+def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, vehicle: Vehicle) -> State:
+    """The state h seconds later along the motion of the model; `turning` is Omega', rad/s^2, body."""
+    h2 = 0.5 * h * h
+    q = normalise(add3(state.q_cable, scale(h, state.q_cable_dot), scale(h2, motion.q_ddot)))
+    q_dot = add3(state.q_cable_dot, scale(h, motion.q_ddot), scale(h2, motion.q_dddot))
+    x = add3(state.x_load, scale(h, state.v_load), scale(h2, motion.a_load))
+    v = add3(state.v_load, scale(h, motion.a_load), scale(h2, motion.j_load))
+    L = vehicle.cable_length
+    return State(
+        x,
+        v,
+        q,
+        q_dot,
+        sub(state.x_quad, scale(L, sub(q, state.q_cable))),
+        add(state.v_quad, sub(sub(v, state.v_load), scale(L, sub(q_dot, state.q_cable_dot)))),
+        mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, turning)))),
+        axpy(h, turning, state.omega_body),
+        state.a_quad,
+    )
+
+
+@kernel
+def wanted_force(
+    state: State,
+    motion: LoadMotion,
+    air: Vec3,
+    jet: Jet,
+    e_i: Vec3,
+    gains: PlumblineGains,
+    vehicle: Vehicle,
+) -> WantedForce:
+    """F of (3-31), drag and wind made up for, and what it is made from."""
+    position = position_jet(state, motion, jet, e_i, gains.k_i, gains.k_x, gains.k_v, vehicle)
     q_c = direction_jet(position, state)
     direction = load_attitude_force(
         state.q_cable,
@@ -156,14 +214,72 @@ def load_position(
         vehicle.quad_mass,
         vehicle.cable_length,
     )
-    F = sub(direction.F, air)
+    return WantedForce(sub(direction.F, air), position, direction, q_c)
 
+
+@kernel
+def force_beside(
+    state: State,
+    motion: LoadMotion,
+    turning: Vec3,
+    rotors: Vec3,
+    jet: Jet,
+    e_i: Vec3,
+    h: float,
+    gains: PlumblineGains,
+    drag: Drag,
+    push: Vec3,
+    vehicle: Vehicle,
+) -> Vec3:
+    """F, N, as it will be h seconds later; `rotors` are f, f', f''."""
+    f, f_dot, f_ddot = rotors
+    then = shifted_state(state, motion, turning, h, vehicle)
+    air = add(air_force(then.v_quad, drag), push)
+    thrust = f + h * f_dot + 0.5 * h * h * f_ddot
+    moved = load_motion(then, thrust, f_dot + h * f_ddot, air, vehicle)
+    e_x, e_v = sub(state.x_load, jet[0]), sub(state.v_load, jet[1])
+    summed = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
+    return wanted_force(then, moved, air, shifted_jet(jet, h), summed, gains, vehicle).F
+
+
+@kernel
+def load_position(
+    memory: PlumblineMemory,
+    state: State,
+    reference: Reference,
+    thrust: float,
+    moment: Vec3,
+    gains: PlumblineGains,
+    drag: Drag,
+    push: Vec3,
+    period: float,
+    vehicle: Vehicle,
+) -> tuple[PlumblineMemory, Command]:
+    """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
+
+    `thrust`, N, and `moment`, N m: what the rotors give at this instant; `push`, N, world: what the air does
+    to the vehicle besides drag in still air; `period`, s, is that of the law.
+    """
+    jet = reference.jet
+    air = add(air_force(state.v_quad, drag), push)
+    motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
+    wanted = wanted_force(state, motion, air, jet, memory.integral, gains, vehicle)
+    F, position, direction = wanted.F, wanted.position, wanted.direction
+
+    J, W = vehicle.inertia, state.omega_body
+    torque = sub(moment, cross(W, times(J, W)))
+    turning: Vec3 = (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
     F_d, F_d_dot, F_d_ddot = flat_force(jet, vehicle)
-    rest = sub(F, F_d)
-    zero: Vec3 = (0.0, 0.0, 0.0)
-    force = filter_step(memory.force, rest, force_filter) if memory.begun != 0.0 else filter_start(rest, zero)
-    F_dot = add(F_d_dot, force.x2)
-    F_ddot = add(F_d_ddot, filter_acceleration(force, force_filter))
+    u, u_dot, _ = unit_derivatives(F_d, F_d_dot, F_d_ddot)
+    rotors: Vec3 = (thrust, memory.thrust_rate, dot(u, F_d_ddot) + dot(u_dot, F_d_dot))
+    F_after = force_beside(
+        state, motion, turning, rotors, jet, memory.integral, STEP, gains, drag, push, vehicle
+    )
+    F_before = force_beside(
+        state, motion, turning, rotors, jet, memory.integral, -STEP, gains, drag, push, vehicle
+    )
+    F_dot = scale(0.5 / STEP, sub(F_after, F_before))
+    F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
 
     attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state)
     result = attitude_moment(
@@ -182,7 +298,12 @@ def load_position(
         result.e_Omega,
         result.psi_R,
         direction.psi_q,
-        q_c.q_c,
+        wanted.q_c.q_c,
         attitude.R_c,
     )
-    return PlumblineMemory(force, dot(F_dot, b3) + dot(F, b3_dot), 1.0), command
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    integral = axpy(period, position.e_x, memory.integral)
+    held = norm(times(gains.k_i, integral))
+    if held > GREATEST_HELD * weight:
+        integral = scale(GREATEST_HELD * weight / held, integral)
+    return PlumblineMemory(dot(F_dot, b3) + dot(F, b3_dot), integral), command

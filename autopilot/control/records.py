@@ -39,6 +39,7 @@ class State(NamedTuple):
     v_quad: Vec3  # m/s
     R: Mat3  # body to world
     omega_body: Vec3  # Omega, rad/s, body
+    a_quad: Vec3 = (0.0, 0.0, 0.0)  # x_Q'', m/s^2, by the accelerometer
 
 
 class Reference(NamedTuple):

@@ -1,13 +1,27 @@
-"""Correction by a load tracker: position of the load, hence direction of the cable, and their rates."""
+"""Correction by a load tracker: position of the load, hence direction, rate and length of a taut cable."""
 
 from __future__ import annotations
 
-from autopilot.estimation.correct_pose import REJECTIONS_BEFORE_RESET, gate
-from autopilot.estimation.history import look_back, renew, shift
+from autopilot.estimation.correct_pose import REJECTIONS_BEFORE_RESET
+from autopilot.estimation.correction import (
+    Past,
+    add_direction,
+    heard,
+    inject,
+    load_at,
+    look_back,
+    position_row,
+    velocity_row,
+    with_load,
+)
+from autopilot.estimation.covariance import absorb, begin, spread
 from autopilot.estimation.records import (
-    Q_CABLE,
-    X_LOAD,
-    X_QUAD,
+    DIRECTION,
+    LENGTH,
+    LOAD,
+    RATE,
+    TRACKED_SIZE,
+    TRACKER,
     Covariance2,
     EstimatorState,
     EstimatorTuning,
@@ -15,9 +29,13 @@ from autopilot.estimation.records import (
     LoadEstimate,
     LoadReading,
 )
+from autopilot.estimation.tautness import SLACK_BELOW, slacken
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import add, axpy, norm, scale, sub
-from autopilot.geometry.s2 import normalise, tangent
+from autopilot.geometry.linear import Vec3, add, axpy, dot, norm, scale, sub
+
+SLACK_FROM = 0.8  # share of the cable length below which a short distance is an outlier, not a slack cable
+SLACK_READINGS = 3.0  # that in a row must show a short distance
+REACH = 1.5  # cable lengths from the vehicle beyond which no load is believed
 
 
 @kernel
@@ -34,26 +52,95 @@ def update2(
 
 
 @kernel
-def refuse_load(estimate: LoadEstimate) -> LoadEstimate:
-    """The load with one more reading refused."""
+def placed(load: LoadEstimate, x_load: Vec3, v_load: Vec3, cov: Covariance2, age_s: float) -> LoadEstimate:
+    """A tracked load where its own filter has it; a slack cable's direction follows with the next prediction."""
     return LoadEstimate(
-        estimate.x_load,
-        estimate.v_load,
-        estimate.q_cable,
-        estimate.q_cable_dot,
-        estimate.covariance,
-        estimate.cable_covariance,
-        estimate.taut,
-        estimate.tension,
-        estimate.age_s,
-        estimate.rejected + 1.0,
+        x_load,
+        v_load,
+        load.q_cable,
+        load.q_cable_dot,
+        load.across,
+        load.length,
+        cov,
+        load.taut,
+        load.tension,
+        load.pull,
+        load.pulled_s,
+        age_s,
+        0.0,
+        TRACKER,
     )
 
 
 @kernel
-def with_load(state: EstimatorState, load: LoadEstimate, resets: float) -> EstimatorState:
-    """The state with its load replaced."""
-    return EstimatorState(state.time_s, state.vehicle, load, state.last_imu, resets, state.head)
+def start_load(
+    state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The load by itself where the reading has it; a cable long enough is found taut at the next prediction."""
+    measured = reading.velocity_std >= 0.0
+    age = reading.age_s
+    v_load = reading.v_load if measured else (0.0, 0.0, 0.0)
+    position_var = reading.position_std * reading.position_std
+    rate_var = reading.velocity_std * reading.velocity_std if measured else 1.0
+    cov = (position_var + age * age * rate_var, age * rate_var, rate_var)
+    load = slacken(state.load, history, position_var, rate_var)
+    return with_load(state, placed(load, reading.x_load, v_load, cov, age), state.resets + 1.0)
+
+
+@kernel
+def refuse_load(
+    state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """One more reading refused; after many the load starts anew, but never far beyond its cable's end."""
+    load = state.load
+    distance = norm(sub(reading.x_load, state.vehicle.x_quad))
+    if load.rejected + 1.0 >= REJECTIONS_BEFORE_RESET and distance < REACH * tuning.cable_length:
+        return start_load(state, history, reading, tuning)
+    return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, TRACKER), state.resets)
+
+
+@kernel
+def correct_slack(
+    state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The slack load's own filter: the axes alike, a reading of then is position - age velocity of now."""
+    load, age = state.load, reading.age_s
+    position_var = reading.position_std * reading.position_std
+    innovation = sub(reading.x_load, axpy(-age, load.v_load, load.x_load))
+    aa, ab, bb = load.covariance
+    past_var = aa - 2.0 * age * ab + age * age * bb
+    limit = 3.0 * tuning.gate_sigma * tuning.gate_sigma * (past_var + position_var)
+    if not dot(innovation, innovation) <= limit:
+        return refuse_load(state, history, reading, tuning)
+    ka, kb, cov = update2(load.covariance, 1.0, -age, position_var)
+    x_load = add(load.x_load, scale(ka, innovation))
+    v_load = axpy(kb, innovation, load.v_load)
+    if reading.velocity_std >= 0.0:
+        difference = sub(reading.v_load, v_load)
+        ka, kb, cov = update2(cov, 0.0, 1.0, reading.velocity_std * reading.velocity_std)
+        x_load = axpy(ka, difference, x_load)
+        v_load = axpy(kb, difference, v_load)
+    return with_load(state, placed(load, x_load, v_load, cov, age), state.resets)
+
+
+@kernel
+def load_position_row(history: History, past: Past, length: float, i: int, n: int) -> None:
+    """Row of component i of x_Q + L q then."""
+    position_row(history, past, i, n)
+    add_direction(history, past, length * past.across[i], length * past.along[i])
+    history.row[LENGTH] = past.q_cable[i]
+
+
+@kernel
+def load_velocity_row(history: History, past: Past, length: float, i: int, n: int) -> None:
+    """Row of component i of v_Q + L q' then: turning the direction by (a, b) leans q' by -(q' . turn) q."""
+    velocity_row(history, past, i, n)
+    row, q = history.row, past.q_cable
+    row[RATE] = length * past.across[i]
+    row[RATE + 1] = length * past.along[i]
+    row[DIRECTION] = -length * dot(past.across, past.q_cable_dot) * q[i]
+    row[DIRECTION + 1] = -length * dot(past.along, past.q_cable_dot) * q[i]
+    row[LENGTH] = past.q_cable_dot[i]
 
 
 @kernel
@@ -62,88 +149,41 @@ def correct_load(
 ) -> EstimatorState:
     """The state after the reading; `history` is corrected along with it.
 
-    The first reading starts the load; readings refused many times in a row start it anew.
+    The first reading starts the load; readings refused many times in a row start it anew, and a few that lie
+    nearer than the cable is long end a taut cable.
     """
-    load, vehicle = state.load, state.vehicle
-    since = state.time_s - reading.age_s
-    at = look_back(state.head, history, since, X_QUAD)
-    separation = sub(reading.x_load, (at[0], at[1], at[2]))
-    # on the ground the vehicle may stand beside the load: keep the direction's noise finite
-    distance = max(norm(separation), 0.1 * tuning.cable_length)
-    direction = normalise(separation)
+    state = heard(state, reading.age_s, TRACKED_SIZE)
+    load, n = state.load, state.size
+    if load.source != TRACKER:
+        return start_load(state, history, reading, tuning)
+    if load.taut == 0.0:
+        return correct_slack(state, history, reading, tuning)
+    past = look_back(state, history, tuning, reading.age_s)
+    innovation = sub(reading.x_load, axpy(load.length, past.q_cable, past.x_quad))
     position_var = reading.position_std * reading.position_std
+    off = 0.0
+    for i in range(3):
+        load_position_row(history, past, load.length, i, n)
+        off += innovation[i] * innovation[i] / (spread(history, n) + position_var)
+    distance = norm(sub(reading.x_load, past.x_quad)) / tuning.cable_length
+    short = SLACK_FROM < distance < SLACK_BELOW
+    if not off <= 3.0 * tuning.gate_sigma * tuning.gate_sigma or short:
+        if short and load.rejected + 1.0 >= SLACK_READINGS:
+            return start_load(state, history, reading, tuning)
+        return refuse_load(state, history, reading, tuning)
+    begin(history)
+    nis = 0.0
     velocity_var = reading.velocity_std * reading.velocity_std
-    measured = reading.velocity_std >= 0.0
-
-    at = look_back(state.head, history, since, X_LOAD)
-    innovation = sub(reading.x_load, (at[0], at[1], at[2]))
-    starting = load.age_s == float("inf")
-    age = reading.age_s
-    aa, ab, bb = load.covariance
-    past_var = aa - 2.0 * age * ab + age * age * bb
-    if not starting and not gate(innovation, past_var + position_var, tuning.gate_sigma):
-        if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
-            return with_load(state, refuse_load(load), state.resets)
-        starting = True
-    if starting:
-        v_load = reading.v_load if measured else (0.0, 0.0, 0.0)
-        rate_var = velocity_var if measured else 1.0
-        turn_var = rate_var / (distance * distance)
-        direction_var = position_var / (distance * distance)
-        started = LoadEstimate(
-            reading.x_load,
-            v_load,
-            direction,
-            tangent(direction, scale(1.0 / distance, sub(v_load, vehicle.v_quad))),
-            (position_var + age * age * rate_var, age * rate_var, rate_var),
-            (direction_var + age * age * turn_var, age * turn_var, turn_var),
-            load.taut,
-            0.0,
-            reading.age_s,
-            0.0,
-        )
-        renew(history, X_LOAD, reading.x_load)
-        renew(history, Q_CABLE, direction)
-        return with_load(state, started, state.resets + 1.0)
-
-    ka, kb, cov_load = update2(load.covariance, 1.0, -age, position_var)
-    moved, faster = scale(ka, innovation), scale(kb, innovation)
-    x_load = add(load.x_load, moved)
-    v_load = axpy(kb, innovation, load.v_load)
-
-    at = look_back(state.head, history, since, Q_CABLE)
-    past_q = normalise((at[0], at[1], at[2]))
-    off = tangent(past_q, direction)
-    direction_var = (position_var + vehicle.covariance[0]) / (distance * distance)
-    ka, kb, cov_cable = update2(load.cable_covariance, 1.0, -age, direction_var)
-    turned, turning = scale(ka, off), scale(kb, off)
-    q_cable = normalise(add(load.q_cable, turned))
-    q_cable_dot = tangent(q_cable, axpy(kb, off, load.q_cable_dot))
-    if measured:
-        difference = sub(reading.v_load, v_load)
-        ka, kb, cov_load = update2(cov_load, 0.0, 1.0, velocity_var)
-        moved, faster = axpy(ka, difference, moved), axpy(kb, difference, faster)
-        x_load = axpy(ka, difference, x_load)
-        v_load = axpy(kb, difference, v_load)
-        rate = tangent(q_cable, scale(1.0 / distance, sub(reading.v_load, vehicle.v_quad)))
-        off = sub(rate, q_cable_dot)
-        rate_var = (velocity_var + vehicle.covariance[3]) / (distance * distance)
-        ka, kb, cov_cable = update2(cov_cable, 0.0, 1.0, rate_var)
-        turned, turning = axpy(ka, off, turned), axpy(kb, off, turning)
-        q_cable = normalise(axpy(ka, off, q_cable))
-        q_cable_dot = tangent(q_cable, axpy(kb, off, q_cable_dot))
-    shift(state.head, history, since, X_LOAD, moved, faster)
-    shift(state.head, history, since, Q_CABLE, turned, turning)
-    corrected = LoadEstimate(
-        x_load,
-        v_load,
-        q_cable,
-        q_cable_dot,
-        cov_load,
-        cov_cable,
-        load.taut,
-        load.tension,
-        reading.age_s,
-        0.0,
-    )
-    return with_load(state, corrected, state.resets)
+    difference = sub(reading.v_load, axpy(load.length, past.q_cable_dot, past.v_quad))
+    for k in range(6 if reading.velocity_std >= 0.0 else 3):
+        if k < 3:
+            load_position_row(history, past, load.length, k, n)
+            off, variance = innovation[k], position_var
+        else:
+            load_velocity_row(history, past, load.length, k - 3, n)
+            off, variance = difference[k - 3], velocity_var
+        nis += absorb(history, off, variance, n)
+    history.consistency[LOAD, 0] += 1.0
+    history.consistency[LOAD, 1] += nis
+    state = inject(state, history)
+    return with_load(state, load_at(state.load, reading.age_s, 0.0, TRACKER), state.resets)

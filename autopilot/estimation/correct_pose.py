@@ -2,14 +2,36 @@
 
 from __future__ import annotations
 
-from autopilot.estimation.history import look_back, renew, shift, turn
+from autopilot.estimation.correction import (
+    attitude_row,
+    heard,
+    inject,
+    look_back,
+    moved_load,
+    position_row,
+    vehicle_at,
+    velocity_row,
+    with_load,
+    with_vehicle,
+)
+from autopilot.estimation.covariance import absorb, begin, forget, spread
+from autopilot.estimation.history import renew
 from autopilot.estimation.records import (
-    ACCEL_BIAS_STD,
-    GYRO_BIAS_STD,
-    HISTORY_LENGTH,
+    ACCEL_BIAS,
+    ATTITUDE,
+    BAROMETER,
+    GNSS,
+    GYRO_BIAS,
+    HEADING,
+    MOUNTING,
+    POSE,
+    POSITION,
     QUAT,
+    TRACKED_SIZE,
+    TRACKER,
+    V_QUAD,
+    VELOCITY,
     X_QUAD,
-    Covariance3,
     EstimatorState,
     EstimatorTuning,
     History,
@@ -17,97 +39,75 @@ from autopilot.estimation.records import (
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, apply_transposed, axpy, dot, scale, sub
-from autopilot.geometry.so3 import (
-    quat_conjugate,
-    quat_exp,
-    quat_log,
-    quat_multiply,
-    quat_normalise,
-    rotation_from_quat,
-)
+from autopilot.geometry.linear import IDENTITY as AXES
+from autopilot.geometry.linear import ZERO, sub
+from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 
-REJECTIONS_BEFORE_RESET = 20.0
+REJECTIONS_BEFORE_RESET = 50.0
+STARTING_SPEED_STD = 1.0  # m/s, where no velocity is measured
+UNKNOWN_HEIGHT_STD = 1.0  # m, of the barometer's zero
 
 
 @kernel
-def gate(innovation: Vec3, variance: float, sigma: float) -> bool:
-    """Whether the innovation of three axes lies within `sigma` standard deviations of each."""
-    return dot(innovation, innovation) <= 3.0 * sigma * sigma * variance
+def spread_out(
+    history: History, position_var: float, velocity_var: float, attitude_var: float, tuning: EstimatorTuning
+) -> None:
+    """The covariance of a vehicle that starts: what is stated, and nothing in common with anything else."""
+    P = history.covariance
+    forget(P, POSITION, 15)
+    for i in range(3):
+        P[POSITION + i, POSITION + i] = position_var
+        P[VELOCITY + i, VELOCITY + i] = velocity_var
+        P[ATTITUDE + i, ATTITUDE + i] = attitude_var
+        P[GYRO_BIAS + i, GYRO_BIAS + i] = tuning.gyro_bias_std * tuning.gyro_bias_std
+        P[ACCEL_BIAS + i, ACCEL_BIAS + i] = tuning.accel_bias_std * tuning.accel_bias_std
+    if P[MOUNTING, MOUNTING] == 0.0:
+        P[MOUNTING, MOUNTING] = tuning.mounting_std * tuning.mounting_std
+        P[MOUNTING + 1, MOUNTING + 1] = P[MOUNTING, MOUNTING]
+        P[HEADING, HEADING] = tuning.magnetic_bias * tuning.magnetic_bias
+        P[BAROMETER, BAROMETER] = UNKNOWN_HEIGHT_STD * UNKNOWN_HEIGHT_STD
+        for i in range(3):
+            P[GNSS + i, GNSS + i] = 1.0
 
 
 @kernel
-def start_vehicle(vehicle: VehicleEstimate, pose: PoseReading) -> VehicleEstimate:
+def start_by_pose(
+    state: EstimatorState, history: History, pose: PoseReading, tuning: EstimatorTuning
+) -> EstimatorState:
     """The vehicle set to the reading, with the reading's own uncertainty and that of its age."""
+    old, age = state.vehicle, pose.age_s
     measured = pose.velocity_std >= 0.0
-    age = pose.age_s
-    position_var = pose.position_std * pose.position_std
-    velocity_var = pose.velocity_std * pose.velocity_std if measured else 1.0
-    return VehicleEstimate(
+    velocity_var = pose.velocity_std * pose.velocity_std if measured else STARTING_SPEED_STD
+    spread_out(
+        history,
+        pose.position_std * pose.position_std + age * age * velocity_var,
+        velocity_var,
+        pose.attitude_std * pose.attitude_std,
+        tuning,
+    )
+    P = history.covariance
+    for i in range(3):
+        P[POSITION + i, VELOCITY + i] = age * velocity_var
+        P[VELOCITY + i, POSITION + i] = age * velocity_var
+    vehicle = VehicleEstimate(
         pose.x_quad,
-        pose.v_quad if measured else (0.0, 0.0, 0.0),
+        pose.v_quad if measured else ZERO,
         pose.quat_wxyz,
-        vehicle.omega_body,
-        vehicle.gyro_bias,
-        vehicle.accel_bias,
-        vehicle.accel_quad,
-        (
-            position_var + age * age * velocity_var,
-            age * velocity_var,
-            0.0,
-            velocity_var,
-            0.0,
-            ACCEL_BIAS_STD * ACCEL_BIAS_STD,
-        ),
-        (pose.attitude_std * pose.attitude_std, 0.0, GYRO_BIAS_STD * GYRO_BIAS_STD),
-        pose.age_s,
+        old.omega_body,
+        old.gyro_bias,
+        old.accel_bias,
+        old.accel_quad,
+        age,
         0.0,
+        TRACKER,
     )
-
-
-@kernel
-def with_vehicle(state: EstimatorState, vehicle: VehicleEstimate, resets: float) -> EstimatorState:
-    """The state with its vehicle replaced."""
-    return EstimatorState(state.time_s, vehicle, state.load, state.last_imu, resets, state.head)
-
-
-@kernel
-def refuse_pose(v: VehicleEstimate) -> VehicleEstimate:
-    """The vehicle with one more reading refused."""
-    return VehicleEstimate(
-        v.x_quad,
-        v.v_quad,
-        v.quat_wxyz,
-        v.omega_body,
-        v.gyro_bias,
-        v.accel_bias,
-        v.accel_quad,
-        v.covariance,
-        v.attitude_covariance,
-        v.age_s,
-        v.rejected + 1.0,
-    )
-
-
-@kernel
-def _update3(cov: Covariance3, h: Vec3, variance: float) -> tuple[float, float, float, Covariance3]:
-    """Gains of a scalar measurement of h . (position, velocity, bias), and the covariance after it."""
-    pp, pv, pb, vv, vb, bb = cov
-    hp = pp * h[0] + pv * h[1] + pb * h[2]
-    hv = pv * h[0] + vv * h[1] + vb * h[2]
-    hb = pb * h[0] + vb * h[1] + bb * h[2]
-    s = 1.0 / (h[0] * hp + h[1] * hv + h[2] * hb + variance)
-    kp, kv, kb = s * hp, s * hv, s * hb
-    after = (pp - kp * hp, pv - kp * hv, pb - kp * hb, vv - kv * hv, vb - kv * hb, bb - kb * hb)
-    return kp, kv, kb, after
-
-
-@kernel
-def past_variance(cov: Covariance3, age: float) -> float:
-    """Variance of the position `age` seconds ago, seen from the present: p - age v - age^2 / 2 b."""
-    pp, pv, pb, vv, vb, bb = cov
-    h = 0.5 * age * age
-    return pp - 2.0 * age * pv - 2.0 * h * pb + age * age * vv + 2.0 * age * h * vb + h * h * bb
+    v = vehicle.v_quad
+    renew(history, X_QUAD, 3, (pose.x_quad[0], pose.x_quad[1], pose.x_quad[2], 0.0))
+    renew(history, V_QUAD, 3, (v[0], v[1], v[2], 0.0))
+    renew(history, QUAT, 4, pose.quat_wxyz)
+    begin(history)
+    load = moved_load(state.load, vehicle, history)
+    return with_load(with_vehicle(state, vehicle, state.resets + 1.0), load, state.resets + 1.0)
 
 
 @kernel
@@ -118,60 +118,45 @@ def correct_pose(
 
     The first reading starts the vehicle; readings refused many times in a row start it anew.
     """
-    vehicle = state.vehicle
-    since = state.time_s - pose.age_s
-    past = look_back(state.head, history, since, X_QUAD)
-    innovation = sub(pose.x_quad, (past[0], past[1], past[2]))
+    state = heard(state, pose.age_s, TRACKED_SIZE)
+    n = state.size
+    if state.vehicle.source != TRACKER:
+        return start_by_pose(state, history, pose, tuning)
+    past = look_back(state, history, tuning, pose.age_s)
+    innovation = sub(pose.x_quad, past.x_quad)
     position_var = pose.position_std * pose.position_std
-    starting = vehicle.age_s == float("inf")
-    if not starting and not gate(
-        innovation, past_variance(vehicle.covariance, pose.age_s) + position_var, tuning.gate_sigma
-    ):
+    off = 0.0
+    for i in range(3):
+        position_row(history, past, i, n)
+        off += innovation[i] * innovation[i] / (spread(history, n) + position_var)
+    # written so that NaN is refused
+    if not off <= 3.0 * tuning.gate_sigma * tuning.gate_sigma:
+        vehicle = state.vehicle
         if vehicle.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
-            return with_vehicle(state, refuse_pose(vehicle), state.resets)
-        starting = True
-    if starting:
-        started = with_vehicle(state, start_vehicle(vehicle, pose), state.resets + 1.0)
-        renew(history, X_QUAD, pose.x_quad)
-        for i in range(HISTORY_LENGTH):
-            for j in range(4):
-                history[i, QUAT + j] = pose.quat_wxyz[j]
-        return started
-
-    R = rotation_from_quat(vehicle.quat_wxyz)
-    age = pose.age_s
-    kp, kv, kb, cov = _update3(vehicle.covariance, (1.0, -age, -0.5 * age * age), position_var)
-    moved, faster = scale(kp, innovation), scale(kv, innovation)
-    x_quad = add(vehicle.x_quad, moved)
-    v_quad = axpy(kv, innovation, vehicle.v_quad)
-    accel_bias = axpy(kb, apply_transposed(R, innovation), vehicle.accel_bias)
-    if pose.velocity_std >= 0.0:
-        difference = sub(pose.v_quad, axpy(-age, vehicle.accel_quad, v_quad))
-        kp, kv, kb, cov = _update3(cov, (0.0, 1.0, age), pose.velocity_std * pose.velocity_std)
-        moved, faster = axpy(kp, difference, moved), axpy(kv, difference, faster)
-        x_quad = axpy(kp, difference, x_quad)
-        v_quad = axpy(kv, difference, v_quad)
-        accel_bias = axpy(kb, apply_transposed(R, difference), accel_bias)
-    shift(state.head, history, since, X_QUAD, moved, faster)
-
-    past_quat = quat_normalise(look_back(state.head, history, since, QUAT))
-    angle = quat_log(quat_multiply(quat_conjugate(past_quat), pose.quat_wxyz))
-    aa, ag, gg = vehicle.attitude_covariance
-    ha, hg = aa + age * ag, ag + age * gg
-    s = 1.0 / (ha + age * hg + pose.attitude_std * pose.attitude_std)
-    turned = quat_exp(scale(s * ha, angle))
-    turn(state.head, history, since, turned)
-    corrected = VehicleEstimate(
-        x_quad,
-        v_quad,
-        quat_normalise(quat_multiply(vehicle.quat_wxyz, turned)),
-        axpy(-s * hg, angle, vehicle.omega_body),
-        axpy(s * hg, angle, vehicle.gyro_bias),
-        accel_bias,
-        vehicle.accel_quad,
-        cov,
-        (aa - s * ha * ha, ag - s * ha * hg, gg - s * hg * hg),
-        pose.age_s,
-        0.0,
-    )
-    return with_vehicle(state, corrected, state.resets)
+            refused = vehicle_at(vehicle, vehicle.age_s, vehicle.rejected + 1.0)
+            return with_vehicle(state, refused, state.resets)
+        return start_by_pose(state, history, pose, tuning)
+    begin(history)
+    nis = 0.0
+    velocity_var = pose.velocity_std * pose.velocity_std
+    attitude_var = pose.attitude_std * pose.attitude_std
+    difference = sub(pose.v_quad, past.v_quad)
+    angle = quat_log(quat_multiply(pose.quat_wxyz, quat_conjugate(past.quat_wxyz)))
+    for k in range(9):
+        i = k % 3
+        if k < 3:
+            position_row(history, past, i, n)
+            off, variance = innovation[i], position_var
+        elif k < 6:
+            attitude_row(history, past, AXES[i], n)
+            off, variance = angle[i], attitude_var
+        elif pose.velocity_std >= 0.0:
+            velocity_row(history, past, i, n)
+            off, variance = difference[i], velocity_var
+        else:
+            break
+        nis += absorb(history, off, variance, n)
+    history.consistency[POSE, 0] += 1.0
+    history.consistency[POSE, 1] += nis
+    state = inject(state, history)
+    return with_vehicle(state, vehicle_at(state.vehicle, pose.age_s, 0.0), state.resets)

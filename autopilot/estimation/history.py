@@ -1,87 +1,132 @@
 """Looking back: a reading is compared with the state at the time it was taken.
 
-The correction it gives is added to the present state and to every state since, so that the next reading
-is not corrected for the same error again.
+The ring holds past states. A correction of the present is carried back to all of them that a reading may yet
+ask for: an error dx, dv of now was dx - tau dv at tau before, so the next reading, perhaps of a moment
+before this correction, is not corrected for the same error again.
 """
 
 from __future__ import annotations
 
-from autopilot.estimation.records import HISTORY_LENGTH, QUAT, History
+from autopilot.estimation.records import (
+    ACROSS,
+    ATTITUDE,
+    DIRECTION,
+    POSITION,
+    Q_CABLE,
+    Q_RATE,
+    QUAT,
+    RATE,
+    RING_LENGTH,
+    V_QUAD,
+    VELOCITY,
+    X_QUAD,
+    Array,
+    EstimatorState,
+    History,
+)
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3
-from autopilot.geometry.so3 import Quat, quat_multiply
+from autopilot.geometry.linear import Vec3, cross
+from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply
+
+NEVER = -float("inf")
 
 
 @kernel
-def row_before(head: int, history: History, time_s: float) -> tuple[int, float]:
+def remember(state: EstimatorState, history: History) -> None:
+    """Write the state into its row of the ring."""
+    row = history.ring[state.head]
+    vehicle, load = state.vehicle, state.load
+    row[0] = state.time_s
+    for i in range(3):
+        row[X_QUAD + i] = vehicle.x_quad[i]
+        row[V_QUAD + i] = vehicle.v_quad[i]
+        row[Q_CABLE + i] = load.q_cable[i]
+        row[ACROSS + i] = load.across[i]
+        row[Q_RATE + i] = load.q_cable_dot[i]
+    for i in range(4):
+        row[QUAT + i] = vehicle.quat_wxyz[i]
+
+
+@kernel
+def row_before(head: int, ring: Array, time_s: float) -> tuple[int, float]:
     """The row at or before `time_s` (else the oldest) and the share of the way to the next row."""
     row = head
-    for _ in range(HISTORY_LENGTH - 1):
-        if history[row, 0] <= time_s:
+    for _ in range(RING_LENGTH - 1):
+        if ring[row, 0] <= time_s:
             break
-        earlier = (row - 1) % HISTORY_LENGTH
-        if history[earlier, 0] == -float("inf") or history[earlier, 0] > history[row, 0]:
+        earlier = (row - 1) % RING_LENGTH
+        if ring[earlier, 0] == NEVER or ring[earlier, 0] > ring[row, 0]:
             return row, 0.0
         row = earlier
-    if row == head or history[row, 0] > time_s:
+    if row == head or ring[row, 0] > time_s:
         return row, 0.0
-    later = (row + 1) % HISTORY_LENGTH
-    return row, (time_s - history[row, 0]) / (history[later, 0] - history[row, 0])
+    later = (row + 1) % RING_LENGTH
+    return row, (time_s - ring[row, 0]) / (ring[later, 0] - ring[row, 0])
 
 
 @kernel
-def look_back(head: int, history: History, time_s: float, first: int) -> Quat:
-    """Columns first ... first+3 at `time_s`, interpolated linearly."""
-    row, share = row_before(head, history, time_s)
-    later = (row + 1) % HISTORY_LENGTH if share > 0.0 else row
+def past3(ring: Array, row: int, share: float, first: int) -> Vec3:
+    """Columns first ... first+2 at `share` of the way from `row` to the next, linearly."""
+    later = (row + 1) % RING_LENGTH if share > 0.0 else row
     rest = 1.0 - share
     return (
-        rest * history[row, first] + share * history[later, first],
-        rest * history[row, first + 1] + share * history[later, first + 1],
-        rest * history[row, first + 2] + share * history[later, first + 2],
-        rest * history[row, first + 3] + share * history[later, first + 3],
+        rest * ring[row, first] + share * ring[later, first],
+        rest * ring[row, first + 1] + share * ring[later, first + 1],
+        rest * ring[row, first + 2] + share * ring[later, first + 2],
     )
 
 
 @kernel
-def shift(head: int, history: History, since_s: float, first: int, value: Vec3, rate: Vec3) -> None:
-    """Add `value` - tau `rate` to columns first ... first+2 of every row from the one at or before `since_s`
-    on, tau being the row's age: the past of a present that moves by `value` and is faster by `rate`."""
-    now = history[head, 0]
-    row = head
-    for _ in range(HISTORY_LENGTH - 1):
-        tau = now - history[row, 0]
-        for i in range(3):
-            history[row, first + i] += value[i] - tau * rate[i]
-        earlier = (row - 1) % HISTORY_LENGTH
-        if history[row, 0] <= since_s or not -float("inf") < history[earlier, 0] <= history[row, 0]:
-            break
-        row = earlier
+def past4(ring: Array, row: int, share: float, first: int) -> Quat:
+    """Columns first ... first+3, as `past3`."""
+    later = (row + 1) % RING_LENGTH if share > 0.0 else row
+    rest = 1.0 - share
+    return (
+        rest * ring[row, first] + share * ring[later, first],
+        rest * ring[row, first + 1] + share * ring[later, first + 1],
+        rest * ring[row, first + 2] + share * ring[later, first + 2],
+        rest * ring[row, first + 3] + share * ring[later, first + 3],
+    )
 
 
 @kernel
-def renew(history: History, first: int, value: Vec3) -> None:
-    """Set columns first ... first+2 of every row: all that was thought before a new start is forgotten.
-
-    Else readings older than the start would be held against it, for as long as the tracker's latency.
-    """
-    for row in range(HISTORY_LENGTH):
-        for i in range(3):
-            history[row, first + i] = value[i]
-
-
-@kernel
-def turn(head: int, history: History, since_s: float, turned: Quat) -> None:
-    """Turn the attitude of every row from the one at or before `since_s` on by `turned` (body frame)."""
+def carry_back(head: int, history: History, memory_s: float) -> None:
+    """Carry the correction in `error` to every row back to `memory_s` before now and the one before that."""
+    ring, e = history.ring, history.error
+    turn = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
+    now = ring[head, 0]
     row = head
-    for _ in range(HISTORY_LENGTH - 1):
+    for _ in range(RING_LENGTH - 1):
+        tau = now - ring[row, 0]
+        for i in range(3):
+            ring[row, X_QUAD + i] += e[POSITION + i] - tau * e[VELOCITY + i]
+            ring[row, V_QUAD + i] += e[VELOCITY + i]
         quat = quat_multiply(
-            (history[row, QUAT], history[row, QUAT + 1], history[row, QUAT + 2], history[row, QUAT + 3]),
-            turned,
+            turn, (ring[row, QUAT], ring[row, QUAT + 1], ring[row, QUAT + 2], ring[row, QUAT + 3])
         )
         for i in range(4):
-            history[row, QUAT + i] = quat[i]
-        earlier = (row - 1) % HISTORY_LENGTH
-        if history[row, 0] <= since_s or not -float("inf") < history[earlier, 0] <= history[row, 0]:
+            ring[row, QUAT + i] = quat[i]
+        q = (ring[row, Q_CABLE], ring[row, Q_CABLE + 1], ring[row, Q_CABLE + 2])
+        across = (ring[row, ACROSS], ring[row, ACROSS + 1], ring[row, ACROSS + 2])
+        along = cross(q, across)
+        da = e[DIRECTION] - tau * e[RATE]
+        db = e[DIRECTION + 1] - tau * e[RATE + 1]
+        for i in range(3):
+            ring[row, Q_CABLE + i] += da * across[i] + db * along[i]
+            ring[row, ACROSS + i] -= da * q[i]
+            ring[row, Q_RATE + i] += e[RATE] * across[i] + e[RATE + 1] * along[i]
+        earlier = (row - 1) % RING_LENGTH
+        if tau > memory_s or not NEVER < ring[earlier, 0] <= ring[row, 0]:
             break
         row = earlier
+
+
+@kernel
+def renew(history: History, first: int, count: int, value: Quat) -> None:
+    """Set `count` columns of every row: all that was thought before a new start is forgotten.
+
+    Else readings older than the start would be held against it, for as long as the sensor's latency.
+    """
+    for row in range(RING_LENGTH):
+        for i in range(count):
+            history.ring[row, first + i] = value[i]

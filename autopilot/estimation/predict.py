@@ -6,20 +6,26 @@ alone, so that the direction q from vehicle to load obeys
     L q'' = -P_q (x_Q'' + g e3) - L |q'|^2 q,        P_q = I - q q^T,
 
 and x_Q'' + g e3 = R a is what the accelerometer reads.
-
-Every quantity's error is taken as isotropic: one covariance serves its three axes, which keeps the filter a
-handful of scalars and free of any frame.
 """
 
 from __future__ import annotations
 
+from math import sqrt
+
+from autopilot.estimation.covariance import Transit, transit
+from autopilot.estimation.history import remember
 from autopilot.estimation.records import (
-    HISTORY_LENGTH,
-    Q_CABLE,
-    QUAT,
-    X_LOAD,
-    X_QUAD,
+    ATTITUDE,
+    DIRECTION,
+    GNSS,
+    LENGTH,
+    POSITION,
+    RING_LENGTH,
+    SIZE,
+    TRACKER,
+    AidEstimate,
     Covariance2,
+    Doubt,
     EstimatorState,
     EstimatorTuning,
     History,
@@ -27,15 +33,14 @@ from autopilot.estimation.records import (
     LoadEstimate,
     VehicleEstimate,
 )
+from autopilot.estimation.tautness import frame, watch
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, apply, axpy, dot, norm, scale, sub
+from autopilot.geometry.linear import Mat3, Vec3, add, apply, axpy, cross, dot, norm, scale, sub
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
-TAUT_ABOVE = 0.985  # share of the cable length at which a slack cable counts as taut
-SLACK_BELOW = 0.965  # and at which a taut one counts as slack
-SLACK_CABLE_ACCEL_STD = 20.0  # rad/s^2: no model holds while slack
-SLACK_LOAD_ACCEL_STD = 10.0  # m/s^2: free fall or rest on the ground, it is not known which
+SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on the ground, it is not known
+LAID_WALK = 0.01  # m per square root of a second, of a load that lies where it was laid
 
 
 @kernel
@@ -46,19 +51,6 @@ def grow2(cov: Covariance2, dt: float, rate_std: float) -> Covariance2:
 
 
 @kernel
-def remember(state: EstimatorState, history: History) -> None:
-    """Write the state into its row of the ring."""
-    row = history[state.head]
-    row[0] = state.time_s
-    for i in range(3):
-        row[X_QUAD + i] = state.vehicle.x_quad[i]
-        row[X_LOAD + i] = state.load.x_load[i]
-        row[Q_CABLE + i] = state.load.q_cable[i]
-    for i in range(4):
-        row[QUAT + i] = state.vehicle.quat_wxyz[i]
-
-
-@kernel
 def _mean(a: Vec3, b: Vec3) -> Vec3:
     return scale(0.5, add(a, b))
 
@@ -66,99 +58,181 @@ def _mean(a: Vec3, b: Vec3) -> Vec3:
 @kernel
 def predict_vehicle(
     vehicle: VehicleEstimate, imu: ImuReading, last: ImuReading, tuning: EstimatorTuning, dt: float
-) -> VehicleEstimate:
-    """Strapdown integration by the trapezoidal rule over the last two samples."""
+) -> tuple[VehicleEstimate, Mat3]:
+    """Strapdown integration by the trapezoidal rule over the last two samples; also R of half way."""
     gyro = sub(_mean(imu.gyro, last.gyro), vehicle.gyro_bias)
     accel = sub(_mean(imu.accel, last.accel), vehicle.accel_bias)
-    half = quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro)))
-    quat = quat_normalise(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(dt, gyro))))
-    force = apply(rotation_from_quat(half), accel)  # specific force, ENU
+    R = rotation_from_quat(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(0.5 * dt, gyro))))
+    force = apply(R, accel)  # specific force, ENU
     accel_quad = (force[0], force[1], force[2] - tuning.gravity)
-
-    # a bias acts with a minus sign: v' = R (a - b), theta' = omega - b
-    pp, pv, pb, vv, vb, bb = vehicle.covariance
-    h = 0.5 * dt * dt
-    pp, pv, pb = (
-        pp + 2.0 * dt * pv - 2.0 * h * pb + dt * dt * vv - 2.0 * dt * h * vb + h * h * bb,
-        pv - dt * pb + dt * vv - dt * dt * vb - h * vb + dt * h * bb,
-        pb + dt * vb - h * bb,
-    )
-    vv, vb = vv - 2.0 * dt * vb + dt * dt * bb, vb - dt * bb
-    vv += tuning.accel_std * tuning.accel_std * dt * dt
-    bb += tuning.accel_bias_walk * tuning.accel_bias_walk * dt
-    aa, ag, gg = vehicle.attitude_covariance
-    aa = aa - 2.0 * dt * ag + dt * dt * gg + tuning.gyro_std * tuning.gyro_std * dt * dt
-    ag = ag - dt * gg
-    gg = gg + tuning.gyro_bias_walk * tuning.gyro_bias_walk * dt
-    return VehicleEstimate(
+    moved = VehicleEstimate(
         axpy(0.5 * dt * dt, accel_quad, axpy(dt, vehicle.v_quad, vehicle.x_quad)),
         axpy(dt, accel_quad, vehicle.v_quad),
-        quat,
+        quat_normalise(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(dt, gyro)))),
         sub(imu.gyro, vehicle.gyro_bias),
         vehicle.gyro_bias,
         vehicle.accel_bias,
         accel_quad,
-        (pp, pv, pb, vv, vb, bb),
-        (aa, ag, gg),
         vehicle.age_s + dt,
         vehicle.rejected,
+        vehicle.source,
+    )
+    return moved, R
+
+
+@kernel
+def predict_taut(
+    load: LoadEstimate, vehicle: VehicleEstimate, tuning: EstimatorTuning, dt: float
+) -> LoadEstimate:
+    """The pendulum; `vehicle` is already at the new time."""
+    q, q_dot = load.q_cable, load.q_cable_dot
+    accel_quad = vehicle.accel_quad
+    force = (accel_quad[0], accel_quad[1], accel_quad[2] + tuning.gravity)
+    q_ddot = axpy(-dot(q_dot, q_dot), q, scale(-1.0 / load.length, tangent(q, force)))
+    accel_load = axpy(load.length, q_ddot, accel_quad)
+    tension = max(0.0, -tuning.load_mass * (dot(q, accel_load) + tuning.gravity * q[2]))
+    q_next = normalise(axpy(0.5 * dt * dt, q_ddot, axpy(dt, q_dot, q)))
+    rate = tangent(q_next, axpy(dt, q_ddot, q_dot))
+    return LoadEstimate(
+        axpy(load.length, q_next, vehicle.x_quad),
+        axpy(load.length, rate, vehicle.v_quad),
+        q_next,
+        rate,
+        normalise(tangent(q_next, load.across)),
+        load.length,
+        load.covariance,
+        load.taut,
+        tension,
+        load.pull,
+        load.pulled_s,
+        load.age_s + dt,
+        load.rejected,
+        load.source,
     )
 
 
 @kernel
-def predict_load(
-    load: LoadEstimate, vehicle: VehicleEstimate, tuning: EstimatorTuning, dt: float
-) -> LoadEstimate:
-    """The pendulum while taut; while slack nothing but a wide noise. `vehicle` is already at the new time."""
-    q, q_dot = load.q_cable, load.q_cable_dot
-    if load.taut > 0.0:
-        accel_quad = vehicle.accel_quad
-        force = (accel_quad[0], accel_quad[1], accel_quad[2] + tuning.gravity)
-        pull = scale(-1.0 / tuning.cable_length, tangent(q, force))
-        q_ddot = axpy(-dot(q_dot, q_dot), q, pull)
-        accel_load = axpy(tuning.cable_length, q_ddot, accel_quad)
-        tension = max(0.0, -tuning.load_mass * (dot(q, accel_load) + tuning.gravity * q[2]))
-        cable_std, load_std = tuning.cable_accel_std, tuning.load_accel_std
+def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, dt: float) -> LoadEstimate:
+    """A load by itself: it goes on as it did if it is tracked, else it lies where it was laid."""
+    x_load, v_load, covariance = load.x_load, load.v_load, load.covariance
+    if load.source == TRACKER:
+        x_load = axpy(dt, v_load, x_load)
+        covariance = grow2(covariance, dt, SLACK_ACCEL_STD)
     else:
-        q_ddot = (0.0, 0.0, 0.0)
-        accel_load = (0.0, 0.0, 0.0)
-        tension = 0.0
-        cable_std, load_std = SLACK_CABLE_ACCEL_STD, SLACK_LOAD_ACCEL_STD
-    q_next = normalise(axpy(0.5 * dt * dt, q_ddot, axpy(dt, q_dot, q)))
-    x_load = axpy(0.5 * dt * dt, accel_load, axpy(dt, load.v_load, load.x_load))
-    distance = norm(sub(x_load, vehicle.x_quad))
-    taut = load.taut
-    if distance > TAUT_ABOVE * tuning.cable_length:
-        taut = 1.0
-    elif distance < SLACK_BELOW * tuning.cable_length:
-        taut, tension = 0.0, 0.0
+        aa, ab, bb = covariance
+        covariance = (aa + LAID_WALK * LAID_WALK * dt, ab, bb)
+    separation = sub(x_load, vehicle.x_quad)
+    distance = norm(separation)
+    q, across, q_dot = load.q_cable, load.across, load.q_cable_dot
+    # the load may be where the vehicle is for all one knows: the direction is then kept
+    if distance > 0.01:
+        q = scale(1.0 / distance, separation)
+        across = frame(q, across)
+        q_dot = scale(1.0 / distance, tangent(q, sub(v_load, vehicle.v_quad)))
     return LoadEstimate(
         x_load,
-        axpy(dt, accel_load, load.v_load),
-        q_next,
-        tangent(q_next, axpy(dt, q_ddot, q_dot)),
-        grow2(load.covariance, dt, load_std),
-        grow2(load.cable_covariance, dt, cable_std),
-        taut,
-        tension,
+        v_load,
+        q,
+        q_dot,
+        across,
+        load.length,
+        covariance,
+        load.taut,
+        0.0,
+        load.pull,
+        load.pulled_s,
         load.age_s + dt,
         load.rejected,
+        load.source,
+    )
+
+
+@kernel
+def doubt(history: History, load: LoadEstimate, n: int) -> Doubt:
+    """Standard deviations of what the covariance says."""
+    P = history.covariance
+    level = 0.5 * (P[POSITION, POSITION] + P[POSITION + 1, POSITION + 1])
+    relative = level
+    if n == SIZE:
+        relative += P[POSITION, GNSS] + P[POSITION + 1, GNSS + 1]
+        relative += 0.5 * (P[GNSS, GNSS] + P[GNSS + 1, GNSS + 1])
+    of_load = load.covariance[0]
+    if load.taut > 0.0:
+        L = load.length
+        of_load = L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1]) + P[LENGTH, LENGTH]
+        if load.source == TRACKER:
+            a, b = load.across, cross(load.q_cable, load.across)
+            for i in range(3):
+                of_load += P[POSITION + i, POSITION + i]
+                of_load += (
+                    2.0 * L * (a[i] * P[POSITION + i, DIRECTION] + b[i] * P[POSITION + i, DIRECTION + 1])
+                )
+                of_load += 2.0 * load.q_cable[i] * P[POSITION + i, LENGTH]
+        of_load /= 3.0
+    return Doubt(
+        sqrt(level),
+        sqrt(P[POSITION + 2, POSITION + 2]),
+        sqrt(0.5 * (P[ATTITUDE, ATTITUDE] + P[ATTITUDE + 1, ATTITUDE + 1])),
+        sqrt(P[ATTITUDE + 2, ATTITUDE + 2]),
+        sqrt(of_load),
+        sqrt(relative),
     )
 
 
 @kernel
 def predict(
-    state: EstimatorState, history: History, imu: ImuReading, tuning: EstimatorTuning, dt: float
+    state: EstimatorState,
+    history: History,
+    imu: ImuReading,
+    tuning: EstimatorTuning,
+    dt: float,
+    thrust: float,
 ) -> EstimatorState:
-    """The state dt seconds on; `history` receives it."""
-    vehicle = predict_vehicle(state.vehicle, imu, state.last_imu, tuning, dt)
+    """The state dt seconds on; `thrust` (N) is what the rotors are believed to give."""
+    load, aids = state.load, state.aids
+    vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, tuning, dt)
+    a = vehicle.accel_quad
+    motion = Transit(
+        (a[0], a[1], a[2] + tuning.gravity),
+        R,
+        load.q_cable,
+        load.across,
+        cross(load.q_cable, load.across),
+        load.q_cable_dot,
+        load.length,
+        load.taut,
+        aids.horizontal_slow,
+        aids.vertical_slow,
+    )
+    if vehicle.source > 0.0:
+        transit(history, motion, tuning, dt, state.size)
+    if load.taut > 0.0:
+        load = predict_taut(load, vehicle, tuning, dt)
+    else:
+        load = predict_slack(load, vehicle, dt)
+    load = watch(load, vehicle, history, imu, thrust, tuning, dt)
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,
-        predict_load(state.load, vehicle, tuning, dt),
+        load,
+        AidEstimate(
+            aids.mounting,
+            aids.heading,
+            aids.barometer,
+            aids.gnss,
+            aids.horizontal_slow,
+            aids.vertical_slow,
+            aids.field,
+            aids.magnetic_age + dt,
+            aids.barometer_age + dt,
+            aids.rejected,
+        ),
+        doubt(history, load, state.size),
         imu,
         state.resets,
-        (state.head + 1) % HISTORY_LENGTH,
+        state.memory_s,
+        (state.head + 1) % RING_LENGTH,
+        state.size,
     )
     remember(predicted, history)
     return predicted

@@ -8,20 +8,54 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.geometry.so3 import IDENTITY_QUAT, Quat
 
-HISTORY_LENGTH = 512
-# columns of the history: time, x_quad (3), quat (4), x_load (3), q_cable (3), one to spare
-X_QUAD, QUAT, X_LOAD, Q_CABLE = 1, 4, 8, 11
-HISTORY_COLUMNS = 15
+Array = NDArray[np.float64]
 
-History = NDArray[np.float64]
-ACCEL_BIAS_STD = 0.2  # m/s^2, before anything is known
-GYRO_BIAS_STD = 0.05  # rad/s
+# The error state, all but the biases in world axes: position, velocity and attitude of the vehicle
+# (R = exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own two
+# axes: direction, rate, and its length. Flights with trackers alone need no more.
+POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
+DIRECTION, RATE, LENGTH = 15, 17, 19
+TRACKED_SIZE = 20
+# mounting of the camera (about the body's forward and left axes), magnetic heading, barometer, receiver
+MOUNTING, HEADING, BAROMETER, GNSS = 20, 22, 23, 24
+SIZE = 27
+
+# columns of the ring of past states: time, then as named
+RING_LENGTH = 512
+X_QUAD, V_QUAD, QUAT, Q_CABLE, ACROSS, Q_RATE = 1, 4, 7, 11, 14, 17
+RING_COLUMNS = 20
+
+# sensors, as rows of `History.consistency`
+POSE, LOAD, FIX, PRESSURE, MAGNETIC, SIGHT, REST = 0, 1, 2, 3, 4, 5, 6
+SENSORS = 7
+
+NOBODY, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what tells the vehicle where it is
+CAMERA = 2.0  # what tells where the load is, beside NOBODY and TRACKER
 
 Covariance2 = tuple[float, float, float]  # (aa, ab, bb)
-Covariance3 = tuple[float, float, float, float, float, float]  # (pp, pv, pb, vv, vb, bb)
+
+
+class Steps(NamedTuple):
+    """What moves the covariance in time: row `to` += `factor` times row `of`, one after the other."""
+
+    to: NDArray[np.int64]
+    of: NDArray[np.int64]
+    factor: Array
+
+
+class History(NamedTuple):
+    """The arrays of the filter, written in place: too large for tuples."""
+
+    ring: Array  # past states, RING_LENGTH x RING_COLUMNS
+    covariance: Array  # of the error state, SIZE x SIZE, symmetric to the bit
+    error: Array  # SIZE: the correction being gathered
+    row: Array  # SIZE: Jacobian of the scalar being absorbed
+    gain: Array  # SIZE: covariance times `row`
+    steps: Steps
+    consistency: Array  # SENSORS x 2: how many readings were absorbed, and the sum of their NIS
 
 
 class ImuReading(NamedTuple):
@@ -56,23 +90,62 @@ class LoadReading(NamedTuple):
     velocity_std: float
 
 
+class GnssReading(NamedTuple):
+    """A satellite navigation receiver's fix, ENU from home; `rtk` is 1.0 where its carrier phase is fixed."""
+
+    age_s: float
+    position: Vec3
+    velocity: Vec3
+    horizontal_std: float
+    vertical_std: float
+    rtk: float
+
+
+class DirectionReading(NamedTuple):
+    """Unit vector from vehicle to load, body FLU, as a camera or an encoder sees it."""
+
+    age_s: float
+    direction_body: Vec3
+    direction_std: float
+
+
 class EstimatorTuning(NamedTuple):
-    """What the estimator believes: vehicle, process noise as standard deviations of one sample, gate."""
+    """What the estimator believes. Deviations of IMU and models are those of one sample, walks of a second."""
 
     cable_length: float
+    quad_mass: float
     load_mass: float
     gravity: float
     gyro_std: float
     accel_std: float
+    gyro_bias_std: float  # rad/s, at switch-on
+    accel_bias_std: float  # m/s^2
     gyro_bias_walk: float  # rad/s per square root of a second
     accel_bias_walk: float  # m/s^2 per square root of a second
     cable_accel_std: float  # rad/s^2, error of the pendulum model while taut
-    load_accel_std: float  # m/s^2, error of the load's acceleration while taut
+    length_std: float  # m, of the believed length
     gate_sigma: float
+    rtk_white: float  # share of a fix's stated deviation that is new in every fix
+    gnss_white: float  # the same without carrier phase
+    gnss_time: float  # s, in which the rest forgets itself
+    rtk_speed_std: float  # m/s, level; climb is 1.7 times as bad
+    gnss_speed_std: float
+    barometer_std: float  # m
+    barometer_walk: float  # m per square root of a second
+    barometer_age: float  # s
+    magnetic_std: float  # rad of heading
+    magnetic_bias: float  # rad
+    magnetic_age: float  # s
+    declination: float  # rad, east of north
+    mounting_std: float  # rad, of the camera
+    gear_height: float  # m, of the standing vehicle's centre of mass
+    load_height: float  # m, of the lying load's centre
+    laid_forward: float  # m ahead of the standing vehicle: where the load was laid
+    laid_std: float  # m
 
 
 class VehicleEstimate(NamedTuple):
-    """The vehicle; covariances of (position, velocity, accelerometer bias) and of (attitude, gyro bias)."""
+    """The vehicle."""
 
     x_quad: Vec3
     v_quad: Vec3
@@ -81,43 +154,86 @@ class VehicleEstimate(NamedTuple):
     gyro_bias: Vec3
     accel_bias: Vec3
     accel_quad: Vec3  # inertial acceleration, ENU
-    covariance: Covariance3
-    attitude_covariance: Covariance2
-    age_s: float  # of the last accepted pose; infinite before the first
-    rejected: float  # poses in a row that failed the gate
+    age_s: float  # of the last accepted pose or fix; infinite before the first
+    rejected: float  # poses or fixes in a row that failed the gate
+    source: float  # NOBODY, TRACKER or RECEIVER
 
 
 class LoadEstimate(NamedTuple):
-    """Load and cable, with the covariances of (position, velocity) and (direction, rate)."""
+    """Load and cable. While slack, `covariance` is that of load (position, velocity), the same on each axis."""
 
     x_load: Vec3
     v_load: Vec3
     q_cable: Vec3
     q_cable_dot: Vec3
+    across: Vec3  # first axis of the cable's own frame, orthogonal to q_cable; the second is q_cable x across
+    length: float
     covariance: Covariance2
-    cable_covariance: Covariance2
     taut: float
     tension: float
+    pull: float  # N along the cable: what the vehicle's acceleration leaves of the believed thrust, smoothed
+    pulled_s: float  # for how long the pull has spoken against `taut`
     age_s: float
     rejected: float
+    source: float  # NOBODY, TRACKER or CAMERA
+
+
+class AidEstimate(NamedTuple):
+    """Errors of the aids, and how long ago each was heard."""
+
+    mounting: tuple[float, float]  # of the camera, rad about the body's forward and left axes
+    heading: float  # of the magnetometer, rad
+    barometer: float  # m
+    gnss: Vec3  # m, the slow error of the receiver
+    horizontal_slow: float  # m, its standard deviation as last stated
+    vertical_slow: float
+    field: Vec3  # the magnetometer's last reading, body
+    magnetic_age: float
+    barometer_age: float
+    rejected: float  # sights of the load in a row that failed the gate
+
+
+class Doubt(NamedTuple):
+    """Standard deviations of the estimate, as of the last prediction."""
+
+    horizontal: float  # m, each axis
+    vertical: float
+    tilt: float  # rad, each axis
+    heading: float
+    load: float  # m, each axis; relative to the vehicle while nothing tracks the load
+    relative: float  # m, each axis: of the vehicle without the receiver's slow error
 
 
 class EstimatorState(NamedTuple):
-    """All the estimator knows. One covariance serves the three axes of a quantity."""
+    """All the estimator knows, but for what `History` holds."""
 
     time_s: float
     vehicle: VehicleEstimate
     load: LoadEstimate
+    aids: AidEstimate
+    doubt: Doubt
     last_imu: ImuReading
     resets: float
-    head: int  # row of the history that holds this state
+    memory_s: float  # age of the oldest reading so far: so much of the ring follows corrections
+    head: int  # row of the ring that holds this state
+    size: int  # how much of the error state is in use
 
 
 def new_history() -> History:
-    """An empty ring of past states; `predict` writes it in place."""
-    history = np.zeros((HISTORY_LENGTH, HISTORY_COLUMNS))
-    history[:, 0] = -np.inf  # the time: long ago
-    return history
+    """Arrays of a filter that knows nothing; `predict` and the corrections write them in place."""
+    ring = np.zeros((RING_LENGTH, RING_COLUMNS))
+    ring[:, 0] = -np.inf  # the time: long ago
+    most = 64
+    steps = Steps(np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most))
+    return History(
+        ring,
+        np.zeros((SIZE, SIZE)),
+        np.zeros(SIZE),
+        np.zeros(SIZE),
+        np.zeros(SIZE),
+        steps,
+        np.zeros((SENSORS, 2)),
+    )
 
 
 def blank_state() -> EstimatorState:
@@ -132,24 +248,31 @@ def blank_state() -> EstimatorState:
             gyro_bias=ZERO,
             accel_bias=ZERO,
             accel_quad=ZERO,
-            covariance=(1.0, 0.0, 0.0, 1.0, 0.0, ACCEL_BIAS_STD**2),
-            attitude_covariance=(1.0, 0.0, GYRO_BIAS_STD**2),
             age_s=inf,
             rejected=0.0,
+            source=NOBODY,
         ),
         load=LoadEstimate(
             x_load=ZERO,
             v_load=ZERO,
             q_cable=(0.0, 0.0, -1.0),
             q_cable_dot=ZERO,
+            across=E1,
+            length=1.0,
             covariance=(1.0, 0.0, 1.0),
-            cable_covariance=(1.0, 0.0, 1.0),
             taut=0.0,
             tension=0.0,
+            pull=0.0,
+            pulled_s=0.0,
             age_s=inf,
             rejected=0.0,
+            source=NOBODY,
         ),
+        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, ZERO, inf, inf, 0.0),
+        doubt=Doubt(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
         resets=0.0,
+        memory_s=0.0,
         head=0,
+        size=TRACKED_SIZE,
     )

@@ -84,6 +84,8 @@ class Snapshot(NamedTuple):
     x_load_d: Vec3 = ZERO
     v_load_d: Vec3 = ZERO
     a_load_d: Vec3 = ZERO
+    x_load_asked: Vec3 = ZERO  # what the mission asks for; the above is as near to it as can be flown
+    v_load_asked: Vec3 = ZERO
     q_cable_c: Vec3 = _DOWN
     x_quad_d: Vec3 = _UNKNOWN  # where that wants the vehicle; NaN while it is not wanted anywhere
     v_quad_d: Vec3 = ZERO

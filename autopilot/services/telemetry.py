@@ -235,7 +235,8 @@ def _load_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _load_setpoint(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     desired = (s.x_load_d, s.v_load_d, s.a_load_d, s.q_cable_c, s.elapsed_s, s.duration_s)
-    return (load_setpoint_message(s.now_us, s.phase, s.control_mode, s.seq, *desired),)
+    asked = (s.x_load_asked, s.v_load_asked)
+    return (load_setpoint_message(s.now_us, s.phase, s.control_mode, s.seq, *desired, *asked),)
 
 
 def _cascade_errors(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

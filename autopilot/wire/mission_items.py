@@ -149,7 +149,8 @@ def _items(step: Step, home: Home, seq: int) -> Iterator[WireItem]:
                 hold = -1 if term.hold_s is None else _whole(seq, 6, "hold", term.hold_s, 1e3)
                 amplitude = sign * term.amplitude_m
                 command = mavlink.PLUMBLINE_LOAD_SIGNAL_TERM
-                yield _item(command, code, amplitude, term.rise_s, term.fall_s, x=start, y=hold)
+                by = 0.0 if term.rise_90_by_s is None else term.rise_90_by_s
+                yield _item(command, code, amplitude, term.rise_s, term.fall_s, x=start, y=hold, z=by)
                 for sine in term.factors:
                     period = _whole(seq, 5, "period", sine.period_s, 1e6)
                     start = _whole(seq, 6, "start", sine.start_s, 1e3)
@@ -331,6 +332,9 @@ class _Reader:
             rise_s=_check(seq, 3, "rise", item.param3, "s", SHORTEST_EDGE_S, LONGEST_S),
             hold_s=None if for_ever else _check(seq, 6, "hold", item.y / 1e3, "s", 0.0, LONGEST_S),
             fall_s=_check(seq, 4, "fall", item.param4, "s", 0.0 if for_ever else SHORTEST_EDGE_S, LONGEST_S),
+            rise_90_by_s=None
+            if item.z == 0.0
+            else _check(seq, 7, "rise by", item.z, "s", SHORTEST_EDGE_S, LONGEST_S),
         )
         if not self._terms:
             self._first_term = seq
@@ -342,6 +346,9 @@ class _Reader:
             text = "a factor (31011) must follow a term (31010)"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
         term = self._terms[-1]
+        if term.rise_90_by_s is not None:
+            text = "a term with a time to rise by takes no factors"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
         if len(term.factors) == MOST_FACTORS:
             text = f"more than {MOST_FACTORS} factors of one term"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_NO_SPACE)

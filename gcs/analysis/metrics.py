@@ -13,13 +13,24 @@ from numpy.typing import NDArray
 
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats, swing, tilt
-from gcs.analysis.samples import AIRBORNE, CARRIED, HOLD, MISSION, Samples, in_window
+from gcs.analysis.samples import (
+    AIRBORNE,
+    ATTITUDE_MODES,
+    CARRIED,
+    HOLD,
+    MISSION,
+    Samples,
+    in_window,
+    phase_at,
+)
 from gcs.analysis.step import find_step, step_response
-from gcs.analysis.tracks import Telemetry
+from gcs.analysis.tracks import Telemetry, WindTrack
 
 Numbers = dict[str, float | int | None]
 
 _LEAD_S = 0.5  # of hold before a step: shows that it begins at rest
+RECOVERED_M = 0.05  # load error within which a gust counts as recovered from
+SNAP_S = 0.5  # after a snap: the time in which its tension is looked for
 _WRAP = 65536  # slack_events is a uint16
 _AXES = "xyz"
 
@@ -53,7 +64,8 @@ def time_numbers(telemetry: Telemetry, wall_s: float | None) -> Numbers:
 
 
 def tracking_numbers(samples: Samples) -> Numbers:
-    """Load position error over the mission window, norm and axes; (3-40)."""
+    """Load position error over the mission window, norm and axes, (3-40), and its two parts: how far the
+    flown path is from the asked one, and the load from the flown one."""
     error = samples.error_m[samples.position_tracked]
     norm = np.linalg.norm(error, axis=1)
     known = norm[np.isfinite(norm)]
@@ -62,6 +74,11 @@ def tracking_numbers(samples: Samples) -> Numbers:
         "load_error_rms_m": _over(norm, _rms),
         "load_error_final_m": float(known[-1]) if len(known) else None,
     }
+    tracked = samples.position_tracked
+    shaped = np.linalg.norm((samples.desired_m - samples.asked_m)[tracked], axis=1)
+    numbers["shaping_distance_max_m"] = _over(shaped, np.max)
+    flown = np.linalg.norm((samples.actual_m - samples.desired_m)[tracked], axis=1)
+    numbers["tracking_error_max_m"] = _over(flown, np.max)
     for i, axis in enumerate(_AXES):
         numbers[f"load_error_max_{axis}_m"] = _over(np.abs(error[:, i]), np.max)
     for i, axis in enumerate(_AXES):
@@ -96,7 +113,7 @@ def step_numbers(samples: Samples) -> Numbers:
     if not samples.position_tracked[window].any():
         return numbers
     time_s = samples.time_s[window]
-    step = find_step(time_s, samples.desired_m[window], samples.desired_m_s[window])
+    step = find_step(time_s, samples.asked_m[window], samples.asked_m_s[window])
     if step is None:
         return numbers
     response = step_response(step, time_s, samples.actual_m[window])
@@ -139,6 +156,61 @@ def cable_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
         "tension_min_n": _over(truth.tension_n[window], np.min),
         "tension_max_n": _over(truth.tension_n[window], np.max),
         "slack_events": int(went_slack[carried].sum()) if carried.any() else None,
+    }
+
+
+def gust_intervals(wind: WindTrack) -> list[tuple[float, float]]:
+    """Begin and end (s) of every gust pulse; the end is NaN where the log ends before it."""
+    blows = (wind.gust_m_s != 0.0).any(axis=1)
+    edges = np.flatnonzero(np.diff(blows, prepend=False))
+    times = [float(t) for t in wind.time_s[edges]]
+    return list(zip(times[::2], [*times[1::2], np.nan][: len(times[::2])], strict=True))
+
+
+def gust_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
+    """What gust pulses did to the load while it was carried.
+
+    Looked at is each gust that begins and ends while the load is carried and its position is tracked, from
+    its begin until the load is no longer carried or the next gust begins.
+    """
+    carried = np.isin(samples.phase, CARRIED) & ~np.isin(samples.control_mode, ATTITUDE_MODES)
+    error = np.linalg.norm(samples.error_m, axis=1)
+    whole, worst_m, recovery_s = 0, 0.0, 0.0
+    gusts = gust_intervals(telemetry.wind)
+    for i, (begin, end) in enumerate(gusts):
+        next_begin = gusts[i + 1][0] if i + 1 < len(gusts) else np.inf
+        after = samples.time_s >= begin
+        ceases = samples.time_s[after & ~carried]
+        until = min(next_begin, ceases[0] if len(ceases) else np.inf)
+        window = after & (samples.time_s < until) & np.isfinite(error)
+        if not end < until or not (window & (samples.time_s >= end)).any():
+            continue
+        whole += 1
+        worst_m = max(worst_m, float(error[window].max()))
+        outside = samples.time_s[window & (error > RECOVERED_M)]
+        last = samples.time_s[window][-1]
+        if len(outside):
+            recovery_s = max(recovery_s, np.inf if outside[-1] == last else float(outside[-1]) - end)
+    return {
+        "gusts": whole,
+        "gust_error_max_m": worst_m if whole else None,
+        "gust_recovery_50mm_s": recovery_s if whole and np.isfinite(recovery_s) else None,
+    }
+
+
+def snap_numbers(telemetry: Telemetry) -> Numbers:
+    """How hard the slack cable came taut, from take-off to touchdown."""
+    snaps, truth = telemetry.snaps, telemetry.load_truth
+    flown = np.isin(phase_at(telemetry, snaps.time_s), AIRBORNE)
+    times, speeds = snaps.time_s[flown], snaps.speed_m_s[flown]
+    # the last snap before each sample, and whether it is recent
+    last = np.searchsorted(times, truth.time_s, side="right") - 1
+    recent = (last >= 0) & (truth.time_s - np.append(times, 0.0)[last] <= SNAP_S)
+    return {
+        "snaps": int(flown.sum()) if len(truth.time_s) else None,
+        "snap_speed_max_m_s": _over(speeds, np.max),
+        "snap_impulse_max_n_s": _over(snaps.impulse_n_s[flown], np.max),
+        "snap_tension_max_n": _over(truth.tension_n[recent], np.max),
     }
 
 

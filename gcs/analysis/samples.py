@@ -26,7 +26,7 @@ AIRBORNE = (
     mavlink.PLUMBLINE_PHASE_SET_DOWN,
     mavlink.PLUMBLINE_PHASE_FAILSAFE,
 )
-_ATTITUDE_MODES = (
+ATTITUDE_MODES = (
     mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE,
     mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE,
 )
@@ -50,24 +50,26 @@ class Samples:
     actual_m_s: Floats  # (n, 3) true load velocity
     desired_m: Floats  # (n, 3)
     desired_m_s: Floats  # (n, 3)
+    asked_m: Floats  # (n, 3) what the mission asks for; desired is as near to it as can be flown
+    asked_m_s: Floats  # (n, 3)
     estimated_m: Floats  # (n, 3) load position as the autopilot believes it
     vehicle_m: Floats  # (n, 3) true vehicle position: load - distance * q_cable
     quat_wxyz: Floats  # (n, 4) true attitude, FLU -> ENU
 
     @property
     def error_m(self) -> Floats:
-        """(n, 3) true minus desired load position, e_x of (3-40)."""
-        return self.actual_m - self.desired_m
+        """(n, 3) true minus asked load position, e_x of (3-40)."""
+        return self.actual_m - self.asked_m
 
     @property
     def error_m_s(self) -> Floats:
-        """(n, 3) true minus desired load velocity."""
-        return self.actual_m_s - self.desired_m_s
+        """(n, 3) true minus asked load velocity."""
+        return self.actual_m_s - self.asked_m_s
 
     @property
     def position_tracked(self) -> NDArray[np.bool_]:
         """(n,) in the mission window, and the cascade tracks a position rather than an attitude."""
-        return self.in_mission & ~np.isin(self.control_mode, _ATTITUDE_MODES)
+        return self.in_mission & ~np.isin(self.control_mode, ATTITUDE_MODES)
 
 
 def phase_at(telemetry: Telemetry, at_s: Floats) -> Ints:
@@ -104,6 +106,8 @@ def samples_of(telemetry: Telemetry) -> Samples:
         actual_m_s=truth.velocity_m_s,
         desired_m=hermite(setpoint.time_s, setpoint.position_m, setpoint.velocity_m_s, time_s),
         desired_m_s=hermite(setpoint.time_s, setpoint.velocity_m_s, setpoint.acceleration_m_s2, time_s),
+        asked_m=hermite(setpoint.time_s, setpoint.asked_m, setpoint.asked_m_s, time_s),
+        asked_m_s=linear(setpoint.time_s, setpoint.asked_m_s, time_s),
         estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),
         vehicle_m=truth.position_m - truth.distance_m[:, None] * truth.q_cable,
         quat_wxyz=linear(telemetry.attitude_truth.time_s, telemetry.attitude_truth.quat_wxyz, time_s),

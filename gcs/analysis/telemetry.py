@@ -24,8 +24,10 @@ from gcs.analysis.tracks import (
     RotorTrack,
     SetpointTrack,
     SimulationTrack,
+    SnapTrack,
     StatusText,
     Telemetry,
+    WindTrack,
 )
 
 Record = tuple[int, Received]  # microseconds since 1970 and the message, as in a .tlog
@@ -76,7 +78,7 @@ _FIELDS: dict[int, str] = {
     mavlink.MAVLINK_MSG_ID_LOAD_STATE: "time_usec x y z vx vy vz qx qy qz qx_dot qy_dot qz_dot distance"
     " tension slack_events taut source",
     mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: "time_usec x y z vx vy vz ax ay az qx qy qz elapsed duration"
-    " seq phase control_mode",
+    " seq phase control_mode asked_x asked_y asked_z asked_vx asked_vy asked_vz",
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: "time_usec e_x e_v e_q e_q_dot e_r e_omega moment"
     " psi_r psi_q thrust control_mode",
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE: "time_usec force force_min force_max saturated source",
@@ -85,6 +87,8 @@ _FIELDS: dict[int, str] = {
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed",
     mavlink.MAVLINK_MSG_ID_SIM_STATUS: "time_usec speed_factor rate_hz late_p50_us late_p99_us late_max_us"
     " missed vehicle_on_ground load_on_ground",
+    mavlink.MAVLINK_MSG_ID_WIND_STATE: "time_usec wind gust",
+    mavlink.MAVLINK_MSG_ID_CABLE_SNAP: "time_usec speed impulse",
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: "base_mode custom_mode system_status",
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: "seq",
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: "seq",
@@ -104,6 +108,7 @@ _ARRAYS = {
         ("e_x", "e_v", "e_q", "e_q_dot", "e_r", "e_omega", "moment"), 3
     ),
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE: {"force": 4},
+    mavlink.MAVLINK_MSG_ID_WIND_STATE: {"wind": 3, "gust": 3},
     mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: {"attitude_quaternion": 4},
 }
 
@@ -162,12 +167,17 @@ def _load(c: _Columns, source: int) -> LoadTrack:
 
 
 def _setpoint(c: _Columns) -> SetpointTrack:
+    asked, asked_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
+    if not asked.any():  # a vehicle that does not say: the wire fills extensions with zeros
+        asked, asked_m_s = c["x y z"], c["vx vy vz"]
     return _in_order(
         SetpointTrack(
             time_s=c["time_usec"] * _MICRO,
             position_m=enu_from_ned(c["x y z"]),
             velocity_m_s=enu_from_ned(c["vx vy vz"]),
             acceleration_m_s2=enu_from_ned(c["ax ay az"]),
+            asked_m=enu_from_ned(asked),
+            asked_m_s=enu_from_ned(asked_m_s),
             q_cable_c=enu_from_ned(c["qx qy qz"]),
             elapsed_s=c["elapsed"],
             duration_s=c["duration"],
@@ -228,6 +238,14 @@ def _simulation(c: _Columns) -> SimulationTrack:
     )
 
 
+def _wind(c: _Columns) -> WindTrack:
+    return _in_order(WindTrack(c["time_usec"] * _MICRO, enu_from_ned(c["wind"]), enu_from_ned(c["gust"])))
+
+
+def _snaps(c: _Columns) -> SnapTrack:
+    return _in_order(SnapTrack(c["time_usec"] * _MICRO, c["speed"], c["impulse"]))
+
+
 def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]:
     """Chunks of one id joined in the order in which they came; id 0 stands alone."""
     whole: list[StatusText] = []
@@ -283,5 +301,7 @@ def _assemble(
         mission_current=ItemTrack(times[current], columns[current].whole("seq")),
         mission_reached=ItemTrack(times[reached], columns[reached].whole("seq")),
         simulation=_simulation(columns[mavlink.MAVLINK_MSG_ID_SIM_STATUS]),
+        wind=_wind(columns[mavlink.MAVLINK_MSG_ID_WIND_STATE]),
+        snaps=_snaps(columns[mavlink.MAVLINK_MSG_ID_CABLE_SNAP]),
         texts=_texts(texts, boot_us),
     )

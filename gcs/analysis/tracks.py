@@ -41,6 +41,8 @@ class SetpointTrack:
     position_m: Floats  # (n, 3) ENU, desired
     velocity_m_s: Floats  # (n, 3) ENU, desired
     acceleration_m_s2: Floats  # (n, 3) ENU, desired
+    asked_m: Floats  # (n, 3) ENU, what the mission asks for; desired is as near to it as can be flown
+    asked_m_s: Floats  # (n, 3) ENU
     q_cable_c: Floats  # (n, 3) commanded cable direction, ENU
     elapsed_s: Floats  # (n,) since the item or phase began
     duration_s: Floats  # (n,) of the item or phase, NaN if open
@@ -120,6 +122,24 @@ class SimulationTrack:
     load_on_ground: Ints
 
 
+@dataclass(frozen=True)
+class WindTrack:
+    """WIND_STATE."""
+
+    time_s: Floats  # (n,) from when on it holds
+    wind_m_s: Floats  # (n, 3) ENU, mean
+    gust_m_s: Floats  # (n, 3) ENU, the gust pulse in force
+
+
+@dataclass(frozen=True)
+class SnapTrack:
+    """CABLE_SNAP."""
+
+    time_s: Floats  # (n,)
+    speed_m_s: Floats  # (n,) closing speed
+    impulse_n_s: Floats  # (n,)
+
+
 class StatusText(NamedTuple):
     """One whole STATUSTEXT, its chunks joined; stamped by the capture."""
 
@@ -144,6 +164,8 @@ class Telemetry:
     mission_current: ItemTrack
     mission_reached: ItemTrack
     simulation: SimulationTrack
+    wind: WindTrack
+    snaps: SnapTrack
     texts: tuple[StatusText, ...]
 
     @property

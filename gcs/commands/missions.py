@@ -37,22 +37,35 @@ def missions_command(as_json: bool) -> None:
 @click.command("check")
 @click.argument("mission")
 @click.option("--vehicle", default="bebop", show_default=True, help="Vehicle name or file with the limits.")
+@click.option("--as-asked", is_flag=True, help="Judge the paths as asked, not shaped.")
 @json_option
-def check_command(mission: str, vehicle: str, as_json: bool) -> int:
+def check_command(mission: str, vehicle: str, as_asked: bool, as_json: bool) -> int:
     """Check whether a vehicle can fly a mission.
 
     MISSION is a shipped name or the path of a mission file. Every limit that it breaks is named, with by how
-    much and when; the exit code is 1 if there is any.
+    much and when; the exit code is 1 if there is any. Of what can be flown it is told how long it takes, how
+    far from the asked path it is, and what it takes of rotors, cable and tilt. With --as-asked the paths are
+    judged as the laws thesis and lqr fly them, not shaped to what can be flown.
     """
-    from gcs.missions_checked import load, violations
+    from gcs.missions_checked import load, path_reports, violations
 
     loaded = load(mission)
-    found = violations(loaded, vehicle)
+    found = violations(loaded, vehicle, not as_asked)
+    reports = [] if found or as_asked else path_reports(loaded, vehicle)
     if as_json:
-        print_json({"mission": loaded.name, "vehicle": vehicle, "violations": [asdict(v) for v in found]})
+        print_json(
+            {
+                "mission": loaded.name,
+                "vehicle": vehicle,
+                "violations": [asdict(v) for v in found],
+                "paths": [asdict(r) for r in reports],
+            }
+        )
     elif found:
         for violation in found:
             click.echo(str(violation))
     else:
         click.echo(f"{loaded.name}: vehicle {vehicle} can fly it")
+        for report in reports:
+            click.echo(str(report))
     return EXIT_ERROR if found else EXIT_DONE

@@ -72,6 +72,7 @@ class PlantState(NamedTuple):
     accel_quad: Vec3  # m/s^2, world
     tension: float  # N, 0 while slack
     diverged: float  # 1.0: left the domain of the model; the state is held as it was before
+    snap_speed: float  # m/s, greatest at which the cable came taut in the last step; 0: it did not
 
 
 class Motion(NamedTuple):

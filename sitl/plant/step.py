@@ -100,11 +100,12 @@ def _held(state: PlantState) -> PlantState:
         state.accel_quad,
         state.tension,
         1.0,
+        0.0,
     )
 
 
 @kernel
-def _state_of(end: Flow, q_before: Vec3, taut: float, slack_events: float) -> PlantState:
+def _state_of(end: Flow, q_before: Vec3, taut: float, slack_events: float, snap_speed: float) -> PlantState:
     """The record of where a step led."""
     motion = end.motion
     q_cable, q_cable_dot = q_before, ZERO
@@ -130,6 +131,7 @@ def _state_of(end: Flow, q_before: Vec3, taut: float, slack_events: float) -> Pl
         end.accel_quad,
         end.tension,
         0.0,
+        snap_speed,
     )
 
 
@@ -152,7 +154,7 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
         cable_dot = sub(state.v_load, state.v_quad)
     motion = Motion(state.x_load, state.v_load, cable, cable_dot, state.quat_wxyz, state.omega_body)
 
-    remaining, impacts = h, 0
+    remaining, impacts, snap_speed = h, 0, 0.0
     while True:
         t = segment_length(motion, truth, remaining)
         low, high, low_excess, high_excess, side = 0.0, t, 0.0, 0.0, 0
@@ -194,12 +196,14 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
             else:
                 taut = 1.0
                 impacts += 1
+                closing = dot(motion.cable, motion.cable_dot) / norm(motion.cable)
+                snap_speed = max(snap_speed, closing)
                 motion = stretched(motion, truth)
         elif not remaining > 0.0:
             break
     if not _sound(end.motion):
         return _held(state)
-    return _state_of(end, state.q_cable, taut, slack_events)
+    return _state_of(end, state.q_cable, taut, slack_events, snap_speed)
 
 
 @kernel
@@ -234,4 +238,5 @@ def initial_state(truth: Truth) -> PlantState:
         accel_quad=ZERO,
         tension=0.0,
         diverged=0.0,
+        snap_speed=0.0,
     )

@@ -31,6 +31,16 @@ def sim_parameters(truth: Truth) -> ParameterTable:
             Parameter("SIM_WIND_U", 0.0, -50.0, 50.0, "m/s", "Wind upwards"),
             Parameter("SIM_GUST_STD", 0.0, 0.0, 20.0, "m/s", "Standard deviation of gusts, each axis"),
             Parameter("SIM_GUST_TAU_S", 1.0, 0.05, 60.0, "s", "Correlation time of gusts"),
+            Parameter("SIM_GUST_E", 0.0, -50.0, 50.0, "m/s", "Gust pulse on the wind, towards the east"),
+            Parameter("SIM_GUST_N", 0.0, -50.0, 50.0, "m/s", "Gust pulse on the wind, towards the north"),
+            Parameter("SIM_GUST_U", 0.0, -50.0, 50.0, "m/s", "Gust pulse on the wind, upwards"),
+            Parameter(
+                "SIM_GUST_AT_S", -1.0, -1.0, 1e6, "s", "Simulated time at which the pulse begins; -1: never"
+            ),
+            Parameter("SIM_GUST_FOR_S", 2.0, 0.0, 1e6, "s", "Duration of the pulse"),
+            Parameter(
+                "SIM_GUST_NOW", 0.0, 0.0, 1.0, "", "1: the pulse begins at the next tick", integer=True
+            ),
         ]
     )
 

@@ -3,7 +3,8 @@
 The arrows are those of the design: geometry stands alone; missions on geometry; the wire on both; the
 vehicle's beliefs on the wire; laws, estimator and services on those; the core of the flight on everything
 below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the missions; only
-`gcs/closed_loop.py` joins the cores. Sockets, clocks, threads and logging belong to the shells alone.
+`gcs/closed_loop.py` and `gcs/sweep` join the cores. Sockets, clocks, threads and logging belong to the shells
+alone.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "sitl": ("autopilot.geometry", "autopilot.wire"),
     "gcs": ("autopilot.geometry", "autopilot.wire", "missions"),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),
+    "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
 }
 # module: the only ones that may import it
 TOP: dict[str, tuple[str, ...]] = {
@@ -43,8 +45,9 @@ TOP: dict[str, tuple[str, ...]] = {
         "autopilot.telemetry_view",
         "autopilot.__main__",
         "gcs.closed_loop",
+        "gcs.sweep",
     ),
-    "autopilot.onboard": ("autopilot.__main__", "gcs.closed_loop"),
+    "autopilot.onboard": ("autopilot.__main__", "gcs.closed_loop", "gcs.sweep"),
     "gcs.closed_loop": ("gcs",),
 }
 
@@ -61,6 +64,8 @@ SHELLS = (
     "gcs.link",
     "gcs.processes",
     "gcs.stopping",
+    "gcs.sweep.pool",
+    "gcs.sweep.progress",
     "autopilot.wire.dialect.plumbline",  # generated
     "autopilot.wire.dialect.generate",
 )

@@ -10,6 +10,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
+from autopilot.flight import limits_from
 from autopilot.geometry.linear import Vec3, norm
 from autopilot.guidance import (
     LOAD_ATTITUDE,
@@ -22,25 +23,39 @@ from autopilot.guidance import (
     Creep,
     Hold,
     Leg,
+    Pass,
     Run,
+    Slow,
     Swing,
     brake_leg,
     carry_leg,
     least_move_s,
+    slow_leg,
     transfer_leg,
 )
-from missions.model import Sine, Term
-from missions.signals import signal_table
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from missions.model import Signals, Sine, Term
+from missions.shaping import shape, unshaped
+from missions.waypoints import Passage, passage
 
 HERE, THERE = (1.0, -2.0, 3.0), (2.0, 1.0, 2.5)
-TABLE = signal_table((Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
+SIGNALS = Signals(4.0, (Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
+LIMITS = limits_from(autopilot_parameters(load_belief("bebop")))
+SHAPED = shape(Signals(3.0, (Term("y", 0.2, 0.2, 0.7, None, 0.0),)), LIMITS.body, LIMITS.bounds)
+POINTS = (HERE, THERE, (3.0, 1.0, 3.0))
+_PATH, _TIMES = passage(POINTS, 1.5, 1.5, LIMITS.body, LIMITS.bounds, False)
+PASSAGE = Passage(_PATH.table(), 0.0, float(_TIMES[1]), HERE)
 BRAKE = Brake(HERE, (1.2, -0.4, 0.1), (-0.5, 0.8, 0.2), 2.4)
 LEGS: dict[str, Leg] = {
     "hold": Hold(HERE, 5.0),
     "transfer": transfer_leg(HERE, THERE, 1.5, 1.5, LOAD_POSITION),
     "brake": BRAKE,
     "creep": Creep(HERE, (0.0, 0.0, -0.2), QUAD_POSITION),
-    "run": Run(HERE, TABLE, 4.0),
+    "run": Run(HERE, unshaped(SIGNALS)),
+    "shaped run": Run(HERE, SHAPED),
+    "pass": Pass(PASSAGE, (0.02, -0.01, 0.0), 1.7),
+    "slow": Slow(Run(HERE, unshaped(SIGNALS)), 0.9, 2.4),
     "swing": Swing(HERE, 0.1, 0.2, 1.5, QUAD_ATTITUDE),
     "calm": Calm(HERE, (0.2, 0.1, 0.0), (1.0, -0.5, 0.0), False, 1.2),
 }
@@ -108,6 +123,42 @@ def test_a_brake_out_of_steady_motion_keeps_to_its_limit_and_never_turns_back(
     for jet in along:
         for v, v0 in zip(jet[1], velocity, strict=True):
             assert v * v0 >= -ROUNDING
+
+
+@given(at=st.floats(0.0, 2.7), limit=st.floats(0.2, 5.0))
+def test_a_stop_goes_on_where_its_leg_was_and_keeps_to_its_path(at: float, limit: float) -> None:
+    run = Run(HERE, unshaped(SIGNALS))
+    leg = slow_leg(run, at, limit, LEAST_S)
+    assert leg.duration_s >= LEAST_S
+    for stopped, going in zip(leg.jet(0.0), run.jet(at), strict=True):
+        assert stopped == pytest.approx(going, abs=ROUNDING)
+    end = leg.jet(leg.duration_s)
+    assert end[0] == leg.end
+    assert all(derivative == (0.0, 0.0, 0.0) for derivative in end[1:])
+    assert leg.jet(leg.duration_s * (1.0 - 1e-9))[0] == pytest.approx(leg.end, abs=1e-6)
+
+
+def test_a_stop_flies_no_part_of_its_path_faster() -> None:
+    """The run reaches 2 m/s at the peak of its sine; out of an acceleration the stop must not gain on it."""
+    run = Run(HERE, unshaped(SIGNALS))
+    fastest = max(norm(run.jet(0.02 * k)[1]) for k in range(200))
+    leg = slow_leg(run, 0.75, 1.0, LEAST_S)
+    speeds = [norm(leg.jet(leg.duration_s * k / 100)[1]) for k in range(101)]
+    assert max(speeds) <= fastest + ROUNDING
+    middle = leg.jet(0.5 * leg.duration_s)
+    # the integral of 1 - s, a polynomial of degree 13, up to the middle
+    passed = 0.75 + leg.duration_s * 0.4476318359375
+    assert middle[0] == pytest.approx(run.jet(passed)[0], abs=1e-6)
+
+
+def test_a_stop_out_of_a_stop_is_the_rest_of_it() -> None:
+    first = slow_leg(Run(HERE, unshaped(SIGNALS)), 0.9, 1.5, LEAST_S)
+    second = slow_leg(first, 0.4, 1.5, LEAST_S)
+    third = slow_leg(second, 0.3, 1.5, LEAST_S)
+    assert (third.leg, third.end) == (first.leg, first.end)
+    assert third.duration_s == pytest.approx(first.duration_s - 0.7)
+    for again, before in zip(third.jet(0.2), first.jet(0.9), strict=True):
+        assert again == pytest.approx(before, abs=ROUNDING)
 
 
 @given(lean=st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)), rate=vectors)

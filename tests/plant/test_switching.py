@@ -135,6 +135,22 @@ def test_a_stretched_cable_is_taken_up_at_once_unless_it_shortens(thesis, speed,
         assert math.dist(state.x_load, state.x_quad) == pytest.approx(thesis.cable_length, abs=1e-12)
 
 
+def test_a_step_tells_at_which_speed_the_cable_came_taut(thesis):
+    """0.5 m/s apart, both in free fall: nothing changes that speed before the distance is the length."""
+    start = initial_state(thesis)._replace(
+        x_quad=(0.0, 0.0, 50.0),
+        x_load=(0.0, 0.0, 50.0 - thesis.cable_length + 1e-3),
+        v_load=(0.0, 0.0, -0.5),
+        q_cable=(0.0, 0.0, -1.0),
+    )
+    before = advance(start, thesis, OFF, CALM, 1e-3)
+    assert (before.taut, before.snap_speed) == (0.0, 0.0)
+    snapped = advance(before, thesis, OFF, CALM, 4e-3)
+    assert snapped.taut == 1.0
+    assert snapped.snap_speed == pytest.approx(0.5, abs=1e-9)
+    assert advance(snapped, thesis, OFF, CALM, 4e-3).snap_speed == 0.0
+
+
 @pytest.mark.parametrize("case", ["taut", "slack", "switching"])
 def test_order_of_the_step_in_the_air(convergence, case):
     errors, order = convergence.study(case, (4e-3, 2e-3, 1e-3, 5e-4))

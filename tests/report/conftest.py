@@ -69,6 +69,8 @@ class Flight:
     psi_q: np.ndarray
     control_mode: np.ndarray
     texts: list[tuple[float, int, str]] = field(default_factory=list)
+    winds: list[tuple[float, tuple]] = field(default_factory=list)  # from when on which gust pulse, ENU
+    snaps: list[tuple[float, float, float]] = field(default_factory=list)  # when, speed, impulse
     drop: Callable[[int, str], bool] = lambda i, kind: False
 
     @property
@@ -79,6 +81,12 @@ class Flight:
         truth, common, dialect = FrameWriter(1, 26), FrameWriter(1, 1), FrameWriter(1, 25)
         ground, load = FrameWriter(255, 190), FrameWriter(2, 35)
         texts = sorted(self.texts)
+        for t, gust in self.winds:
+            message = mavlink.MAVLink_wind_state_message(round(t * 1e6), [0.0] * 3, _ned(np.array(gust)))
+            yield BOOT_US + round(t * 1e6), truth.frame(message)
+        for t, speed, impulse in self.snaps:
+            message = mavlink.MAVLink_cable_snap_message(round(t * 1e6), speed, impulse)
+            yield BOOT_US + round(t * 1e6), truth.frame(message)
         half = np.sqrt(0.5)
         for i, t in enumerate(self.time_s):
             us = round(t * 1e6)

@@ -217,6 +217,72 @@ def test_slack_counts_while_the_load_is_carried(flights):
     assert record(flight)["slack_events"] == 3
 
 
+BLOW, CALM = (5.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+
+
+def gusty(flights, back_s):
+    """Ten seconds of hovering, 0.2 m off from one second to `back_s` after it began."""
+    begin = flights.before_s
+
+    def error(t):
+        off = (t >= 1.0 - 1e-9) & (t < back_s - 1e-9)
+        return np.where(off, 0.2, 0.01)[:, None] * np.array((0.0, 1.0, 0.0))
+
+    flight = flights.flight(10.0, flights.still, error)
+    flight.winds = [(0.0, CALM), (begin + 1.0, BLOW), (begin + 1.2, BLOW), (begin + 3.0, CALM)]
+    return flight
+
+
+def test_a_gust_and_what_came_of_it(flights, tolerances):
+    found = record(gusty(flights, 4.5))
+    assert found["gusts"] == 1
+    assert found["gust_error_max_m"] == pytest.approx(0.2, abs=tolerances.WIRE_M)
+    # 3.0 s to the last sample before 4.5 s
+    assert found["gust_recovery_50mm_s"] == pytest.approx(1.5 - flights.tick_s, abs=flights.tick_s)
+
+
+def test_a_gust_that_did_not_take_the_load_along(flights):
+    flight = gusty(flights, 0.0)
+    assert record(flight)["gust_recovery_50mm_s"] == 0.0
+    flight.winds = []
+    found = record(flight)
+    assert (found["gusts"], found["gust_error_max_m"], found["gust_recovery_50mm_s"]) == (0, None, None)
+
+
+def test_a_gust_without_recovery_has_no_time_of_recovery(flights):
+    flight = gusty(flights, 1e3)
+    found = record(flight)
+    assert (found["gusts"], found["gust_recovery_50mm_s"]) == (1, None)
+
+
+def test_a_gust_that_is_not_over_while_the_load_is_carried_does_not_count(flights):
+    flight = gusty(flights, 4.5)
+    flight.winds = flight.winds[:3]
+    assert record(flight)["gusts"] == 0
+
+
+def test_the_longest_recovery_of_two_gusts(flights):
+    flight = gusty(flights, 4.5)
+    begin = flights.before_s
+    flight.winds += [(begin + 5.0, BLOW), (begin + 6.0, CALM)]
+    found = record(flight)
+    assert found["gusts"] == 2
+    assert found["gust_recovery_50mm_s"] == pytest.approx(1.5 - flights.tick_s, abs=flights.tick_s)
+
+
+def test_snaps_from_takeoff_to_touchdown(flights):
+    flight = flights.flight(4.0, flights.still)
+    taken_off = flight.time_s[np.flatnonzero(flight.phase == mavlink.PLUMBLINE_PHASE_TAUTEN)[5]]
+    lifted = flight.time_s[np.flatnonzero(flight.phase == mavlink.PLUMBLINE_PHASE_LIFT)[5]]
+    flight.snaps = [(0.01, 9.0, 9.0), (taken_off, 0.25, 0.125), (lifted, 0.125, 0.0625)]
+    after = np.flatnonzero(flight.time_s > lifted)
+    flight.tension[after[10]] = 1.75
+    flight.tension[after[100]] = 7.0  # 0.8 s later
+    found = record(flight)
+    assert (found["snaps"], found["snap_speed_max_m_s"], found["snap_impulse_max_n_s"]) == (2, 0.25, 0.125)
+    assert found["snap_tension_max_n"] == 1.75
+
+
 def test_tilt_swing_and_tension(flights, tolerances):
     flight = flights.flight(4.0, flights.still)
     i = np.flatnonzero(flight.mission)[17]

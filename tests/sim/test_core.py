@@ -184,6 +184,31 @@ def test_wind_blows_and_gusts_vary_about_it(core) -> None:
     assert calm.wind == (0.0, 2.0, 0.0)
 
 
+def test_a_gust_pulse_is_added_from_tick_to_tick(core) -> None:
+    pulse = {"SIM_GUST_E": 5.0, "SIM_GUST_U": -2.0, "SIM_GUST_AT_S": 0.01, "SIM_GUST_FOR_S": 0.02}
+    blown = core("ideal", vehicle="bebop", SIM_WIND_E=1.0, **pulse)
+    winds = []
+    for _ in range(10):
+        blown.tick(FORCES)
+        winds.append(blown.wind)
+    # 10 ms and 30 ms lie between ticks of 4 ms: it blows in those that begin at 12 ... 28 ms
+    assert winds == [(1.0, 0.0, 0.0)] * 3 + [(6.0, 0.0, -2.0)] * 5 + [(1.0, 0.0, 0.0)] * 2
+
+
+def test_a_gust_pulse_under_way_follows_its_strength_and_no_change_of_its_time(core) -> None:
+    settings = {"SIM_GUST_E": 5.0, "SIM_GUST_AT_S": 0.0, "SIM_GUST_FOR_S": 1.0}
+    blown = core("ideal", **settings)
+    blown.tick(FORCES)
+    assert blown.wind == (5.0, 0.0, 0.0)
+    harder = blown.settings._replace(pulse=(7.0, 0.0, 0.0))
+    blown.retune(blown.truth, harder)
+    blown.tick(FORCES)
+    assert blown.wind == (7.0, 0.0, 0.0)
+    blown.retune(blown.truth, harder._replace(pulse_at_us=4000))
+    blown.tick(FORCES)
+    assert blown.wind == (0.0, 0.0, 0.0)
+
+
 @pytest.mark.parametrize("rate", [300, 333, 240])
 def test_rates_that_do_not_divide_are_refused(core, rate: int) -> None:
     with pytest.raises(ParameterError, match=rf"SIM_RATE_HZ = {rate} Hz; .*1000000 us / {rate} is not"):

@@ -128,7 +128,7 @@ def test_truth_goes_out_on_every_second_tick_and_status_five_times_a_second(answ
 def test_truth_is_the_truth(answerer, messages) -> None:
     simulator = HilSimulator.build(vehicle="bebop", sensors="lab")
     answerer((1.45, 1.45, 1.45, 2.5)).fly(simulator, 100)
-    vehicle, load, rotors, status = messages(simulator.truth_datagram())
+    vehicle, load, rotors, _, status = messages(simulator.truth_datagram())
     state = simulator._core.state
     got = convert.read_load_state(load)
     assert got.source == mavlink.PLUMBLINE_SOURCE_TRUTH
@@ -260,6 +260,72 @@ def test_real_time_rotors_stop_when_commands_stay_away(answerer) -> None:
         assert simulator._core.command == pytest.approx((0.5,) * 4)
     simulator.advance()
     assert simulator._core.command == (0.0, 0.0, 0.0, 0.0)
+
+
+def told_winds(simulator: HilSimulator, answerer, messages, ticks: int) -> list[tuple]:
+    """Time (us), mean and pulse (ENU) of every WIND_STATE of so many ticks."""
+    winds = []
+    for datagram in answerer().fly(simulator, ticks):
+        for message in messages(datagram):
+            if message.get_type() == "WIND_STATE":
+                winds.append(tuple(convert.read_wind_state(message)))
+    return winds
+
+
+def test_a_gust_is_told_with_the_ticks_of_its_edges(answerer, messages) -> None:
+    settings = {"SIM_WIND_E": 3.0, "SIM_GUST_N": 5.0, "SIM_GUST_AT_S": 0.5, "SIM_GUST_FOR_S": 0.25}
+    winds = told_winds(HilSimulator.build(settings=settings), answerer, messages, 250)
+    calm, blown = (0.0, 0.0, 0.0), (0.0, 5.0, 0.0)
+    assert {wind for _, wind, _ in winds} == {(3.0, 0.0, 0.0)}
+    expected = {0: calm, 200: calm, 400: calm, 500: blown, 600: blown, 752: calm, 800: calm}
+    # 750 ms is no tick: the first that is not before it is at 752 ms
+    assert [(time_us // 1000, gust) for time_us, _, gust in winds] == list(expected.items())
+
+
+def set_parameter(simulator: HilSimulator, answerer, name: str, value: float) -> None:
+    """PARAM_SET beside the answer to the present tick."""
+    pilot = answerer()
+    message = mavlink.MAVLink_param_set_message(1, 26, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32)
+    assert simulator.receive(pilot.answer(simulator.now_us) + pilot.writer.frame(message))
+    simulator.advance()
+
+
+def test_a_gust_can_be_triggered_at_once(answerer, messages) -> None:
+    simulator = HilSimulator.build(settings={"SIM_GUST_E": 4.0, "SIM_GUST_FOR_S": 0.1})
+    answerer().fly(simulator, 100)
+    set_parameter(simulator, answerer, "SIM_GUST_NOW", 1.0)
+    values = {
+        m.param_id: m.param_value for m in messages(simulator.sensor_datagram()) if hasattr(m, "param_id")
+    }
+    assert values["SIM_GUST_NOW"] == 0.0
+    assert values["SIM_GUST_AT_S"] == pytest.approx(0.404)
+    winds = told_winds(simulator, answerer, messages, 40)
+    assert [time_us // 1000 for time_us, _, gust in winds if gust != (0.0, 0.0, 0.0)] == [404]
+    assert [time_us // 1000 for time_us, _, gust in winds if gust == (0.0, 0.0, 0.0)] == [504]
+
+
+def test_a_gust_of_the_past_does_nothing(answerer, messages) -> None:
+    simulator = HilSimulator.build(settings={"SIM_GUST_E": 4.0, "SIM_GUST_FOR_S": 10.0})
+    answerer().fly(simulator, 100)
+    set_parameter(simulator, answerer, "SIM_GUST_AT_S", 0.2)
+    winds = told_winds(simulator, answerer, messages, 100)
+    assert winds
+    assert {gust for _, _, gust in winds} == {(0.0, 0.0, 0.0)}
+    set_parameter(simulator, answerer, "SIM_GUST_AT_S", 1.0)  # the future is not the past
+    assert (4.0, 0.0, 0.0) in {gust for _, _, gust in told_winds(simulator, answerer, messages, 100)}
+
+
+def test_a_cable_that_comes_taut_is_told_of(answerer, messages) -> None:
+    simulator = HilSimulator.build(sensors="ideal")
+    sent = answerer((1.45,) * 4).fly(simulator, 300)  # lifts vehicle and load
+    (snap,) = [m for d in sent for m in messages(d) if m.get_type() == "CABLE_SNAP"]
+    truth = simulator._core.truth
+    reduced_mass = truth.quad_mass * truth.load_mass / (truth.quad_mass + truth.load_mass)
+    assert snap.speed > 0.5  # m/s, it climbs at about 2 m/s^2 over 0.7 m
+    assert snap.impulse == pytest.approx(reduced_mass * snap.speed, rel=1e-6)
+    loads = [m for d in sent for m in messages(d) if m.get_type() == "LOAD_STATE"]
+    first_taut = min(m.time_usec for m in loads if m.taut)
+    assert 0 <= first_taut - snap.time_usec <= 4000  # truth goes out on every second tick
 
 
 def test_status_carries_what_the_shell_measured(answerer, messages) -> None:

@@ -137,6 +137,8 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             vectors,
             positive,
             positive | st.just(NAN),
+            vectors,
+            vectors,
         ),
         convert.load_setpoint_message,
         convert.read_load_setpoint,
@@ -167,6 +169,11 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
         ),
         convert.rotor_state_message,
         convert.read_rotor_state,
+    ),
+    "wind state": (
+        st.builds(convert.WindState, times, vectors, vectors),
+        convert.wind_state_message,
+        convert.read_wind_state,
     ),
 }
 
@@ -316,9 +323,10 @@ def test_no_state_however_wild_raises(v: Any, quat: Any) -> None:
         convert.hil_state_quaternion_message(0, quat, v, v, v, v[0], v, home=HOME),
         convert.hil_actuator_controls_message(0, (*v, v[0]), True, True),
         convert.load_state_message(0, 0, v, v, v, v, v[0], v[0], True, 10**9),
-        convert.load_setpoint_message(0, 0, 0, 10**9, v, v, v, v, v[0], v[0]),
+        convert.load_setpoint_message(0, 0, 0, 10**9, v, v, v, v, v[0], v[0], v, v),
         convert.cascade_errors_message(0, 0, v, v, v, v, v, v, v[0], v[0], v[0], v),
         convert.rotor_state_message(0, 0, (*v, v[0]), v[0], v[0], 0),
+        convert.wind_state_message(0, v, v),
         convert.attitude_message(0, quat, v),
         convert.attitude_quaternion_message(0, quat, v),
         convert.local_position_ned_message(0, v, v),
@@ -440,12 +448,14 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        convert.load_setpoint_message(0, 5, 3, 7, V, V, V, V, 1.0, 2.0),
+        convert.load_setpoint_message(0, 5, 3, 7, V, V, V, V, 1.0, 2.0, V, V),
         {
             "x y z": NED,
             "vx vy vz": NED,
             "ax ay az": NED,
             "qx qy qz": NED,
+            "asked_x asked_y asked_z": NED,
+            "asked_vx asked_vy asked_vz": NED,
             "elapsed duration seq phase control_mode": [1.0, 2.0, 7, 5, 3],
         },
     ),
@@ -461,6 +471,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         convert.rotor_state_message(0, 2, (1.0, 2.0, 3.0, 4.0), 0.0, math.inf, 9),
         {"force": [(1.0, 2.0, 3.0, 4.0)], "force_min force_max saturated source": [0.0, math.inf, 9, 2]},
     ),
+    (convert.wind_state_message(0, V, V), {"wind": [tuple(NED)], "gust": [tuple(NED)]}),
     (
         convert.position_target_local_ned_message(0, V, V, V),
         {"x y z": NED, "vx vy vz": NED, "afx afy afz": NED, "type_mask": [0xC00]},

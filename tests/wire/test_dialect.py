@@ -27,8 +27,10 @@ def test_our_messages_keep_their_ids_and_contents() -> None:
 CONTENTS = {
     "LOAD_SENSOR": (60100, 25, 58),
     "LOAD_STATE": (60101, 243, 68),
-    "LOAD_SETPOINT": (60102, 67, 68),
+    "LOAD_SETPOINT": (60102, 67, 92),
     "CASCADE_ERRORS": (60103, 142, 105),
     "ROTOR_STATE": (60104, 95, 34),
     "SIM_STATUS": (60105, 30, 34),
+    "WIND_STATE": (60106, 38, 32),
+    "CABLE_SNAP": (60107, 208, 16),
 }

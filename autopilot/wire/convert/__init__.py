@@ -12,6 +12,7 @@ from autopilot.wire.convert.flight import (
     LoadSetpoint,
     LoadState,
     RotorState,
+    WindState,
     cascade_errors_message,
     load_setpoint_message,
     load_state_message,
@@ -19,7 +20,9 @@ from autopilot.wire.convert.flight import (
     read_load_setpoint,
     read_load_state,
     read_rotor_state,
+    read_wind_state,
     rotor_state_message,
+    wind_state_message,
 )
 from autopilot.wire.convert.geodesy import (
     EARTH_RADIUS_M,
@@ -102,6 +105,7 @@ __all__ = [
     "LocalPosition",
     "Odometry",
     "RotorState",
+    "WindState",
     "altitude_message",
     "attitude_message",
     "attitude_quaternion_message",
@@ -142,9 +146,11 @@ __all__ = [
     "read_local_position_ned",
     "read_odometry",
     "read_rotor_state",
+    "read_wind_state",
     "rotor_state_message",
     "saturated",
     "uint16",
     "vfr_hud_message",
     "winch_status_message",
+    "wind_state_message",
 ]

@@ -82,6 +82,8 @@ class LoadSetpoint(NamedTuple):
     q_cable_c: Vec3  # commanded direction of the cable
     elapsed: float  # s since the item or phase began
     duration: float  # s, NaN if open
+    asked_position: Vec3  # what the mission asks for; `position` is as near to it as can be flown
+    asked_velocity: Vec3
 
 
 def load_setpoint_message(
@@ -95,6 +97,8 @@ def load_setpoint_message(
     q_cable_c: Vec3,
     elapsed: float,
     duration: float,
+    asked_position: Vec3,
+    asked_velocity: Vec3,
 ) -> Any:
     """LOAD_SETPOINT, see `LoadSetpoint`."""
     return mavlink.MAVLink_load_setpoint_message(
@@ -108,6 +112,8 @@ def load_setpoint_message(
         uint16(seq),
         phase,
         control_mode,
+        *ned_from_enu(asked_position),
+        *ned_from_enu(asked_velocity),
     )
 
 
@@ -124,6 +130,8 @@ def read_load_setpoint(m: Any) -> LoadSetpoint:
         enu_from_ned((m.qx, m.qy, m.qz)),
         m.elapsed,
         m.duration,
+        enu_from_ned((m.asked_x, m.asked_y, m.asked_z)),
+        enu_from_ned((m.asked_vx, m.asked_vy, m.asked_vz)),
     )
 
 
@@ -191,6 +199,24 @@ def read_cascade_errors(m: Any) -> CascadeErrors:
         m.thrust,
         flu_from_frd(tuple(m.moment)),
     )
+
+
+class WindState(NamedTuple):
+    """WIND_STATE: mean wind and gust pulse in force from `time_us` on, m/s; random gusts are in neither."""
+
+    time_us: int
+    wind: Vec3
+    gust: Vec3
+
+
+def wind_state_message(time_us: int, wind: Vec3, gust: Vec3) -> Any:
+    """WIND_STATE, see `WindState`."""
+    return mavlink.MAVLink_wind_state_message(time_us, ned_from_enu(wind), ned_from_enu(gust))
+
+
+def read_wind_state(m: Any) -> WindState:
+    """Inverse of `wind_state_message`."""
+    return WindState(m.time_usec, enu_from_ned(tuple(m.wind)), enu_from_ned(tuple(m.gust)))
 
 
 class RotorState(NamedTuple):

@@ -442,7 +442,8 @@ enums["PLUMBLINE_COMMAND"][31010].param[5] = """Start after the beginning of the
 enums["PLUMBLINE_COMMAND"][31010].label[5] = """Start"""
 enums["PLUMBLINE_COMMAND"][31010].param[6] = """Duration of the hold, -1 for ever (MISSION_ITEM_INT.y)."""
 enums["PLUMBLINE_COMMAND"][31010].label[6] = """Hold"""
-enums["PLUMBLINE_COMMAND"][31010].param[7] = """Reserved (0)."""
+enums["PLUMBLINE_COMMAND"][31010].param[7] = """Time after the start by which nine tenths of the rise are to be made; 0: as the envelope has it."""
+enums["PLUMBLINE_COMMAND"][31010].label[7] = """Rise by"""
 PLUMBLINE_LOAD_SIGNAL_FACTOR = 31011
 enums["PLUMBLINE_COMMAND"][31011] = EnumEntry("PLUMBLINE_LOAD_SIGNAL_FACTOR", """Multiplies the last term by a sine.""")
 enums["PLUMBLINE_COMMAND"][31011].param[1] = """Phase."""
@@ -6445,6 +6446,8 @@ MAVLINK_MSG_ID_LOAD_SETPOINT = 60102
 MAVLINK_MSG_ID_CASCADE_ERRORS = 60103
 MAVLINK_MSG_ID_ROTOR_STATE = 60104
 MAVLINK_MSG_ID_SIM_STATUS = 60105
+MAVLINK_MSG_ID_WIND_STATE = 60106
+MAVLINK_MSG_ID_CABLE_SNAP = 60107
 MAVLINK_MSG_ID_SYS_STATUS = 1
 MAVLINK_MSG_ID_SYSTEM_TIME = 2
 MAVLINK_MSG_ID_PING = 4
@@ -6774,22 +6777,22 @@ class MAVLink_load_setpoint_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_LOAD_SETPOINT
     msgname = "LOAD_SETPOINT"
-    fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode"]
-    ordered_fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode"]
-    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "uint16_t", "uint8_t", "uint8_t"]
+    fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode", "asked_x", "asked_y", "asked_z", "asked_vx", "asked_vy", "asked_vz"]
+    ordered_fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az", "qx", "qy", "qz", "elapsed", "duration", "seq", "phase", "control_mode", "asked_x", "asked_y", "asked_z", "asked_vx", "asked_vy", "asked_vz"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "float", "uint16_t", "uint8_t", "uint8_t", "float", "float", "float", "float", "float", "float"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {"phase": "PLUMBLINE_PHASE", "control_mode": "PLUMBLINE_CONTROL_MODE"}
-    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s/s", "ay": "m/s/s", "az": "m/s/s", "elapsed": "s", "duration": "s"}
-    native_format = bytearray(b"<QffffffffffffffHBB")
-    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
-    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "ax": "m/s/s", "ay": "m/s/s", "az": "m/s/s", "elapsed": "s", "duration": "s", "asked_x": "m", "asked_y": "m", "asked_z": "m", "asked_vx": "m/s", "asked_vy": "m/s", "asked_vz": "m/s"}
+    native_format = bytearray(b"<QffffffffffffffHBBffffff")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
     crc_extra = 67
-    unpacker = struct.Struct("<QffffffffffffffHBB")
+    unpacker = struct.Struct("<QffffffffffffffHBBffffff")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int):
+    def __init__(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, asked_x: float = 0, asked_y: float = 0, asked_z: float = 0, asked_vx: float = 0, asked_vy: float = 0, asked_vz: float = 0):
         MAVLink_message.__init__(self, MAVLink_load_setpoint_message.id, MAVLink_load_setpoint_message.msgname)
         self._fieldnames = MAVLink_load_setpoint_message.fieldnames
         self._instance_field = MAVLink_load_setpoint_message.instance_field
@@ -6812,9 +6815,15 @@ class MAVLink_load_setpoint_message(MAVLink_message):
         self.seq = seq
         self.phase = phase
         self.control_mode = control_mode
+        self.asked_x = asked_x
+        self.asked_y = asked_y
+        self.asked_z = asked_z
+        self.asked_vx = asked_vx
+        self.asked_vy = asked_vy
+        self.asked_vz = asked_vz
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.x, self.y, self.z, self.vx, self.vy, self.vz, self.ax, self.ay, self.az, self.qx, self.qy, self.qz, self.elapsed, self.duration, self.seq, self.phase, self.control_mode), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.x, self.y, self.z, self.vx, self.vy, self.vz, self.ax, self.ay, self.az, self.qx, self.qy, self.qz, self.elapsed, self.duration, self.seq, self.phase, self.control_mode, self.asked_x, self.asked_y, self.asked_z, self.asked_vx, self.asked_vy, self.asked_vz), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -6960,6 +6969,87 @@ class MAVLink_sim_status_message(MAVLink_message):
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
 setattr(MAVLink_sim_status_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_wind_state_message(MAVLink_message):
+    """
+    Wind of the simulated world: five times a second, and when a gust
+    pulse begins or ends.
+    """
+
+    id = MAVLINK_MSG_ID_WIND_STATE
+    msgname = "WIND_STATE"
+    fieldnames = ["time_usec", "wind", "gust"]
+    ordered_fieldnames = ["time_usec", "wind", "gust"]
+    fieldtypes = ["uint64_t", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "wind": "m/s", "gust": "m/s"}
+    native_format = bytearray(b"<Qff")
+    orders = [0, 1, 2]
+    lengths = [1, 3, 3]
+    array_lengths = [0, 3, 3]
+    crc_extra = 38
+    unpacker = struct.Struct("<Q3f3f")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, time_usec: int, wind: Sequence[float], gust: Sequence[float]):
+        MAVLink_message.__init__(self, MAVLink_wind_state_message.id, MAVLink_wind_state_message.msgname)
+        self._fieldnames = MAVLink_wind_state_message.fieldnames
+        self._instance_field = MAVLink_wind_state_message.instance_field
+        self._instance_offset = MAVLink_wind_state_message.instance_offset
+        self.time_usec = time_usec
+        self.wind = wind
+        self.gust = gust
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.wind[0], self.wind[1], self.wind[2], self.gust[0], self.gust[1], self.gust[2]), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_wind_state_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_cable_snap_message(MAVLink_message):
+    """
+    The slack cable of the simulated world came taut.
+    """
+
+    id = MAVLINK_MSG_ID_CABLE_SNAP
+    msgname = "CABLE_SNAP"
+    fieldnames = ["time_usec", "speed", "impulse"]
+    ordered_fieldnames = ["time_usec", "speed", "impulse"]
+    fieldtypes = ["uint64_t", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "speed": "m/s", "impulse": "N.s"}
+    native_format = bytearray(b"<Qff")
+    orders = [0, 1, 2]
+    lengths = [1, 1, 1]
+    array_lengths = [0, 0, 0]
+    crc_extra = 208
+    unpacker = struct.Struct("<Qff")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, time_usec: int, speed: float, impulse: float):
+        MAVLink_message.__init__(self, MAVLink_cable_snap_message.id, MAVLink_cable_snap_message.msgname)
+        self._fieldnames = MAVLink_cable_snap_message.fieldnames
+        self._instance_field = MAVLink_cable_snap_message.instance_field
+        self._instance_offset = MAVLink_cable_snap_message.instance_offset
+        self.time_usec = time_usec
+        self.speed = speed
+        self.impulse = impulse
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.speed, self.impulse), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_cable_snap_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_sys_status_message(MAVLink_message):
@@ -17127,6 +17217,8 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_CASCADE_ERRORS: MAVLink_cascade_errors_message,
     MAVLINK_MSG_ID_ROTOR_STATE: MAVLink_rotor_state_message,
     MAVLINK_MSG_ID_SIM_STATUS: MAVLink_sim_status_message,
+    MAVLINK_MSG_ID_WIND_STATE: MAVLink_wind_state_message,
+    MAVLINK_MSG_ID_CABLE_SNAP: MAVLink_cable_snap_message,
     MAVLINK_MSG_ID_SYS_STATUS: MAVLink_sys_status_message,
     MAVLINK_MSG_ID_SYSTEM_TIME: MAVLink_system_time_message,
     MAVLINK_MSG_ID_PING: MAVLink_ping_message,
@@ -17833,7 +17925,7 @@ class MAVLink(object):
         """
         self.send(self.load_state_encode(time_usec, x, y, z, vx, vy, vz, qx, qy, qz, qx_dot, qy_dot, qz_dot, distance, tension, slack_events, taut, source), force_mavlink1=force_mavlink1)
 
-    def load_setpoint_encode(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int) -> MAVLink_load_setpoint_message:
+    def load_setpoint_encode(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, asked_x: float = 0, asked_y: float = 0, asked_z: float = 0, asked_vx: float = 0, asked_vy: float = 0, asked_vz: float = 0) -> MAVLink_load_setpoint_message:
         """
         What the cascade is asked to track, and where in the flight it is.
 
@@ -17855,11 +17947,17 @@ class MAVLink(object):
         seq                       : Mission item. (type:uint16_t)
         phase                     : Phase of flight. (type:uint8_t, values:PLUMBLINE_PHASE)
         control_mode              : What the cascade tracks. (type:uint8_t, values:PLUMBLINE_CONTROL_MODE)
+        asked_x                   : Load position that the mission asks for, north of home; the desired one is as near to it as can be flown. [m] (type:float)
+        asked_y                   : The same, east of home. [m] (type:float)
+        asked_z                   : The same, below home. [m] (type:float)
+        asked_vx                  : Load velocity that the mission asks for, north. [m/s] (type:float)
+        asked_vy                  : The same, east. [m/s] (type:float)
+        asked_vz                  : The same, down. [m/s] (type:float)
 
         """
-        return MAVLink_load_setpoint_message(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode)
+        return MAVLink_load_setpoint_message(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode, asked_x, asked_y, asked_z, asked_vx, asked_vy, asked_vz)
 
-    def load_setpoint_send(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, force_mavlink1: bool = False) -> None:
+    def load_setpoint_send(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, ax: float, ay: float, az: float, qx: float, qy: float, qz: float, elapsed: float, duration: float, seq: int, phase: int, control_mode: int, asked_x: float = 0, asked_y: float = 0, asked_z: float = 0, asked_vx: float = 0, asked_vy: float = 0, asked_vz: float = 0, force_mavlink1: bool = False) -> None:
         """
         What the cascade is asked to track, and where in the flight it is.
 
@@ -17881,9 +17979,15 @@ class MAVLink(object):
         seq                       : Mission item. (type:uint16_t)
         phase                     : Phase of flight. (type:uint8_t, values:PLUMBLINE_PHASE)
         control_mode              : What the cascade tracks. (type:uint8_t, values:PLUMBLINE_CONTROL_MODE)
+        asked_x                   : Load position that the mission asks for, north of home; the desired one is as near to it as can be flown. [m] (type:float)
+        asked_y                   : The same, east of home. [m] (type:float)
+        asked_z                   : The same, below home. [m] (type:float)
+        asked_vx                  : Load velocity that the mission asks for, north. [m/s] (type:float)
+        asked_vy                  : The same, east. [m/s] (type:float)
+        asked_vz                  : The same, down. [m/s] (type:float)
 
         """
-        self.send(self.load_setpoint_encode(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode), force_mavlink1=force_mavlink1)
+        self.send(self.load_setpoint_encode(time_usec, x, y, z, vx, vy, vz, ax, ay, az, qx, qy, qz, elapsed, duration, seq, phase, control_mode, asked_x, asked_y, asked_z, asked_vx, asked_vy, asked_vz), force_mavlink1=force_mavlink1)
 
     def cascade_errors_encode(self, time_usec: int, e_x: Sequence[float], e_v: Sequence[float], e_q: Sequence[float], e_q_dot: Sequence[float], e_r: Sequence[float], e_omega: Sequence[float], psi_r: float, psi_q: float, thrust: float, moment: Sequence[float], control_mode: int) -> MAVLink_cascade_errors_message:
         """
@@ -17990,6 +18094,52 @@ class MAVLink(object):
 
         """
         self.send(self.sim_status_encode(time_usec, speed_factor, rate_hz, late_p50_us, late_p99_us, late_max_us, missed, vehicle_on_ground, load_on_ground), force_mavlink1=force_mavlink1)
+
+    def wind_state_encode(self, time_usec: int, wind: Sequence[float], gust: Sequence[float]) -> MAVLink_wind_state_message:
+        """
+        Wind of the simulated world: five times a second, and when a gust
+        pulse begins or ends.
+
+        time_usec                 : Time from which this holds, clock of the vehicle. [us] (type:uint64_t)
+        wind                      : Mean wind, NED, without random gusts. [m/s] (type:float)
+        gust                      : Gust pulse in force, NED, to be added; 0 where there is none. [m/s] (type:float)
+
+        """
+        return MAVLink_wind_state_message(time_usec, wind, gust)
+
+    def wind_state_send(self, time_usec: int, wind: Sequence[float], gust: Sequence[float], force_mavlink1: bool = False) -> None:
+        """
+        Wind of the simulated world: five times a second, and when a gust
+        pulse begins or ends.
+
+        time_usec                 : Time from which this holds, clock of the vehicle. [us] (type:uint64_t)
+        wind                      : Mean wind, NED, without random gusts. [m/s] (type:float)
+        gust                      : Gust pulse in force, NED, to be added; 0 where there is none. [m/s] (type:float)
+
+        """
+        self.send(self.wind_state_encode(time_usec, wind, gust), force_mavlink1=force_mavlink1)
+
+    def cable_snap_encode(self, time_usec: int, speed: float, impulse: float) -> MAVLink_cable_snap_message:
+        """
+        The slack cable of the simulated world came taut.
+
+        time_usec                 : The tick by which it had, clock of the vehicle. [us] (type:uint64_t)
+        speed                     : Closing speed: at which the distance grew to the length of the cable. [m/s] (type:float)
+        impulse                   : What the cable exchanged between vehicle and load. [N.s] (type:float)
+
+        """
+        return MAVLink_cable_snap_message(time_usec, speed, impulse)
+
+    def cable_snap_send(self, time_usec: int, speed: float, impulse: float, force_mavlink1: bool = False) -> None:
+        """
+        The slack cable of the simulated world came taut.
+
+        time_usec                 : The tick by which it had, clock of the vehicle. [us] (type:uint64_t)
+        speed                     : Closing speed: at which the distance grew to the length of the cable. [m/s] (type:float)
+        impulse                   : What the cable exchanged between vehicle and load. [N.s] (type:float)
+
+        """
+        self.send(self.cable_snap_encode(time_usec, speed, impulse), force_mavlink1=force_mavlink1)
 
     def sys_status_encode(self, onboard_control_sensors_present: int, onboard_control_sensors_enabled: int, onboard_control_sensors_health: int, load: int, voltage_battery: int, current_battery: int, battery_remaining: int, drop_rate_comm: int, errors_comm: int, errors_count1: int, errors_count2: int, errors_count3: int, errors_count4: int, onboard_control_sensors_present_extended: int = 0, onboard_control_sensors_enabled_extended: int = 0, onboard_control_sensors_health_extended: int = 0) -> MAVLink_sys_status_message:
         """

@@ -1,0 +1,126 @@
+"""What the rotors give now by belief, and the commands that are still on their way to them.
+
+| symbol  | code name      | frame | unit   | meaning                                              |
+|---------|----------------|-------|--------|------------------------------------------------------|
+| u_k     | queue          | B     | N, N m | thrust and moment that the mixer gave at tick k      |
+| r       | thrust, moment | B     | N, N m | what the rotors give at the present tick             |
+| d       | delay          |       | s      | from a command to the instant at which it is in force |
+| tau     | lag            |       | s      | r' = (u - r) / tau                                   |
+| T       | period         |       | s      | of the control law                                   |
+
+With d = n T + c, 0 <= c < T, the command in force is u_{k-n-1} for c seconds after tick k, then u_{k-n} until
+the next tick. (2-13) is linear and the rotors are alike, so that thrust and moment lag as each rotor does.
+"""
+
+from __future__ import annotations
+
+from math import exp, floor
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3
+
+LONGEST_DELAY = 0.2  # s
+GREATEST_RATE = 1000.0  # Hz
+ROWS = round(LONGEST_DELAY * GREATEST_RATE) + 2
+
+Queue = NDArray[np.float64]
+
+
+class ActuationConstants(NamedTuple):
+    """Delay and lag for one control period."""
+
+    whole: int  # n, whole periods in the delay
+    late: float  # c, s
+    rest: float  # T - c, s
+    lag: float  # tau, s
+    kept_late: float  # share of the way left after c: exp(-c / tau)
+    kept_rest: float  # after T - c
+    kept: float  # after T
+    kept_half_late: float  # after c / 2
+    kept_half: float  # after T / 2
+
+
+class Actuation(NamedTuple):
+    """Belief at a tick, before the command of that tick is given. `queue[i]` is (f, M) of u_{k-1-i}."""
+
+    queue: Queue
+    thrust: float  # N
+    moment: Vec3  # N m, body
+
+
+def actuation_constants(delay: float, lag: float, period: float) -> ActuationConstants:
+    """Constants for a transport delay and a first-order lag of the rotors, all in seconds."""
+    # a delay that rounding left a little short of a whole number of periods is that number
+    whole = floor(delay / period + 1e-9)
+    late = max(0.0, delay - whole * period)
+
+    def kept(duration: float) -> float:
+        return exp(-duration / lag) if lag > 0.0 else (0.0 if duration > 0.0 else 1.0)
+
+    return ActuationConstants(
+        whole,
+        late,
+        period - late,
+        lag,
+        kept(late),
+        kept(period - late),
+        kept(period),
+        kept(0.5 * late),
+        kept(0.5 * period),
+    )
+
+
+def resting() -> Actuation:
+    """Rotors that stand still, and no command on its way."""
+    return Actuation(np.zeros((ROWS, 4)), 0.0, ZERO)
+
+
+def steady(thrust: float) -> Actuation:
+    """Rotors that have been asked for this thrust (N) for long."""
+    queue = np.zeros((ROWS, 4))
+    queue[:, 0] = thrust
+    return Actuation(queue, thrust, ZERO)
+
+
+@kernel
+def lagged(thrust: float, moment: Vec3, queue: Queue, row: int, kept: float) -> tuple[float, Vec3]:
+    """Thrust and moment of the rotors when `kept` of their way to command `row` is left."""
+    f, x, y, z = queue[row, 0], queue[row, 1], queue[row, 2], queue[row, 3]
+    return f + kept * (thrust - f), (
+        x + kept * (moment[0] - x),
+        y + kept * (moment[1] - y),
+        z + kept * (moment[2] - z),
+    )
+
+
+@kernel
+def after_delay(actuation: Actuation, constants: ActuationConstants) -> tuple[float, Vec3]:
+    """What the rotors will give when the command of this tick comes into force: thrust N, moment N m."""
+    thrust, moment = actuation.thrust, actuation.moment
+    if constants.late > 0.0:
+        thrust, moment = lagged(thrust, moment, actuation.queue, constants.whole, constants.kept_late)
+    for i in range(constants.whole):
+        row = constants.whole - 1 - i
+        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept)
+    return thrust, moment
+
+
+@kernel
+def advance(actuation: Actuation, thrust: float, moment: Vec3, constants: ActuationConstants) -> Actuation:
+    """The belief a period later, `thrust` (N) and `moment` (N m, body) being the command of this tick."""
+    queue = np.empty_like(actuation.queue)
+    queue[1:] = actuation.queue[:-1]
+    queue[0, 0] = thrust
+    queue[0, 1] = moment[0]
+    queue[0, 2] = moment[1]
+    queue[0, 3] = moment[2]
+    now, turning = actuation.thrust, actuation.moment
+    # in the queue that has the command of this tick, u_{k-n-1} is row n + 1
+    if constants.late > 0.0:
+        now, turning = lagged(now, turning, queue, constants.whole + 1, constants.kept_late)
+    now, turning = lagged(now, turning, queue, constants.whole, constants.kept_rest)
+    return Actuation(queue, now, turning)

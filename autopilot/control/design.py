@@ -1,0 +1,213 @@
+"""The gains of the law `plumbline`, computed from what is believed of the vehicle.
+
+| symbol | code name | frame | unit | equation |
+|---|---|---|---|---|
+| omega_x, omega_q, omega_R | omega_x, omega_q, omega_R | | rad/s | of load, cable, vehicle |
+| omega_i | omega_i | | rad/s | in which the load's steady error fades |
+| zeta | zeta | | | of the three |
+| J, m_Q, m_L, L | vehicle | | | Table 4-1 |
+| k_x | k_x | I | N/m | m (omega_x^2 + 2 zeta omega_x omega_i), m = m_Q + m_L |
+| k_v | k_v | I | N s/m | m (2 zeta omega_x + omega_i) |
+| k_i | k_i | I | N/m/s | m omega_x^2 omega_i |
+| k_q, k_w | k_q, k_omega | | N, N s | m_Q L omega_q^2, 2 zeta omega_q m_Q L |
+| k_R, k_Omega | k_R, k_Omega | B | N m, N m s | J omega_R^2, 2 zeta omega_R J |
+| d, delta | delay, tolerance | | s | delay believed; unknown delay to survive |
+| tau_a, T | lag, period | | s | lag that the rotors show; of the control law |
+| K, A, b | K, A, b | | | below |
+
+Near hover the law is u = -K x on the chain e_i, x_L, v_L, q, q', theta, Omega of one level axis,
+
+    v_L' = -g q    q'' = -(m g / m_Q L)(q + theta)    Omega' = M / J    M' = (u - M) / tau_a
+
+and the poles are those of three loops, one inside the other, and omega_i. With prediction over d the loop holds
+for every delay between d - delta and d + delta, by the small-gain theorem, if
+
+    delta omega |K exp(A d) G(i omega)| / |1 + K G(i omega)| < 1 at all omega,
+    G(s) = (s - A)^-1 b exp(-s T / 2)
+
+What is wanted is delta. The ratios of the bandwidths are given; all three are as high as two conditions
+allow: the tolerance is kept, and three standard deviations of each rotor's command, for the noise that the
+estimate is believed to have, fit between hover and the nearest limit of a rotor.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, solve_discrete_lyapunov
+
+from autopilot.control.plumbline import PlumblineGains
+from autopilot.control.records import Vehicle
+
+Array = NDArray[np.float64]
+
+# what an estimator over motion capture leaves, white from tick to tick, of e_i, x_L, v_L, q, q', theta, Omega
+NOISE = (0.0, 0.0005, 0.003, 0.0007, 0.008, 0.002, 0.005)
+SIGMAS = 3.0
+# of omega_R, rad/s, within which the greatest is looked for
+_SLOWEST, _FASTEST = 0.5, 200.0
+_LEAST_LAG = 1e-4  # s; rotors without lag are taken for so fast ones
+_STATES = 7
+
+
+class Wanted(NamedTuple):
+    """What is asked of the design."""
+
+    tolerance: float  # s, of delay
+    integral_ratio: float  # omega_i / omega_x
+    cable_ratio: float  # omega_q / omega_x
+    attitude_ratio: float  # omega_R / omega_q
+    zeta: float
+    noise: float  # factor on NOISE
+
+
+class Timing(NamedTuple):
+    """What is believed of the way from a command to its force; seconds."""
+
+    delay: float
+    lag: float  # as it is
+    lag_shown: float  # as it is made to look
+    period: float
+
+
+class Design(NamedTuple):
+    """Gains, and what they were computed to hold."""
+
+    gains: PlumblineGains
+    omega_i: float  # rad/s
+    omega_x: float
+    omega_q: float
+    omega_R: float
+    tolerance: float  # s
+    rotor_deviation: float  # N, standard deviation of a rotor's command
+
+
+def gains_of(
+    omega_i: float, omega_x: float, omega_q: float, omega_R: float, zeta: float, vehicle: Vehicle
+) -> PlumblineGains:
+    """Gains that give the three loops these bandwidths (rad/s) and damping."""
+    mass, reach = vehicle.quad_mass + vehicle.load_mass, vehicle.quad_mass * vehicle.cable_length
+    J_x, J_y, J_z = vehicle.inertia
+    stiff, damped = omega_R * omega_R, 2.0 * zeta * omega_R
+    k_x = mass * omega_x * (omega_x + 2.0 * zeta * omega_i)
+    k_v = mass * (2.0 * zeta * omega_x + omega_i)
+    k_i = mass * omega_x * omega_x * omega_i
+    return PlumblineGains(
+        k_R=(J_x * stiff, J_y * stiff, J_z * stiff),
+        k_Omega=(J_x * damped, J_y * damped, J_z * damped),
+        k_q=reach * omega_q * omega_q,
+        k_omega=2.0 * zeta * omega_q * reach,
+        k_x=(k_x, k_x, k_x),
+        k_v=(k_v, k_v, k_v),
+        k_i=(k_i, k_i, k_i),
+    )
+
+
+def level_axis(vehicle: Vehicle, J: float, lag: float) -> tuple[Array, Array]:
+    """(A, b) of e_i, x_L, v_L, q, q', theta, Omega, M along a level axis; u, N m, is the moment asked."""
+    stiffness = (
+        (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / (vehicle.quad_mass * vehicle.cable_length)
+    )
+    A, b = np.zeros((_STATES + 1, _STATES + 1)), np.zeros(_STATES + 1)
+    A[0, 1] = A[1, 2] = A[3, 4] = A[5, 6] = 1.0
+    A[2, 3] = -vehicle.gravity
+    A[4, 3] = A[4, 5] = -stiffness
+    A[6, 7] = 1.0 / J
+    A[7, 7], b[7] = -1.0 / lag, 1.0 / lag
+    return A, b
+
+
+def response(vehicle: Vehicle, J: float, lag: float, period: float, omegas: Array) -> NDArray[np.complex128]:
+    """(s - A)^-1 b exp(-s T / 2) at s = i omega, one row for each omega (rad/s)."""
+    s = 1j * omegas
+    stiffness = -level_axis(vehicle, J, lag)[0][4, 3]
+    M = np.exp(-0.5 * s * period) / (lag * s + 1.0)
+    Omega = M / (J * s)
+    theta = Omega / s
+    q = -stiffness * theta / (s * s + stiffness)
+    v = -vehicle.gravity * q / s
+    return np.stack([v / (s * s), v / s, v, q, s * q, theta, Omega, M], axis=1)
+
+
+def feedback(A: Array, J: float, polynomial: Array) -> Array:
+    """K that gives the chain, rotors taken for immediate, this polynomial of poles (Ackermann)."""
+    n = _STATES
+    chain, b = A[:n, :n], np.zeros(n)
+    b[n - 1] = 1.0 / J
+    powers = [np.eye(n)]
+    for _ in range(n):
+        powers.append(powers[-1] @ chain)
+    reach = np.array([power @ b for power in powers[:n]])
+    last = np.linalg.solve(reach, np.eye(n)[n - 1])
+    closed = sum((polynomial[n - i] * powers[i] for i in range(n + 1)), np.zeros((n, n)))
+    return np.append(last @ closed, 0.0)
+
+
+def judged(
+    omega_i: float,
+    omega_x: float,
+    omega_q: float,
+    omega_R: float,
+    zeta: float,
+    noise: float,
+    timing: Timing,
+    vehicle: Vehicle,
+) -> tuple[float, float]:
+    """(tolerance of delay in s, standard deviation of a rotor's command in N); (0, inf) where unstable."""
+    lag, T = max(_LEAST_LAG, timing.lag_shown), timing.period
+    J = min(vehicle.inertia[0], vehicle.inertia[1])
+    A, b = level_axis(vehicle, J, lag)
+    polynomial = np.array([1.0, omega_i])
+    for omega in (omega_x, omega_q, omega_R):
+        polynomial = np.convolve(polynomial, [1.0, 2.0 * zeta * omega, omega * omega])
+    K = feedback(A, J, polynomial)
+    ahead = K @ expm(A * timing.delay)
+
+    n = len(A)
+    held = expm(np.block([[A, b[:, None]], [np.zeros((1, n + 1))]]) * T)
+    A_d, b_d = held[:n, :n], held[:n, n]
+    closed = A_d - np.outer(b_d, K)
+    if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
+        return 0.0, math.inf
+    omegas = np.geomspace(0.02 * omega_x, 0.99 * math.pi / T, 300)
+    G = response(vehicle, J, lag, T, omegas)
+    tolerance = 1.0 / float(np.max(omegas * np.abs((G @ ahead) / (1.0 + G @ K))))
+
+    W = np.zeros((n, n))
+    W[:_STATES, :_STATES] = np.diag((noise * np.array(NOISE)) ** 2)
+    drive = float(ahead @ W @ ahead)
+    P = solve_discrete_lyapunov(closed, drive * np.outer(b_d, b_d))
+    moment = math.sqrt(float(K @ P @ K) + drive)
+    faster = (1.0 - math.exp(-T / lag)) / (1.0 - math.exp(-T / max(lag, timing.lag)))
+    return tolerance, faster * moment / (2.0 * vehicle.arm)
+
+
+@lru_cache(maxsize=16)
+def design(wanted: Wanted, timing: Timing, vehicle: Vehicle) -> Design:
+    """The fastest gains that keep what is wanted; the slowest looked at where none does."""
+    hover = 0.25 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    room = min(vehicle.rotor_max - hover, hover - vehicle.rotor_min)
+
+    def bandwidths(omega_R: float) -> tuple[float, float, float, float]:
+        omega_q = omega_R / wanted.attitude_ratio
+        omega_x = omega_q / wanted.cable_ratio
+        return wanted.integral_ratio * omega_x, omega_x, omega_q, omega_R
+
+    def found(omega_R: float) -> tuple[float, float]:
+        return judged(*bandwidths(omega_R), wanted.zeta, wanted.noise, timing, vehicle)
+
+    low, high = math.log(_SLOWEST), math.log(_FASTEST)
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        tolerance, deviation = found(math.exp(middle))
+        if tolerance >= wanted.tolerance and SIGMAS * deviation <= room:
+            low = middle
+        else:
+            high = middle
+    omegas = bandwidths(math.exp(low))
+    gains = gains_of(*omegas, wanted.zeta, vehicle)
+    return Design(gains, *omegas, *found(omegas[-1]))

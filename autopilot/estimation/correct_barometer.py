@@ -1,0 +1,61 @@
+"""Correction by a barometer: height plus an offset that wanders."""
+
+from __future__ import annotations
+
+from autopilot.estimation.correction import heard, inject, look_back, position_row, with_aids
+from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.records import (
+    BAROMETER,
+    PRESSURE,
+    RECEIVER,
+    SIZE,
+    AidEstimate,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+)
+from autopilot.geometry.kernel import kernel
+
+ANY_OFFSET_STD = 100.0  # m: the first reading is the zero
+
+
+@kernel
+def correct_barometer(
+    state: EstimatorState, history: History, height: float, age: float, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The state after a reading of the height (m). No use is made of it beside a tracker."""
+    if state.vehicle.source != RECEIVER:
+        return state
+    state = heard(state, age, SIZE)
+    n, a = state.size, state.aids
+    starting = a.barometer_age == float("inf")
+    state = with_aids(
+        state,
+        AidEstimate(
+            a.mounting,
+            a.heading,
+            height - state.vehicle.x_quad[2] if starting else a.barometer,
+            a.gnss,
+            a.horizontal_slow,
+            a.vertical_slow,
+            a.field,
+            a.magnetic_age,
+            age,
+            a.rejected,
+        ),
+    )
+    if starting:
+        history.covariance[BAROMETER, BAROMETER] = ANY_OFFSET_STD * ANY_OFFSET_STD
+    past = look_back(state, history, tuning, age)
+    innovation = height - past.x_quad[2] - state.aids.barometer
+    position_row(history, past, 2, n)
+    history.row[BAROMETER] = 1.0
+    variance = tuning.barometer_std * tuning.barometer_std
+    limit = tuning.gate_sigma * tuning.gate_sigma * (spread(history, n) + variance)
+    if not innovation * innovation <= limit:
+        return state
+    begin(history)
+    nis = absorb(history, innovation, variance, n)
+    history.consistency[PRESSURE, 0] += 1.0
+    history.consistency[PRESSURE, 1] += nis
+    return inject(state, history)

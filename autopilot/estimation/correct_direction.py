@@ -1,0 +1,153 @@
+"""Correction by the direction to the load as a camera or an encoder sees it, in body axes.
+
+With m = exp(c) R^T q, c the mounting error about the body's forward and left axes, the direction R exp(-c) m
+differs from q by its own error, by attitude x q and by (R c) x q. While the cable is slack the load lies on the
+ground: it is where the line of sight meets its height.
+"""
+
+from __future__ import annotations
+
+from autopilot.estimation.correction import (
+    Past,
+    add_direction,
+    attitude_row,
+    heard,
+    inject,
+    load_at,
+    look_back,
+    with_load,
+)
+from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.records import (
+    CAMERA,
+    DIRECTION,
+    MOUNTING,
+    NOBODY,
+    SIGHT,
+    SIZE,
+    TRACKER,
+    DirectionReading,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+    LoadEstimate,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, apply, apply_transposed, cross, dot, scale, sub
+from autopilot.geometry.so3 import exp, rotation_from_quat
+
+REJECTIONS_BEFORE_RESET = 10.0
+LEAST_SLOPE = 0.3  # of a line of sight that is to meet the ground
+LEAST_HEIGHT = 0.1  # m over the load, the same
+
+
+@kernel
+def put(load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float) -> LoadEstimate:
+    """A lying load found elsewhere."""
+    return LoadEstimate(
+        x_load,
+        load.v_load,
+        load.q_cable,
+        load.q_cable_dot,
+        load.across,
+        load.length,
+        (position_var, 0.0, 0.0),
+        load.taut,
+        load.tension,
+        load.pull,
+        load.pulled_s,
+        age_s,
+        0.0,
+        CAMERA,
+    )
+
+
+@kernel
+def see_lying(
+    state: EstimatorState, past: Past, sight: Vec3, reading: DirectionReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The lying load moved towards where the line of sight meets its height."""
+    load = state.load
+    height = past.x_quad[2] - load.x_load[2]
+    if not (height > LEAST_HEIGHT and -sight[2] > LEAST_SLOPE):
+        return state
+    far = height / -sight[2]
+    seen = (past.x_quad[0] + far * sight[0], past.x_quad[1] + far * sight[1])
+    tilt = state.doubt.tilt
+    slow = far * far * (tilt * tilt + tuning.mounting_std * tuning.mounting_std) / (sight[2] * sight[2])
+    own = far * reading.direction_std / sight[2]
+    variance = own * own + slow
+    var = load.covariance[0]
+    off = (seen[0] - load.x_load[0], seen[1] - load.x_load[1])
+    limit = 2.0 * tuning.gate_sigma * tuning.gate_sigma * (var + variance)
+    if not off[0] * off[0] + off[1] * off[1] <= limit:
+        if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
+            return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, load.source), state.resets)
+        var = 1.0
+    k = var / (var + variance)
+    x_load = (load.x_load[0] + k * off[0], load.x_load[1] + k * off[1], load.x_load[2])
+    # what tilt and mounting do to all sights alike is not averaged away
+    return with_load(state, put(load, x_load, max((1.0 - k) * var, slow), reading.age_s), state.resets)
+
+
+@kernel
+def correct_direction(
+    state: EstimatorState, history: History, reading: DirectionReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The state after the reading; `history` is corrected along with it. Ignored where a tracker sees the load."""
+    load = state.load
+    if state.vehicle.source == NOBODY or load.source == TRACKER:
+        return state
+    state = heard(state, reading.age_s, SIZE)
+    n = state.size
+    past = look_back(state, history, tuning, reading.age_s)
+    R = rotation_from_quat(past.quat_wxyz)
+    c = state.aids.mounting
+    sight = apply(R, apply(exp((-c[0], -c[1], 0.0)), reading.direction_body))
+    if load.taut == 0.0:
+        return see_lying(state, past, sight, reading, tuning)
+    q = past.q_cable
+    off = sub(sight, q)
+    # the stated deviation counts the mounting in
+    stated = reading.direction_std * reading.direction_std
+    variance = max(stated - tuning.mounting_std * tuning.mounting_std, 0.25 * stated)
+    innovation = (dot(past.across, off), dot(past.along, off))
+    far = 0.0
+    for i in range(2):
+        sight_row(history, past, R, i, n)
+        far += innovation[i] * innovation[i] / (spread(history, n) + variance)
+    # written so that NaN is refused
+    if not (far <= 2.0 * tuning.gate_sigma * tuning.gate_sigma and dot(sight, q) > 0.0):
+        if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
+            return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, load.source), state.resets)
+        widen(history)
+        return with_load(state, load_at(load, load.age_s, 0.0, load.source), state.resets + 1.0)
+    begin(history)
+    nis = 0.0
+    for i in range(2):
+        sight_row(history, past, R, i, n)
+        nis += absorb(history, innovation[i], variance, n)
+    history.consistency[SIGHT, 0] += 1.0
+    history.consistency[SIGHT, 1] += nis
+    state = inject(state, history)
+    return with_load(state, load_at(state.load, reading.age_s, 0.0, CAMERA), state.resets)
+
+
+@kernel
+def widen(history: History) -> None:
+    """The cable may point anywhere and turn fast: the next sight decides."""
+    P = history.covariance
+    for i in range(DIRECTION, DIRECTION + 4):
+        P[i, i] += 1.0
+
+
+@kernel
+def sight_row(history: History, past: Past, R: tuple[Vec3, Vec3, Vec3], i: int, n: int) -> None:
+    """Row of component i of the seen direction in the cable's axes."""
+    axis = past.across if i == 0 else past.along
+    turn = cross(past.q_cable, axis)
+    attitude_row(history, past, scale(-1.0, turn), n)
+    add_direction(history, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
+    mounted = apply_transposed(R, turn)
+    history.row[MOUNTING] = mounted[0]
+    history.row[MOUNTING + 1] = mounted[1]

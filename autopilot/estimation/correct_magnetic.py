@@ -1,0 +1,86 @@
+"""Correction by a magnetometer: the heading alone. How strong the field is and how it dips need not be known.
+
+With u = R m the measured field in the world and e magnetic north, a small attitude error phi shows as the angle
+from e to u's level part, phi . (e3 - (u_z / |u_level|) e): a tilt feigns heading where the field is steep.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, sin, sqrt
+
+from autopilot.estimation.correction import attitude_row, heard, inject, look_back, with_aids
+from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.records import (
+    HEADING,
+    MAGNETIC,
+    RECEIVER,
+    SIZE,
+    AidEstimate,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, apply, dot
+from autopilot.geometry.so3 import rotation_from_quat
+
+LEAST_LEVEL = 0.05  # share of the field that must be level to tell a heading
+
+
+@kernel
+def magnetic_north(declination: float) -> Vec3:
+    """Unit vector, ENU."""
+    return (sin(declination), cos(declination), 0.0)
+
+
+@kernel
+def with_field(state: EstimatorState, field: Vec3, age: float) -> EstimatorState:
+    """The state that has heard the magnetometer."""
+    a = state.aids
+    return with_aids(
+        state,
+        AidEstimate(
+            a.mounting,
+            a.heading,
+            a.barometer,
+            a.gnss,
+            a.horizontal_slow,
+            a.vertical_slow,
+            field,
+            age,
+            a.barometer_age,
+            a.rejected,
+        ),
+    )
+
+
+@kernel
+def correct_magnetic(
+    state: EstimatorState, history: History, field: Vec3, age: float, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The state after a reading of the field (body axes, any unit). No use is made of it beside a tracker."""
+    state = with_field(state, field, age)
+    if state.vehicle.source != RECEIVER:
+        return state
+    state = heard(state, age, SIZE)
+    n = state.size
+    past = look_back(state, history, tuning, age)
+    u = apply(rotation_from_quat(past.quat_wxyz), field)
+    level = sqrt(u[0] * u[0] + u[1] * u[1])
+    if not level > LEAST_LEVEL * sqrt(dot(u, u)):
+        return state
+    north = magnetic_north(tuning.declination)
+    angle = atan2(u[0] * north[1] - u[1] * north[0], u[0] * north[0] + u[1] * north[1])
+    innovation = angle - state.aids.heading
+    steep = u[2] / level
+    attitude_row(history, past, (-steep * north[0], -steep * north[1], 1.0), n)
+    history.row[HEADING] = 1.0
+    variance = tuning.magnetic_std * tuning.magnetic_std
+    limit = tuning.gate_sigma * tuning.gate_sigma * (spread(history, n) + variance)
+    if not innovation * innovation <= limit:
+        return state
+    begin(history)
+    nis = absorb(history, innovation, variance, n)
+    history.consistency[MAGNETIC, 0] += 1.0
+    history.consistency[MAGNETIC, 1] += nis
+    return inject(state, history)

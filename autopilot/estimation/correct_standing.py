@@ -1,0 +1,57 @@
+"""Correction by standing on the ground: no velocity, no rate. It levels and finds the gyro's bias."""
+
+from __future__ import annotations
+
+from autopilot.estimation.correction import inject
+from autopilot.estimation.covariance import absorb, begin, clear_row
+from autopilot.estimation.records import (
+    GYRO_BIAS,
+    RECEIVER,
+    REST,
+    VELOCITY,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import norm
+
+IDLE_SHARE = 0.3  # of the vehicle's weight: with less thrust it stands, unless it falls
+STILL_RATE, STILL_FORCE = 0.1, 1.0  # rad/s, m/s^2 about gravity: more is no standing
+STILL_SPEED = 0.5  # m/s, estimated
+SPEED_STD = 0.02  # m/s
+
+
+@kernel
+def stands(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> bool:
+    """Whether the vehicle rests on the ground, by thrust and IMU."""
+    vehicle, imu = state.vehicle, state.last_imu
+    return (
+        vehicle.source == RECEIVER
+        and thrust < IDLE_SHARE * tuning.quad_mass * tuning.gravity
+        and norm(imu.gyro) < STILL_RATE
+        and abs(norm(imu.accel) - tuning.gravity) < STILL_FORCE
+        and norm(vehicle.v_quad) < STILL_SPEED
+    )
+
+
+@kernel
+def correct_standing(
+    state: EstimatorState, history: History, tuning: EstimatorTuning, thrust: float
+) -> EstimatorState:
+    """The state of a vehicle that rests on the ground; any other is returned as it is."""
+    if not stands(state, tuning, thrust):
+        return state
+    n, vehicle, imu = state.size, state.vehicle, state.last_imu
+    begin(history)
+    nis = 0.0
+    for k in range(6):
+        clear_row(history, n)
+        i = k % 3
+        history.row[(VELOCITY if k < 3 else GYRO_BIAS) + i] = 1.0
+        off = -vehicle.v_quad[i] if k < 3 else imu.gyro[i] - vehicle.gyro_bias[i]
+        std = SPEED_STD if k < 3 else tuning.gyro_std
+        nis += absorb(history, off, std * std, n)
+    history.consistency[REST, 0] += 1.0
+    history.consistency[REST, 1] += nis
+    return inject(state, history)

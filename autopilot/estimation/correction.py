@@ -1,0 +1,348 @@
+"""What all corrections share: the past a reading speaks of, rows of its Jacobian, and the state moved by it.
+
+A reading of `age` ago is a function of the errors of *then*; `row` wants them in errors of *now*. Errors move by
+x' = F x, and back over the age
+
+    attitude(then)  = attitude + age R gyro bias
+    velocity(then)  = velocity - attitude x S + age R accel bias
+    position(then)  = position - age velocity + attitude x D - age^2/2 R accel bias
+    direction(then) = (1 + age^2 k / 2) direction - age rate,    k = q . f / L
+
+with f the specific force in the world, S its integral since then and D that of (s - then) f. S and D follow from
+the velocities and positions of then and now in the ring. Left out: the noise that came in since then, the turn
+of R within the age, and in the cable's direction what attitude and bias drive within the age.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.estimation.covariance import clear_row
+from autopilot.estimation.history import carry_back, past3, past4, row_before
+from autopilot.estimation.records import (
+    ACCEL_BIAS,
+    ACROSS,
+    ATTITUDE,
+    BAROMETER,
+    DIRECTION,
+    GNSS,
+    GYRO_BIAS,
+    HEADING,
+    LENGTH,
+    MOUNTING,
+    POSITION,
+    Q_CABLE,
+    Q_RATE,
+    QUAT,
+    RATE,
+    SIZE,
+    V_QUAD,
+    VELOCITY,
+    X_QUAD,
+    AidEstimate,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+    LoadEstimate,
+    VehicleEstimate,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Mat3, Vec3, add, axpy, cross, dot, scale, sub
+from autopilot.geometry.s2 import normalise, tangent
+from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply, quat_normalise, rotation_from_quat
+
+
+class Past(NamedTuple):
+    """The state when a reading was taken, and what ties its errors to those of now."""
+
+    age: float
+    x_quad: Vec3
+    v_quad: Vec3
+    quat_wxyz: Quat
+    q_cable: Vec3
+    across: Vec3
+    along: Vec3
+    q_cable_dot: Vec3
+    R: Mat3  # of now
+    gained: Vec3  # S, m/s
+    moved: Vec3  # D, m
+    bend: float  # 1 + age^2 k / 2
+
+
+@kernel
+def look_back(state: EstimatorState, history: History, tuning: EstimatorTuning, age: float) -> Past:
+    """The state `age` seconds ago."""
+    ring = history.ring
+    row, share = row_before(state.head, ring, state.time_s - age)
+    vehicle, load = state.vehicle, state.load
+    x, v = past3(ring, row, share, X_QUAD), past3(ring, row, share, V_QUAD)
+    q = normalise(past3(ring, row, share, Q_CABLE))
+    across = normalise(tangent(q, past3(ring, row, share, ACROSS)))
+    g = tuning.gravity
+    gained = sub(vehicle.v_quad, v)
+    gained = (gained[0], gained[1], gained[2] + g * age)
+    moved = axpy(age, vehicle.v_quad, sub(x, vehicle.x_quad))
+    moved = (moved[0], moved[1], moved[2] + 0.5 * g * age * age)
+    a = vehicle.accel_quad
+    k = dot(q, (a[0], a[1], a[2] + g)) / load.length
+    return Past(
+        age,
+        x,
+        v,
+        quat_normalise(past4(ring, row, share, QUAT)),
+        q,
+        across,
+        cross(q, across),
+        past3(ring, row, share, Q_RATE),
+        rotation_from_quat(vehicle.quat_wxyz),
+        gained,
+        moved,
+        1.0 + 0.5 * age * age * k,
+    )
+
+
+@kernel
+def _attitude_cross(history: History, i: int, s: float, v: Vec3) -> None:
+    """Add s (attitude x v)_i."""
+    row = history.row
+    if i == 0:
+        row[ATTITUDE + 1] += s * v[2]
+        row[ATTITUDE + 2] -= s * v[1]
+    elif i == 1:
+        row[ATTITUDE + 2] += s * v[0]
+        row[ATTITUDE] -= s * v[2]
+    else:
+        row[ATTITUDE] += s * v[1]
+        row[ATTITUDE + 1] -= s * v[0]
+
+
+@kernel
+def position_row(history: History, past: Past, i: int, n: int) -> None:
+    """Row of component i of the vehicle's position then."""
+    clear_row(history, n)
+    row = history.row
+    row[POSITION + i] = 1.0
+    row[VELOCITY + i] = -past.age
+    _attitude_cross(history, i, 1.0, past.moved)
+    s = -0.5 * past.age * past.age
+    for j in range(3):
+        row[ACCEL_BIAS + j] = s * past.R[i][j]
+
+
+@kernel
+def velocity_row(history: History, past: Past, i: int, n: int) -> None:
+    """Row of component i of the vehicle's velocity then."""
+    clear_row(history, n)
+    row = history.row
+    row[VELOCITY + i] = 1.0
+    _attitude_cross(history, i, -1.0, past.gained)
+    for j in range(3):
+        row[ACCEL_BIAS + j] = past.age * past.R[i][j]
+
+
+@kernel
+def attitude_row(history: History, past: Past, axis: Vec3, n: int) -> None:
+    """Row of the attitude error then about a world axis."""
+    clear_row(history, n)
+    row = history.row
+    for i in range(3):
+        row[ATTITUDE + i] = axis[i]
+        row[GYRO_BIAS + i] = past.age * (
+            axis[0] * past.R[0][i] + axis[1] * past.R[1][i] + axis[2] * past.R[2][i]
+        )
+
+
+@kernel
+def add_direction(history: History, past: Past, first: float, second: float) -> None:
+    """Add first, second times the two components of the cable's direction then."""
+    row = history.row
+    row[DIRECTION] += past.bend * first
+    row[DIRECTION + 1] += past.bend * second
+    row[RATE] -= past.age * first
+    row[RATE + 1] -= past.age * second
+
+
+@kernel
+def with_vehicle(state: EstimatorState, vehicle: VehicleEstimate, resets: float) -> EstimatorState:
+    """The state with its vehicle replaced."""
+    return EstimatorState(
+        state.time_s,
+        vehicle,
+        state.load,
+        state.aids,
+        state.doubt,
+        state.last_imu,
+        resets,
+        state.memory_s,
+        state.head,
+        state.size,
+    )
+
+
+@kernel
+def with_load(state: EstimatorState, load: LoadEstimate, resets: float) -> EstimatorState:
+    """The state with its load replaced."""
+    return EstimatorState(
+        state.time_s,
+        state.vehicle,
+        load,
+        state.aids,
+        state.doubt,
+        state.last_imu,
+        resets,
+        state.memory_s,
+        state.head,
+        state.size,
+    )
+
+
+@kernel
+def with_aids(state: EstimatorState, aids: AidEstimate) -> EstimatorState:
+    """The state with its aids replaced."""
+    return EstimatorState(
+        state.time_s,
+        state.vehicle,
+        state.load,
+        aids,
+        state.doubt,
+        state.last_imu,
+        state.resets,
+        state.memory_s,
+        state.head,
+        state.size,
+    )
+
+
+@kernel
+def heard(state: EstimatorState, age: float, size: int) -> EstimatorState:
+    """The state that keeps the ring corrected as far back as `age`, with an error state of at least `size`."""
+    return EstimatorState(
+        state.time_s,
+        state.vehicle,
+        state.load,
+        state.aids,
+        state.doubt,
+        state.last_imu,
+        state.resets,
+        max(state.memory_s, age),
+        state.head,
+        max(state.size, size),
+    )
+
+
+@kernel
+def vehicle_at(v: VehicleEstimate, age_s: float, rejected: float) -> VehicleEstimate:
+    """The vehicle with another age and count of refusals."""
+    return VehicleEstimate(
+        v.x_quad,
+        v.v_quad,
+        v.quat_wxyz,
+        v.omega_body,
+        v.gyro_bias,
+        v.accel_bias,
+        v.accel_quad,
+        age_s,
+        rejected,
+        v.source,
+    )
+
+
+@kernel
+def load_at(load: LoadEstimate, age_s: float, rejected: float, source: float) -> LoadEstimate:
+    """The load with another age, count of refusals and source."""
+    return LoadEstimate(
+        load.x_load,
+        load.v_load,
+        load.q_cable,
+        load.q_cable_dot,
+        load.across,
+        load.length,
+        load.covariance,
+        load.taut,
+        load.tension,
+        load.pull,
+        load.pulled_s,
+        age_s,
+        rejected,
+        source,
+    )
+
+
+@kernel
+def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History) -> LoadEstimate:
+    """The cable moved by the correction in `error`; while taut the load is where it ends."""
+    e = history.error
+    along = cross(load.q_cable, load.across)
+    off = add(scale(e[DIRECTION], load.across), scale(e[DIRECTION + 1], along))
+    turned = add(scale(e[RATE], load.across), scale(e[RATE + 1], along))
+    q = normalise(add(load.q_cable, off))
+    across = normalise(tangent(q, load.across))
+    q_dot = tangent(q, add(load.q_cable_dot, turned))
+    length = load.length + e[LENGTH]
+    x_load, v_load = load.x_load, load.v_load
+    if load.taut > 0.0:
+        x_load = axpy(length, q, vehicle.x_quad)
+        v_load = axpy(length, q_dot, vehicle.v_quad)
+    return LoadEstimate(
+        x_load,
+        v_load,
+        q,
+        q_dot,
+        across,
+        length,
+        load.covariance,
+        load.taut,
+        load.tension,
+        load.pull,
+        load.pulled_s,
+        load.age_s,
+        load.rejected,
+        load.source,
+    )
+
+
+@kernel
+def inject(state: EstimatorState, history: History) -> EstimatorState:
+    """The state moved by the correction in `error`, and the ring with it."""
+    e, v, a = history.error, state.vehicle, state.aids
+    turned = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
+    shift = (e[GYRO_BIAS], e[GYRO_BIAS + 1], e[GYRO_BIAS + 2])
+    vehicle = VehicleEstimate(
+        add(v.x_quad, (e[POSITION], e[POSITION + 1], e[POSITION + 2])),
+        add(v.v_quad, (e[VELOCITY], e[VELOCITY + 1], e[VELOCITY + 2])),
+        quat_normalise(quat_multiply(turned, v.quat_wxyz)),
+        sub(v.omega_body, shift),
+        add(v.gyro_bias, shift),
+        add(v.accel_bias, (e[ACCEL_BIAS], e[ACCEL_BIAS + 1], e[ACCEL_BIAS + 2])),
+        v.accel_quad,
+        v.age_s,
+        v.rejected,
+        v.source,
+    )
+    aids = a
+    if state.size == SIZE:
+        aids = AidEstimate(
+            (a.mounting[0] + e[MOUNTING], a.mounting[1] + e[MOUNTING + 1]),
+            a.heading + e[HEADING],
+            a.barometer + e[BAROMETER],
+            add(a.gnss, (e[GNSS], e[GNSS + 1], e[GNSS + 2])),
+            a.horizontal_slow,
+            a.vertical_slow,
+            a.field,
+            a.magnetic_age,
+            a.barometer_age,
+            a.rejected,
+        )
+    carry_back(state.head, history, state.memory_s)
+    return EstimatorState(
+        state.time_s,
+        vehicle,
+        moved_load(state.load, vehicle, history),
+        aids,
+        state.doubt,
+        state.last_imu,
+        state.resets,
+        state.memory_s,
+        state.head,
+        state.size,
+    )

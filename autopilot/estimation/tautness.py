@@ -1,0 +1,190 @@
+"""Whether the cable is taut, and what becomes of the error state when it comes taut or slack.
+
+Taut, the load is where the cable ends and its error that of vehicle and cable; slack, it is tracked or lies by
+itself. A tracked load tells by its distance. Else the pull tells: what the vehicle's acceleration leaves
+of the believed thrust, m_Q (R a) - f R e3, along the cable.
+"""
+
+from __future__ import annotations
+
+from autopilot.estimation.covariance import forget
+from autopilot.estimation.records import (
+    DIRECTION,
+    LENGTH,
+    POSITION,
+    RATE,
+    SIZE,
+    TRACKER,
+    VELOCITY,
+    Array,
+    EstimatorTuning,
+    History,
+    ImuReading,
+    LoadEstimate,
+    VehicleEstimate,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, apply, axpy, cross, dot, norm, sub
+from autopilot.geometry.s2 import normalise, tangent
+from autopilot.geometry.so3 import rotation_from_quat
+
+TAUT_ABOVE = 0.985  # share of the cable length at which a tracked load's slack cable counts as taut
+SLACK_BELOW = 0.965  # and at which a taut one counts as slack
+PULL_TAUT, PULL_SLACK = 0.4, 0.2  # share of the load's weight that must be felt, and that is too little
+PULL_TAUT_S, PULL_SLACK_S = 0.1, 0.15  # for how long
+PULL_DISTANCE = 0.75  # share of the cable length below which no pull is believed
+PULL_TIME_S = 0.04  # in which the felt pull is smoothed
+SEEN_S = 1.0  # a cable is not taken as taut while the load has not been seen for so long
+
+
+@kernel
+def frame(q: Vec3, across: Vec3) -> Vec3:
+    """A unit vector orthogonal to q, near `across` if that is possible."""
+    flat = tangent(q, across)
+    if norm(flat) < 0.1:
+        flat = tangent(q, (1.0, 0.0, 0.0) if q[0] * q[0] < 0.5 else (0.0, 1.0, 0.0))
+    return normalise(flat)
+
+
+@kernel
+def felt_pull(
+    load: LoadEstimate, vehicle: VehicleEstimate, imu: ImuReading, thrust: float, mass: float
+) -> float:
+    """Force of the cable on the vehicle along q, N, from one sample."""
+    a = sub(imu.accel, vehicle.accel_bias)
+    left = (mass * a[0], mass * a[1], mass * a[2] - thrust)
+    return dot(load.q_cable, apply(rotation_from_quat(vehicle.quat_wxyz), left))
+
+
+@kernel
+def _with(load: LoadEstimate, taut: float, length: float, pull: float, pulled_s: float) -> LoadEstimate:
+    return LoadEstimate(
+        load.x_load,
+        load.v_load,
+        load.q_cable,
+        load.q_cable_dot,
+        load.across,
+        length,
+        load.covariance,
+        taut,
+        load.tension,
+        pull,
+        pulled_s,
+        load.age_s,
+        load.rejected,
+        load.source,
+    )
+
+
+@kernel
+def _tie(P: Array, first: int, of: int, across: Vec3, along: Vec3, d: float) -> None:
+    """Rows of b_i . (load - vehicle) / d, for a load whose error has nothing in common with the rest: what comes
+    in through the vehicle. `of` lies before `first`, so that the rows' own block finds what was just set."""
+    for j in range(SIZE):
+        p0, p1, p2 = P[of, j], P[of + 1, j], P[of + 2, j]
+        one = -(across[0] * p0 + across[1] * p1 + across[2] * p2) / d
+        two = -(along[0] * p0 + along[1] * p1 + along[2] * p2) / d
+        P[first, j], P[j, first] = one, one
+        P[first + 1, j], P[j, first + 1] = two, two
+
+
+@kernel
+def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length: float) -> LoadEstimate:
+    """Direction and rate of the cable take over from the load's own position and velocity."""
+    P = history.covariance
+    forget(P, DIRECTION, 5)
+    P[LENGTH, LENGTH] = tuning.length_std * tuning.length_std
+    across, along = load.across, cross(load.q_cable, load.across)
+    aa, ab, bb = load.covariance
+    if load.source == TRACKER:
+        _tie(P, DIRECTION, POSITION, across, along, length)
+    _tie(P, RATE, VELOCITY, across, along, length)
+    s = 1.0 / length
+    for i in range(2):
+        P[DIRECTION + i, DIRECTION + i] += s * s * aa
+        P[DIRECTION + i, RATE + i] += s * s * ab
+        P[RATE + i, DIRECTION + i] += s * s * ab
+        P[RATE + i, RATE + i] += s * s * bb
+    return _with(load, 1.0, length, load.pull, 0.0)
+
+
+@kernel
+def slacken(load: LoadEstimate, history: History, position_var: float, velocity_var: float) -> LoadEstimate:
+    """The load by itself from now on, known to these variances; the cable's errors are dropped."""
+    forget(history.covariance, DIRECTION, 5)
+    resting = (0.0, 0.0, 0.0)
+    return LoadEstimate(
+        load.x_load,
+        load.v_load if load.source == TRACKER else resting,
+        load.q_cable,
+        load.q_cable_dot,
+        load.across,
+        load.length,
+        (position_var, 0.0, velocity_var),
+        0.0,
+        0.0,
+        load.pull,
+        0.0,
+        load.age_s,
+        load.rejected,
+        load.source,
+    )
+
+
+@kernel
+def watch(
+    load: LoadEstimate,
+    vehicle: VehicleEstimate,
+    history: History,
+    imu: ImuReading,
+    thrust: float,
+    tuning: EstimatorTuning,
+    dt: float,
+) -> LoadEstimate:
+    """The load with its cable found taut or slack."""
+    share = dt / (PULL_TIME_S + dt)
+    felt = felt_pull(load, vehicle, imu, thrust, tuning.quad_mass)
+    pull = load.pull + share * (felt - load.pull)
+    distance = norm(sub(load.x_load, vehicle.x_quad))
+    if load.source == TRACKER:
+        load = _with(load, load.taut, load.length, pull, 0.0)
+        if load.taut == 0.0 and distance > TAUT_ABOVE * tuning.cable_length:
+            return tauten(load, history, tuning, distance)
+        return load
+    weight = tuning.load_mass * tuning.gravity
+    if load.taut == 0.0:
+        pulled = pull > PULL_TAUT * weight and distance > PULL_DISTANCE * tuning.cable_length
+        load = _with(load, 0.0, load.length, pull, load.pulled_s + dt if pulled else 0.0)
+        if load.pulled_s > PULL_TAUT_S and load.age_s < SEEN_S:
+            load = tauten(load, history, tuning, tuning.cable_length)
+            x_load = axpy(load.length, load.q_cable, vehicle.x_quad)
+            return moved(load, x_load)
+        return load
+    load = _with(load, 1.0, load.length, pull, load.pulled_s + dt if pull < PULL_SLACK * weight else 0.0)
+    if load.pulled_s > PULL_SLACK_S:
+        P = history.covariance
+        L = load.length
+        var = 0.5 * L * L * (P[DIRECTION, DIRECTION] + P[DIRECTION + 1, DIRECTION + 1])
+        return slacken(load, history, var, 0.0)
+    return load
+
+
+@kernel
+def moved(load: LoadEstimate, x_load: Vec3) -> LoadEstimate:
+    """The load elsewhere."""
+    return LoadEstimate(
+        x_load,
+        load.v_load,
+        load.q_cable,
+        load.q_cable_dot,
+        load.across,
+        load.length,
+        load.covariance,
+        load.taut,
+        load.tension,
+        load.pull,
+        load.pulled_s,
+        load.age_s,
+        load.rejected,
+        load.source,
+    )

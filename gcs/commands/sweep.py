@@ -1,0 +1,145 @@
+"""gcs sweep"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import click
+
+from gcs.commands.options import SettingType, json_option, print_json
+from gcs.display import say
+from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
+
+
+@click.command("sweep")
+@click.argument("mission")
+@click.option(
+    "--law",
+    "laws",
+    type=click.Choice(["thesis", "lqr", "plumbline"]),
+    multiple=True,
+    help="Control law to fly with; may be given again.  [default: plumbline]",
+)
+@click.option("--sensors", default="lab", show_default=True, help="What the vehicle senses with, as gcs fly.")
+@click.option("--vehicle", default="bebop", show_default=True, help="What really flies, as gcs fly.")
+@click.option(
+    "--vary",
+    "varied",
+    metavar="NAME=VALUES",
+    multiple=True,
+    help="Vary a parameter: NAME=LOW:HIGH:COUNT or NAME=A,B,C, with --sample also NAME=LOW:HIGH; "
+    "may be given again.",
+)
+@click.option(
+    "--set",
+    "settings",
+    type=SettingType(),
+    multiple=True,
+    help="Set a parameter for all flights; may be given again.",
+)
+@click.option(
+    "--seeds",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Fly each setting with so many seeds: 1, 2, 3 ...",
+)
+@click.option(
+    "--sample",
+    type=click.IntRange(min=1),
+    help="Draw so many settings from what is varied (Latin hypercube) instead of flying its whole grid.",
+)
+@click.option(
+    "--jobs", type=click.IntRange(min=1), help="Flights at a time, each on a core.  [default: all cores]"
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Fly on a running Dask cluster, e.g. tcp://host:8786.")
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Where table and report go.  [default: sweeps/MISSION]",
+)
+@click.option("--fresh", is_flag=True, help="Fly everything anew, also what has been flown already.")
+@json_option
+@click.option("--quiet", is_flag=True, help="No progress.")
+@click.pass_context
+def sweep_command(
+    ctx: click.Context,
+    mission: str,
+    laws: tuple[str, ...],
+    sensors: str,
+    vehicle: str,
+    varied: tuple[str, ...],
+    settings: tuple[str, ...],
+    seeds: int,
+    sample: int | None,
+    jobs: int | None,
+    scheduler: str | None,
+    out: Path | None,
+    fresh: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Fly a mission thousands of times under varied conditions.
+
+    The flights are those of gcs fly --lockstep, but for the wire, which is left out: some ten a second on
+    each core. Every parameter of the simulator and of the autopilot can be varied. The directory then holds
+    flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that was
+    stopped goes on when the same command is given again.
+
+    \b
+    gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5
+    gcs sweep case-b --law plumbline --law thesis --vary SIM_NOISE_SCALE=0.5:4:8 --vary SIM_SENS_LAT_MS=0,5,10
+    gcs sweep case-c --vary SIM_LOAD_MASS=0.05:0.15 --vary SIM_GUST_STD=0:2 --sample 500
+    """
+    if jobs is not None and scheduler is not None:
+        raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
+
+    from gcs.experiments.launch import cores
+    from gcs.stopping import StopRequest
+    from gcs.sweep.plan import make_plan, read_varied
+    from gcs.sweep.pool import dask_cluster, own_processes
+    from gcs.sweep.report import write_report
+    from gcs.sweep.run import sweep
+
+    quiet = quiet or as_json
+    plan = make_plan(
+        mission,
+        vehicle,
+        sensors,
+        laws or ("plumbline",),
+        tuple(range(1, seeds + 1)),
+        [read_varied(text, sample is not None) for text in varied],
+        dict(_setting(text) for text in settings),
+        sample or 0,
+    )
+    directory = out or Path("sweeps") / Path(mission).stem
+    workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(jobs)))
+    with StopRequest("stopping; what is flown is kept, the same command goes on from there") as stop:
+        done = sweep(plan, directory, shlex.join(sys.argv), version("plumbline"), workers, stop, quiet, fresh)
+        page = write_report(directory, plan)
+    if as_json:
+        print_json(
+            {
+                "flights": done.flights,
+                "completed": done.completed,
+                "failed": done.flights - done.completed,
+                "planned": plan.flights,
+                "flown": done.flown,
+                "wall_s": round(done.wall_s, 3),
+                "flights_per_s": round(done.flights_per_s, 2),
+                "out": str(directory),
+            }
+        )
+    else:
+        pace = f", {done.flights_per_s:.1f} flights/s" if done.flown else ""
+        say(f"{mission}: {done.flights} of {plan.flights} flown, {done.completed} completed{pace}")
+        click.echo(f"report: {page}")
+    return EXIT_DONE if done.whole else EXIT_INTERRUPTED
+
+
+def _setting(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    return name, float(value)

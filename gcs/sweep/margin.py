@@ -1,0 +1,233 @@
+"""How far a parameter may go by linear theory: until an eigenvalue of hovering leaves the unit circle.
+
+The loop is that of load position: the vehicle of (2-30)-(2-35) about hover with first-order rotors and a
+transport delay, sampled with a zero-order hold, and the law that flies, linearised by central differences of
+its own tick. The state is taken as known: what estimator and sensors do to it is what the flights show beyond
+this. Mass and wind are not observed meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+
+from autopilot.actuation import Actuation, advance, steady
+from autopilot.control.records import Reference, State, Vehicle
+from autopilot.flight_core import Setup
+from autopilot.geometry.linear import E1, ZERO, Vec3
+from autopilot.observer import nominal
+from autopilot.onboard import build_setup
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
+from gcs.analysis.axes import Floats
+from gcs.sweep.plan import Plan, simulated
+from sitl.sim_core import settings_of
+from sitl.truth.files import load_truth
+from sitl.truth.parameters import apply as apply_parameters
+from sitl.truth.parameters import sim_parameters
+
+STEP = 1e-5  # central differences: truncation and rounding both below 1e-9
+LOST = 1.0 + 1e-7  # spectral radius; what the law carries but does not use has eigenvalue 1
+STRIDES = 12  # on the way from the value delivered to the end of the search
+HALVINGS = 6
+SETTLE_TICKS = 500  # in which the memory of a law comes to rest while hovering
+MOTION = 16  # x_L, v_L, q_x, q_y, their rates, rotation vector, Omega
+
+
+def plant(vehicle: Vehicle) -> tuple[Floats, Floats]:
+    """(A, B) of (2-30)-(2-35) at hover in the coordinates of MOTION, inputs f and M: linearised by hand."""
+    m_Q, L, g = vehicle.quad_mass, vehicle.cable_length, vehicle.gravity
+    m = m_Q + vehicle.load_mass
+    A, B = np.zeros((MOTION, MOTION)), np.zeros((MOTION, 4))
+    A[0:3, 3:6] = np.eye(3)
+    A[3, 6] = A[4, 7] = -g
+    B[5, 0] = 1.0 / m
+    A[6:8, 8:10] = np.eye(2)
+    A[8, 6] = A[9, 7] = A[8, 11] = -m * g / (m_Q * L)
+    A[9, 10] = m * g / (m_Q * L)
+    A[10:13, 13:16] = np.eye(3)
+    B[13:16, 1:4] = np.diag(1.0 / np.array(vehicle.inertia))
+    return A, B
+
+
+def sampled_plant(vehicle: Vehicle, tau: float, delay: float, period: float) -> tuple[Floats, Floats, Floats]:
+    """(A, B, C) from tick to tick: motion, rotors of lag `tau`, commands on their way for `delay` (s)."""
+    A, B = plant(vehicle)
+    n = len(A)
+    if tau > 0.0:
+        A = np.block([[A, B], [np.zeros((4, n)), -np.eye(4) / tau]])
+        B = np.vstack([np.zeros((n, 4)), np.eye(4) / tau])
+    whole = math.floor(delay / period + 1e-9)
+    late = max(0.0, delay - whole * period)
+
+    def hold(duration: float) -> tuple[Floats, Floats]:
+        E = expm(np.block([[A, B], [np.zeros((4, len(A) + 4))]]) * duration)
+        return E[: len(A), : len(A)], E[: len(A), len(A) :]
+
+    Phi, _ = hold(period)
+    Phi_new, Gamma_new = hold(period - late)
+    Gamma_old = Phi_new @ hold(late)[1]
+    # commands on their way, oldest first
+    m, queue = len(A), whole + 1
+    size = m + 4 * queue
+    A_d, B_d = np.zeros((size, size)), np.zeros((size, 4))
+    A_d[:m, :m] = Phi
+    A_d[:m, m : m + 4] = Gamma_old
+    if whole == 0:
+        B_d[:m] = Gamma_new
+    else:
+        A_d[:m, m + 4 : m + 8] = Gamma_new
+    A_d[m : size - 4, m + 4 :] = np.eye(4 * (queue - 1))
+    B_d[size - 4 :] = np.eye(4)
+    C_d = np.zeros((MOTION, size))
+    C_d[:, :MOTION] = np.eye(MOTION)
+    return A_d, B_d, C_d
+
+
+def state_at(motion: Floats, vehicle: Vehicle) -> State:
+    """The state near hover with these coordinates, on its manifolds to second order."""
+    q_x, q_y = float(motion[6]), float(motion[7])
+    q_z = -math.sqrt(1.0 - q_x * q_x - q_y * q_y)
+    q = np.array([q_x, q_y, q_z])
+    q_dot = np.array([motion[8], motion[9], -(q_x * motion[8] + q_y * motion[9]) / q_z])
+    a, b, c = motion[10:13]
+    R = expm(np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]]))
+    x, v, L = motion[0:3], motion[3:6], vehicle.cable_length
+    return State(
+        _vec(x),
+        _vec(v),
+        _vec(q),
+        _vec(q_dot),
+        _vec(x - L * q),
+        _vec(v - L * q_dot),
+        (_vec(R[0]), _vec(R[1]), _vec(R[2])),
+        _vec(motion[13:16]),
+    )
+
+
+def _vec(a: Floats) -> Vec3:
+    return (float(a[0]), float(a[1]), float(a[2]))
+
+
+def _numbers(record: Any) -> Iterator[float]:
+    """Every number of a record of records, vectors and arrays."""
+    if isinstance(record, np.ndarray):
+        yield from record.ravel().tolist()
+    elif isinstance(record, tuple):
+        for part in record:
+            yield from _numbers(part)
+    else:
+        yield float(record)
+
+
+def _like(record: Any, numbers: Iterator[float]) -> Any:
+    """A record of the same form with other numbers."""
+    if isinstance(record, np.ndarray):
+        return np.array([next(numbers) for _ in range(record.size)]).reshape(record.shape)
+    if isinstance(record, tuple):
+        parts = [_like(part, numbers) for part in record]
+        return type(record)(*parts) if hasattr(record, "_fields") else tuple(parts)
+    return next(numbers)
+
+
+def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
+    """(A, B, C, D) of the law at hover: memory and motion in, memory and (f, M) out."""
+    vehicle, law = setup.vehicle, setup.law
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
+    observed = nominal(vehicle)._replace(support=0.0)
+    rows = setup.actuation.whole + 2  # of the queue; later ones are not looked at
+    hover = np.zeros(MOTION)
+
+    def tick(memory: Any, actuation: Actuation, motion: Floats) -> tuple[Any, Actuation, Floats]:
+        state = state_at(motion, vehicle)
+        memory, command = law.load_position(memory, state, reference, actuation, observed)
+        after = advance(actuation, command.thrust, command.moment, setup.actuation)
+        return memory, after, np.array([command.thrust, *command.moment])
+
+    full = steady(weight)
+    actuation = Actuation(full.queue[:rows].copy(), full.thrust, full.moment)
+    memory = law.start(state_at(hover, vehicle), ZERO, ZERO)
+    for _ in range(SETTLE_TICKS):
+        memory, actuation, _ = tick(memory, actuation, hover)
+    form = (memory, actuation)
+    rest = np.array(list(_numbers(form)))
+    n = len(rest)
+
+    def step(at: Floats) -> Floats:
+        memory, actuation = _like(form, iter(at[:n].tolist()))
+        after, moved, command = tick(memory, actuation, at[n:])
+        return np.array([*_numbers((after, moved)), *command])
+
+    at = np.concatenate([rest, hover])
+    jacobian = np.empty((n + 4, n + MOTION))
+    for j in range(n + MOTION):
+        shift = np.zeros(n + MOTION)
+        shift[j] = STEP
+        jacobian[:, j] = (step(at + shift) - step(at - shift)) / (2.0 * STEP)
+    return jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
+
+
+def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
+    """Moduli of the eigenvalues of hovering, sorted, under settings by name."""
+    import control
+
+    table = autopilot_parameters(load_belief(vehicle))
+    apply_settings(table, settings.items())
+    truth = load_truth(vehicle)
+    sim_table = sim_parameters(truth)
+    for name, value in simulated(settings).items():
+        sim_table.set(name, value)
+    true, period = apply_parameters(truth, sim_table), 1.0 / table["CTL_RATE_HZ"]
+    setup = build_setup(table, 1)
+    really = setup.vehicle._replace(
+        quad_mass=true.quad_mass,
+        load_mass=true.load_mass,
+        cable_length=true.cable_length,
+        inertia=true.inertia,
+        gravity=true.gravity,
+    )
+    delay = settings_of(sim_table).actuator_delay_us * 1e-6
+    A, B, C = sampled_plant(really, true.rotor_tau, delay, period)
+    world = control.ss(A, B, C, np.zeros((MOTION, 4)), period)
+    law = control.ss(*linearised_law(setup), period)
+    # the law's own sign closes the loop
+    return sorted(np.abs(control.feedback(world, law, sign=1).poles()).tolist())
+
+
+def linear_range(plan: Plan, law: str, name: str, nominal_value: float, limits: tuple[float, float]) -> str:
+    """How far the parameter may go from its value as delivered, at most to `limits`; empty if the linear loop
+    does not know it. Everything else is as delivered or set for all flights."""
+    fixed = {**dict(plan.settings), "CTL_LAW": float(LAWS.index(law))}
+
+    def holds(value: float) -> bool:
+        return moduli(plan.vehicle, {**fixed, name: value})[-1] < LOST
+
+    here, low, high = (moduli(plan.vehicle, {**fixed, name: value}) for value in (nominal_value, *limits))
+    if here == low == high:
+        return ""
+    if here[-1] >= LOST:
+        return "nowhere"
+    least, below = _boundary(holds, nominal_value, limits[0])
+    most, above = _boundary(holds, nominal_value, limits[1])
+    return f"{'< ' if below else ''}{least:.4g} … {'> ' if above else ''}{most:.4g}"
+
+
+def _boundary(holds: Callable[[float], bool], inside: float, outside: float) -> tuple[float, bool]:
+    """Where on the way it first ceases to hold, and whether it held all the way (to no natural end)."""
+    if outside == inside:
+        return inside, False
+    low = inside
+    for value in np.linspace(inside, outside, STRIDES + 1)[1:].tolist():
+        if not holds(value):
+            high = value
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if holds(middle) else (low, middle)
+            return low, False
+        low = value
+    return outside, outside != 0.0

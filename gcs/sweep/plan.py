@@ -1,0 +1,264 @@
+"""What a sweep flies: laws, seeds and settings, every flight with a number of its own.
+
+The flights follow from the plan alone, so that a sweep that was stopped goes on, and any flight of it can be
+flown again by its number.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import LAWS, autopilot_parameters
+from autopilot.wire.parameters import ParameterError
+from gcs.closed_loop import Conditions
+from gcs.errors import EXIT_USAGE, GcsError
+from missions.fileformat import load_mission
+from sitl.sensors.files import load_profile
+from sitl.sim_core import settings_of
+from sitl.truth.files import load_truth
+from sitl.truth.parameters import sim_parameters
+
+PLAN_FILE = "plan.json"
+MOST_FLIGHTS = 10_000_000
+_MOST_VALUES = 10_000
+_DRAW_SEED = 1  # of the settings of `--sample`: part of the plan's meaning
+
+
+def simulated(settings: Mapping[str, float]) -> dict[str, float]:
+    """Of settings by name those that the simulator takes."""
+    return {n: v for n, v in settings.items() if n.startswith("SIM_") and n != "SIM_LOSS_PCT"}
+
+
+class PlanError(GcsError):
+    """A sweep that cannot be."""
+
+    exit_code = EXIT_USAGE
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A parameter and what it takes on: on a grid each of `values`; drawn, if `continuous`, any number
+    between the least and the greatest."""
+
+    name: str
+    values: tuple[float, ...]
+    continuous: bool
+
+
+@dataclass(frozen=True)
+class Case:
+    """One flight of a sweep."""
+
+    index: int
+    law: str
+    seed: int
+    varied: tuple[float, ...]  # in the order of the plan
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep. `sample` settings are drawn by Latin hypercube; 0: the grid of all values is flown."""
+
+    mission: str
+    vehicle: str
+    sensors: str
+    laws: tuple[str, ...]
+    seeds: tuple[int, ...]
+    varied: tuple[Varied, ...]
+    settings: tuple[tuple[str, float], ...]  # the same for all flights
+    sample: int = 0
+
+    @property
+    def points(self) -> int:
+        """How many different settings are flown."""
+        return self.sample or math.prod(len(v.values) for v in self.varied)
+
+    @property
+    def flights(self) -> int:
+        """How many flights there are."""
+        return len(self.laws) * self.points * len(self.seeds)
+
+    def cases(self) -> Iterator[Case]:
+        """Every flight, in the order of its number: law by law, setting by setting, seed by seed."""
+        points = self._points()
+        numbered = product(self.laws, points, self.seeds)
+        for index, (law, point, seed) in enumerate(numbered):
+            yield Case(index, law, seed, point)
+
+    def _points(self) -> list[tuple[float, ...]]:
+        if not self.sample:
+            return list(product(*(v.values for v in self.varied)))
+        from scipy.stats.qmc import LatinHypercube
+
+        shares = LatinHypercube(len(self.varied), rng=_DRAW_SEED).random(self.sample)
+        return [
+            tuple(_drawn(v, float(share)) for v, share in zip(self.varied, row, strict=True))
+            for row in shares
+        ]
+
+    def conditions(self, case: Case) -> Conditions:
+        """What the flight is flown under."""
+        varied = {v.name: value for v, value in zip(self.varied, case.varied, strict=True)}
+        law = {"CTL_LAW": float(LAWS.index(case.law))}
+        return Conditions(self.vehicle, self.sensors, case.seed, {**dict(self.settings), **varied, **law})
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return json.loads(json.dumps(asdict(self)))  # type: ignore[no-any-return]
+
+
+def from_json(values: Mapping[str, Any]) -> Plan:
+    """Inverse of `Plan.to_json`."""
+    return Plan(
+        mission=values["mission"],
+        vehicle=values["vehicle"],
+        sensors=values["sensors"],
+        laws=tuple(values["laws"]),
+        seeds=tuple(values["seeds"]),
+        varied=tuple(Varied(v["name"], tuple(v["values"]), bool(v["continuous"])) for v in values["varied"]),
+        settings=tuple((name, float(value)) for name, value in values["settings"]),
+        sample=int(values["sample"]),
+    )
+
+
+def _drawn(varied: Varied, share: float) -> float:
+    if varied.continuous:
+        low, high = min(varied.values), max(varied.values)
+        return low + share * (high - low)
+    return varied.values[min(int(share * len(varied.values)), len(varied.values) - 1)]
+
+
+def read_varied(text: str, sampled: bool) -> Varied:
+    """NAME=LOW:HIGH:COUNT, NAME=A,B,C, or, if values are `sampled`, NAME=LOW:HIGH."""
+    name, equals, values = text.partition("=")
+    name = name.strip().upper()
+    if not equals or not name or not values.strip():
+        raise PlanError(
+            f"--vary {text}: must be NAME=LOW:HIGH:COUNT or NAME=A,B,C, e.g. SIM_ACT_DELAY_MS=0:60:7"
+        )
+    if ":" not in values:
+        return Varied(name, tuple(_number(text, one) for one in values.split(",")), False)
+    parts = values.split(":")
+    if len(parts) not in (2, 3):
+        raise PlanError(f"--vary {text}: must be NAME=LOW:HIGH:COUNT, or NAME=LOW:HIGH with --sample")
+    low, high = _number(text, parts[0]), _number(text, parts[1])
+    if not low < high:
+        raise PlanError(f"--vary {text}: the first end must be below the second")
+    if len(parts) == 2:
+        if not sampled:
+            raise PlanError(f"--vary {text}: a range without a count is for --sample; append a count, as :7")
+        return Varied(name, (low, high), True)
+    count = _number(text, parts[2])
+    if count != int(count) or not 2 <= count <= _MOST_VALUES:
+        raise PlanError(f"--vary {text}: the count must be a whole number, 2 ... {_MOST_VALUES}")
+    n = int(count)
+    # twelve digits: 0.1 and not 0.30000000000000004
+    return Varied(name, tuple(float(f"{low + i * (high - low) / (n - 1):.12g}") for i in range(n)), True)
+
+
+def _number(text: str, number: str) -> float:
+    try:
+        value = float(number)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise PlanError(f"--vary {text}: {number.strip() or 'nothing'!r} is no finite number")
+    return value
+
+
+def make_plan(
+    mission: str,
+    vehicle: str,
+    sensors: str,
+    laws: Sequence[str],
+    seeds: Sequence[int],
+    varied: Sequence[Varied],
+    settings: Mapping[str, float],
+    sample: int,
+) -> Plan:
+    """The plan, or PlanError with what is wrong with it."""
+    names = [v.name for v in varied]
+    for name in names:
+        if names.count(name) > 1:
+            raise PlanError(f"--vary {name} is given twice; give all its values in one")
+        if name in settings:
+            raise PlanError(f"{name} is both varied and set; leave one of the two out")
+    if sample and not varied:
+        raise PlanError("--sample draws the values of --vary, and there is none")
+    _check_values(vehicle, [*((v.name, value) for v in varied for value in v.values), *settings.items()])
+    try:
+        load_mission(mission)
+        load_profile(sensors)
+    except ValueError as error:
+        raise PlanError(str(error)) from None
+    plan = Plan(
+        mission,
+        vehicle,
+        sensors,
+        tuple(dict.fromkeys(laws)),
+        tuple(seeds),
+        tuple(varied),
+        tuple(sorted(settings.items())),
+        sample,
+    )
+    if plan.flights > MOST_FLIGHTS:
+        raise PlanError(f"{plan.flights} flights are too many, {MOST_FLIGHTS} at most; --sample takes a few")
+    return plan
+
+
+def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
+    try:
+        simulated = sim_parameters(load_truth(vehicle))
+        table = autopilot_parameters(load_belief(vehicle))
+    except ValueError as error:
+        raise PlanError(str(error)) from None
+    for name, value in values:
+        if name == "SIM_LOSS_PCT":
+            raise PlanError(
+                "SIM_LOSS_PCT acts on the ground link, and a sweep flies without one; leave it out"
+            )
+        if name == "CTL_LAW":
+            raise PlanError("CTL_LAW is what --law says; give --law instead")
+        holder = simulated if name.startswith("SIM_") and name in simulated else table
+        try:
+            holder.set(name, value)
+            if name == "SIM_RATE_HZ":
+                settings_of(simulated)
+        except ParameterError as error:
+            raise PlanError(str(error)) from None
+
+
+def store_plan(directory: Path, plan: Plan, command: str, version: str, code: str) -> None:
+    """Write plan.json; PlanError if the directory holds another plan, or flights of other code."""
+    path = directory / PLAN_FILE
+    wanted = {"plan": plan.to_json(), "code": code}
+    if path.exists():
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError:
+            raise PlanError(f"{path} cannot be read; take another --out or remove {directory}") from None
+        if found.get("plan") != wanted["plan"]:
+            raise PlanError(f"{directory} holds another sweep; take another --out or remove it")
+        if found.get("code") != code:
+            raise PlanError(
+                f"{directory} holds flights of other code; take another --out, remove it, or give --fresh"
+            )
+        return
+    directory.mkdir(parents=True, exist_ok=True)
+    fields = {"command": command, "version": version, **wanted, "flights": plan.flights}
+    path.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
+
+
+def load_plan(directory: Path) -> Plan:
+    """The plan of a sweep's directory."""
+    try:
+        return from_json(json.loads((directory / PLAN_FILE).read_text(encoding="utf-8"))["plan"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise PlanError(f"{directory} holds no sweep: {PLAN_FILE} is missing or cannot be read") from None

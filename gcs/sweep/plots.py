@@ -1,0 +1,113 @@
+"""The pictures of a sweep: maps of success and error over two parameters, curves over one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gcs.analysis.axes import Floats
+from gcs.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, RED, key, new_figure, save, style
+from gcs.sweep.plan import Plan
+from gcs.sweep.results import Cells, Flights, cells
+
+LAW_COLOURS = {"plumbline": BLUE, "thesis": ORANGE, "lqr": GREEN}
+_MOST_NUMBERS = 144  # cells of a map up to which each has its number written in
+_ERROR_LIMITS_MM = (1.0, 1000.0)  # of the colours
+
+
+def draw_map(path: Path, flights: Flights, plan: Plan, names: tuple[str, str], units: dict[str, str]) -> None:
+    """Share of success, median and worst error of one law over two parameters."""
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
+
+    found = cells(flights, plan, names)
+    success = LinearSegmentedColormap.from_list("success", [RED, "#f6e3c5", BLUE])
+    panels: tuple[tuple[str, Floats, Any, Any, float], ...] = (
+        ("flights completed (%)", 100.0 * found.success, Normalize(0.0, 100.0), success, 1.0),
+        (
+            "greatest load error, median (mm)",
+            found.error_median_m,
+            LogNorm(*_ERROR_LIMITS_MM),
+            "viridis_r",
+            1e3,
+        ),
+        (
+            "greatest load error, worst (mm)",
+            found.error_worst_m,
+            LogNorm(*_ERROR_LIMITS_MM),
+            "viridis_r",
+            1e3,
+        ),
+    )
+    with style():
+        figure = new_figure(14.4, 4.3)
+        for ax, (title, values, norm, colours, scale) in zip(figure.subplots(1, 3), panels, strict=True):
+            _draw_cells(ax, found, scale * values, norm, colours)
+            ax.set_title(title)
+            ax.set_xlabel(_label(names[0], units))
+            ax.set_ylabel(_label(names[1], units))
+        figure.subplots_adjust(left=0.05, right=0.985, bottom=0.13, top=0.88, wspace=0.2)
+        figure.suptitle(f"law {flights.law}", x=0.012, ha="left", fontsize=11, color=INK)
+        save(figure, path)
+
+
+def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) -> None:
+    x, y = found.axes
+    shown = np.ma.masked_invalid(values.T)
+    ax.grid(False)
+    ax.set_facecolor(PALE)
+    image = ax.imshow(shown, origin="lower", aspect="auto", norm=norm, cmap=colours, interpolation="nearest")
+    for ticks, labels, centres in (
+        (ax.set_xticks, ax.set_xticklabels, x),
+        (ax.set_yticks, ax.set_yticklabels, y),
+    ):
+        stride = max(1, -(-len(centres) // 12))
+        ticks(range(0, len(centres), stride))
+        labels([f"{value:.4g}" for value in centres[::stride]])
+    if values.size > _MOST_NUMBERS:
+        ax.figure.colorbar(image, ax=ax)
+        return
+    for (i, j), value in np.ndenumerate(values):
+        if not np.isfinite(value):
+            ax.text(i, j, "–", ha="center", va="center", fontsize=8, color=GREY)
+            continue
+        red, green, blue, _ = image.cmap(norm(value))
+        dark = 0.3 * red + 0.59 * green + 0.11 * blue < 0.5
+        text = f"{value:.0f}" if value >= 10.0 or value == 0.0 else f"{value:.1f}"
+        ax.text(i, j, text, ha="center", va="center", fontsize=8, color="white" if dark else INK)
+
+
+def draw_curve(path: Path, laws: list[Flights], plan: Plan, name: str, units: dict[str, str]) -> None:
+    """Share of success and error over one parameter, all laws."""
+    with style():
+        figure = new_figure(11.0, 3.7)
+        left, right = figure.subplots(1, 2)
+        for flights in laws:
+            found = cells(flights, plan, (name,))
+            colour = LAW_COLOURS.get(flights.law, PURPLE)
+            x = found.axes[0]
+            left.plot(x, 100.0 * found.success, "o-", color=colour, markersize=4, label=flights.law)
+            right.plot(
+                x,
+                1e3 * found.error_median_m,
+                "o-",
+                color=colour,
+                markersize=4,
+                label=f"{flights.law}, median",
+            )
+            right.plot(x, 1e3 * found.error_worst_m, "--", color=colour, linewidth=1.0, label="worst")
+        left.set_ylim(-4.0, 104.0)
+        left.set_title("flights completed (%)")
+        right.set_title("greatest load error (mm)")
+        right.set_yscale("log")
+        for ax in (left, right):
+            ax.set_xlabel(_label(name, units))
+            key(ax, 2 * len(laws))
+        figure.subplots_adjust(left=0.06, right=0.985, bottom=0.15, top=0.88, wspace=0.16)
+        save(figure, path)
+
+
+def _label(name: str, units: dict[str, str]) -> str:
+    unit = units.get(name, "")
+    return f"{name} ({unit})" if unit else name

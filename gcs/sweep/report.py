@@ -1,0 +1,124 @@
+"""report.html of a sweep: what was flown, maps and curves, and how far each parameter may go."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections import Counter
+from importlib.resources import files
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.parameters import Parameter, ParameterTable
+from gcs.sweep.margin import linear_range
+from gcs.sweep.plan import PLAN_FILE, Plan
+from gcs.sweep.plots import draw_curve, draw_map
+from gcs.sweep.results import Flights, flights_of, reach
+from gcs.sweep.store import Store
+from sitl.truth.files import load_truth
+from sitl.truth.parameters import sim_parameters
+
+PAGE_FILE = "report.html"
+_TEMPLATE = "sweep.html"
+_MOST_PAIRS = 10
+
+
+def write_report(directory: Path, plan: Plan) -> Path:
+    """Pictures and page from the flights that are stored; the page's path."""
+    from jinja2 import Environment
+
+    laws = [flights for flights in flights_of(Store(directory, plan).read(), plan) if flights.outcome]
+    tables = _tables(plan)
+    units = {v.name: _parameter(tables, v.name).unit for v in plan.varied}
+    names = [v.name for v in plan.varied if len(set(v.values)) > 1]
+    curves, maps = [], []
+    for name in names if laws else []:
+        picture = directory / f"curve-{name.lower()}.png"
+        draw_curve(picture, laws, plan, name, units)
+        curves.append(_picture(picture, f"{name}: everything else thrown together"))
+    for first, second in list(combinations(names, 2))[:_MOST_PAIRS]:
+        for flights in laws:
+            picture = directory / f"map-{flights.law}-{first.lower()}-{second.lower()}.png"
+            draw_map(picture, flights, plan, (first, second), units)
+            maps.append(_picture(picture, f"law {flights.law}, {first} and {second}"))
+    story = json.loads((directory / PLAN_FILE).read_text(encoding="utf-8"))
+    source = files("gcs.sweep").joinpath(_TEMPLATE).read_text(encoding="utf-8")
+    page = directory / PAGE_FILE
+    text = (
+        Environment(autoescape=True)
+        .from_string(source)
+        .render(
+            title=plan.mission,
+            plan=plan,
+            command=story.get("command", ""),
+            version=story.get("version", ""),
+            flown=sum(len(flights.outcome) for flights in laws),
+            laws=[_law(flights) for flights in laws],
+            reaches=margins(plan, laws, tables),
+            curves=curves,
+            maps=maps,
+        )
+    )
+    page.write_text(text, encoding="utf-8")
+    return page
+
+
+def margins(plan: Plan, laws: list[Flights], tables: tuple[ParameterTable, ...]) -> list[dict[str, str]]:
+    """For each law and varied parameter: from where to where all is well, and what linear theory says."""
+    rows = []
+    for flights in laws:
+        for varied in plan.varied:
+            parameter = _parameter(tables, varied.name)
+            nominal, unit = parameter.default, parameter.unit
+            found = reach(flights, plan, varied.name, nominal)
+            least, most = min(*varied.values, nominal), max(*varied.values, nominal)
+            limits = (max(parameter.low, least), min(parameter.high, nominal + 2.0 * (most - nominal)))
+            rows.append(
+                {
+                    "law": flights.law,
+                    "name": varied.name,
+                    "unit": unit,
+                    "nominal": f"{nominal:.4g}",
+                    "every": _range(found.all_from, found.all_to),
+                    "some": _range(found.some_from, found.some_to),
+                    "flown": _range(min(varied.values), max(varied.values)),
+                    "linear": linear_range(plan, flights.law, varied.name, nominal, limits),
+                }
+            )
+    return rows
+
+
+def _range(low: float, high: float) -> str:
+    if math.isnan(low):
+        return "nowhere"
+    return f"{low:.4g}" if low == high else f"{low:.4g} … {high:.4g}"
+
+
+def _law(flights: Flights) -> dict[str, Any]:
+    ends = Counter(flights.outcome)
+    phases = Counter(phase for phase in flights.lost_phase if phase)
+    worst = max((e for e in flights.error_m[flights.completed] if math.isfinite(e)), default=math.nan)
+    return {
+        "name": flights.law,
+        "flights": len(flights.outcome),
+        "share": f"{100.0 * ends['completed'] / len(flights.outcome):.1f}",
+        "ends": ", ".join(f"{name} {n}" for name, n in ends.most_common()),
+        "phases": ", ".join(f"{name} {n}" for name, n in phases.most_common()) or "–",
+        "worst": f"{1e3 * worst:.1f}" if math.isfinite(worst) else "–",
+    }
+
+
+def _tables(plan: Plan) -> tuple[ParameterTable, ...]:
+    return (sim_parameters(load_truth(plan.vehicle)), autopilot_parameters(load_belief(plan.vehicle)))
+
+
+def _parameter(tables: tuple[ParameterTable, ...], name: str) -> Parameter:
+    return next(table for table in tables if name in table).describe(name)
+
+
+def _picture(path: Path, caption: str) -> dict[str, str]:
+    return {"data": base64.b64encode(path.read_bytes()).decode(), "caption": caption}

@@ -1,0 +1,147 @@
+"""What a sweep found: shares of success and errors over the settings, and how far each setting goes."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcs.analysis.axes import Floats
+from gcs.sweep.plan import Plan
+
+if TYPE_CHECKING:
+    import pyarrow
+
+BINS = 8  # of a parameter whose values were drawn
+COMPLETED = "completed"
+
+
+@dataclass(frozen=True)
+class Flights:
+    """The flights of one law, n of them."""
+
+    law: str
+    values: dict[str, Floats]  # (n,) by varied parameter
+    completed: NDArray[np.bool_]  # (n,)
+    error_m: Floats  # (n,) greatest load error of the mission
+    outcome: tuple[str, ...]
+    lost_phase: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Figures over one or two parameters; NaN where nothing was flown, errors also where none completed."""
+
+    axes: tuple[Floats, ...]  # centres, one array for each parameter
+    flown: Floats  # flights
+    success: Floats  # share
+    error_median_m: Floats  # of the flights that completed
+    error_worst_m: Floats
+
+
+@dataclass(frozen=True)
+class Reach:
+    """From where to where, around the value that the vehicle is delivered with, a parameter may go.
+
+    `all_from`, `all_to`: every flight completes, whatever else is varied. `some_from`, `some_to`: there is a
+    setting of everything else at which all seeds complete. NaN: not even at that value.
+    """
+
+    name: str
+    nominal: float
+    all_from: float
+    all_to: float
+    some_from: float
+    some_to: float
+
+
+def flights_of(table: pyarrow.Table, plan: Plan) -> list[Flights]:
+    """The table law by law, in the order of the plan."""
+    law = np.array(table.column("law").to_pylist(), dtype=object)
+    outcome = np.array(table.column("outcome").to_pylist(), dtype=object)
+    phase = np.array(table.column("lost_phase").to_pylist(), dtype=object)
+    error = table.column("load_error_max_m").to_numpy()
+    found = []
+    for name in plan.laws:
+        rows = law == name
+        found.append(
+            Flights(
+                name,
+                {v.name: table.column(v.name).to_numpy()[rows] for v in plan.varied},
+                outcome[rows] == COMPLETED,
+                error[rows],
+                tuple(outcome[rows].tolist()),
+                tuple(phase[rows].tolist()),
+            )
+        )
+    return found
+
+
+def levels(plan: Plan, name: str) -> Floats:
+    """The values that a parameter takes on, or the centres of the bins that its drawn values fall into."""
+    varied = next(v for v in plan.varied if v.name == name)
+    if plan.sample and varied.continuous:
+        edges = np.linspace(min(varied.values), max(varied.values), BINS + 1)
+        return np.asarray(0.5 * (edges[1:] + edges[:-1]))
+    return np.array(sorted(set(varied.values)))
+
+
+def _nearest(values: Floats, centres: Floats) -> NDArray[np.intp]:
+    return np.asarray(np.argmin(np.abs(values[:, None] - centres[None, :]), axis=1))
+
+
+def cells(flights: Flights, plan: Plan, names: tuple[str, ...]) -> Cells:
+    """The figures over the parameters named, everything else thrown together."""
+    axes = tuple(levels(plan, name) for name in names)
+    shape = tuple(len(axis) for axis in axes)
+    at = np.ravel_multi_index(
+        [_nearest(flights.values[name], axis) for name, axis in zip(names, axes, strict=True)], shape
+    )
+    count = int(np.prod(shape))
+    flown = np.bincount(at, minlength=count).astype(float)
+    done = np.bincount(at, weights=flights.completed.astype(float), minlength=count)
+    median, worst = np.full(count, np.nan), np.full(count, np.nan)
+    for cell in np.unique(at[flights.completed]):
+        errors = flights.error_m[(at == cell) & flights.completed]
+        errors = errors[np.isfinite(errors)]
+        if len(errors):
+            median[cell], worst[cell] = np.median(errors), errors.max()
+    with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
+        success = np.where(flown > 0.0, done / flown, np.nan)
+    return Cells(
+        axes, flown.reshape(shape), success.reshape(shape), median.reshape(shape), worst.reshape(shape)
+    )
+
+
+def reach(flights: Flights, plan: Plan, name: str, nominal: float) -> Reach:
+    """How far a parameter may go from `nominal` (or the value flown that is nearest to it)."""
+    centres = levels(plan, name)
+    level = _nearest(flights.values[name], centres)
+    rest = [other.name for other in plan.varied if other.name != name]
+    settings = (
+        np.stack([flights.values[other] for other in rest], axis=1) if rest else np.zeros((len(level), 1))
+    )
+    every = np.array(
+        [flights.completed[level == i].all() and (level == i).any() for i in range(len(centres))]
+    )
+    some = np.zeros(len(centres), dtype=np.bool_)
+    for i in range(len(centres)):
+        here = level == i
+        lost = {tuple(row) for row in settings[here & ~flights.completed].tolist()}
+        some[i] = any(tuple(row) not in lost for row in settings[here].tolist())
+    start = int(np.argmin(np.abs(centres - nominal)))
+    return Reach(name, nominal, *_span(centres, every, start), *_span(centres, some, start))
+
+
+def _span(centres: Floats, holds: NDArray[np.bool_], start: int) -> tuple[float, float]:
+    if not holds[start]:
+        return np.nan, np.nan
+    low = high = start
+    while low > 0 and holds[low - 1]:
+        low -= 1
+    while high + 1 < len(centres) and holds[high + 1]:
+        high += 1
+    return float(centres[low]), float(centres[high])

@@ -1,0 +1,133 @@
+"""flights.parquet: a row for each flight of a sweep, written in parts so that nothing flown is lost.
+
+A part is whole or not there: it is written under another name and renamed. When all is flown the parts become
+one table in the order of the flights.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gcs.sweep.flight import Flown
+from gcs.sweep.plan import Case, Plan
+
+if TYPE_CHECKING:
+    import pyarrow
+
+TABLE_FILE = "flights.parquet"
+PARTS = "parts"
+METADATA_KEY = b"plumbline"
+Row = dict[str, Any]
+
+_TEXTS = ("law", "outcome", "reason", "lost_phase")
+_WHOLE = ("index", "seed", "slack_events")
+
+
+def columns(plan: Plan) -> tuple[str, ...]:
+    """The columns of the table: which flight it is, what was varied, what became of it."""
+    figures = tuple(f.name for f in fields(Flown) if f.name != "texts")
+    return ("index", "law", "seed", *(v.name for v in plan.varied), *figures, "wall_s")
+
+
+def schema(plan: Plan) -> pyarrow.Schema:
+    """Types of the columns."""
+    import pyarrow as pa
+
+    def kind(name: str) -> pa.DataType:
+        if name in _TEXTS:
+            return pa.string()
+        return pa.int64() if name in _WHOLE else pa.float64()
+
+    metadata = {METADATA_KEY: json.dumps(plan.to_json()).encode()}
+    return pa.schema([(name, kind(name)) for name in columns(plan)], metadata=metadata)
+
+
+def row_of(plan: Plan, case: Case, flown: Flown, wall_s: float) -> Row:
+    """The row of a flight."""
+    figures = {f.name: getattr(flown, f.name) for f in fields(Flown) if f.name != "texts"}
+    varied = {v.name: value for v, value in zip(plan.varied, case.varied, strict=True)}
+    return {"index": case.index, "law": case.law, "seed": case.seed, **varied, **figures, "wall_s": wall_s}
+
+
+class Store:
+    """The flights of a sweep's directory."""
+
+    def __init__(self, directory: Path, plan: Plan) -> None:
+        self._directory = directory
+        self._plan = plan
+        self._schema = schema(plan)
+
+    @property
+    def path(self) -> Path:
+        """The table of all flights."""
+        return self._directory / TABLE_FILE
+
+    def parts(self) -> list[Path]:
+        """The parts that are whole."""
+        return sorted((self._directory / PARTS).glob("*.parquet"))
+
+    def done(self) -> set[int]:
+        """Numbers of the flights that are stored."""
+        import pyarrow.parquet as pq
+
+        found: set[int] = set()
+        for path in self._files():
+            found.update(pq.read_table(path, columns=["index"]).column("index").to_pylist())
+        return found
+
+    def add(self, rows: Sequence[Row]) -> None:
+        """Store rows as a part of its own."""
+        import pyarrow as pa
+
+        if not rows:
+            return
+        folder = self._directory / PARTS
+        folder.mkdir(parents=True, exist_ok=True)
+        first = min(row["index"] for row in rows)
+        self._write(
+            folder / f"{first:09d}-{len(rows)}.parquet", pa.Table.from_pylist(list(rows), self._schema)
+        )
+
+    def merge(self) -> pyarrow.Table:
+        """One table of all that is stored, in the order of the flights; the parts go when it is on disk."""
+        table = self.read()
+        self._write(self.path, table)
+        for path in self.parts():
+            path.unlink()
+        folder = self._directory / PARTS
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+        return table
+
+    def read(self) -> pyarrow.Table:
+        """All that is stored; a flight that was stored twice (killed while merging) counts once."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        tables = [pq.read_table(path, schema=self._schema) for path in self._files()]
+        if not tables:
+            return self._schema.empty_table()
+        table = pa.concat_tables(tables).sort_by("index")
+        index = table.column("index").to_numpy()
+        first = [True, *(index[1:] != index[:-1]).tolist()] if len(index) else []
+        return table.filter(pa.array(first, pa.bool_())).replace_schema_metadata(self._schema.metadata)
+
+    def clear(self) -> None:
+        """Forget all flights."""
+        for path in self._files():
+            path.unlink()
+
+    def _files(self) -> Iterable[Path]:
+        return [*([self.path] if self.path.exists() else []), *self.parts()]
+
+    def _write(self, path: Path, table: pyarrow.Table) -> None:
+        import pyarrow.parquet as pq
+
+        unfinished = path.with_suffix(f".{os.getpid()}.unfinished")
+        pq.write_table(table, unfinished, compression="zstd")
+        unfinished.replace(path)
