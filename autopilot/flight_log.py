@@ -129,6 +129,8 @@ def _load_setpoint(s: Sample) -> Numbers:
         *ned_from_enu(v.x_load_d),
         *ned_from_enu(v.v_load_d),
         *ned_from_enu(v.a_load_d),
+        *ned_from_enu(v.x_load_asked),
+        *ned_from_enu(v.v_load_asked),
         *ned_from_enu(v.q_cable_c),
         *(v.elapsed_s, v.duration_s),
         *(v.seq & 0xFFFF, v.phase, v.control_mode),
@@ -221,7 +223,8 @@ FAST: tuple[tuple[Topic, _Builder], ...] = (
         Topic(
             "load_setpoint",
             (
-                *(_vector(name) for name in ("position", "velocity", "acceleration", "cable")),
+                *(_vector(name) for name in ("position", "velocity", "acceleration")),
+                *(_vector(name) for name in ("position_asked", "velocity_asked", "cable")),
                 *("float elapsed", "float duration"),
                 *("uint16_t item", "uint8_t phase", "uint8_t control_mode"),
             ),

@@ -13,10 +13,7 @@ from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
 from autopilot.flight import Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
-<<<<<<< HEAD
 from autopilot.flight_log import FlightLog, LogChunk, Sample
-from autopilot.laws import believed_vehicle, build_law
-=======
 from autopilot.laws import (
     believed_actuation,
     believed_drag,
@@ -24,7 +21,6 @@ from autopilot.laws import (
     believed_vehicle,
     build_law,
 )
->>>>>>> main
 from autopilot.loss import Loss
 from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
