@@ -16,7 +16,14 @@ from platformdirs import user_state_path
 from autopilot.onboard import Onboard
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
-from autopilot.services.records import Event, Link, MissionChanged, ParameterChanged, TimesyncAnswered
+from autopilot.services.records import (
+    Event,
+    Link,
+    MissionChanged,
+    ParameterChanged,
+    SigningChanged,
+    TimesyncAnswered,
+)
 from autopilot.storage import Storage, StorageError
 from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import BeliefError, load_belief
@@ -38,6 +45,7 @@ from autopilot.wire.shell import (
     set_timeout,
     setting_option,
     shown,
+    signing_key_option,
 )
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
@@ -229,7 +237,9 @@ class Program:
             self._socket.sendto(answer, self._simulator)
         else:
             self._socket.sendto(answer, self._simulator)
+            self.onboard.endpoint.tell_time(time.time_ns() // 1000)
             self._ground.exchange(self.onboard, self._keep, stop)
+        self._keep(self.onboard.endpoint.take_events())
         self._keep_log(_LOG_BYTES)
         if new and self.onboard.fault and self.onboard.tick == 1:
             raise AutopilotError(self.onboard.fault)
@@ -246,6 +256,8 @@ class Program:
                         self._storage.keep_mission(mission)
                     case ParameterChanged(name, value):
                         self._storage.keep_parameter(name, value)
+                    case SigningChanged(key, timestamp):
+                        self._storage.keep_signing(key, timestamp)
             except OSError as error:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
@@ -326,6 +338,12 @@ def _address_or_none(text: str) -> Address | None:
     metavar="DIR",
     help="Where mission and parameters outlive the program.  [default: the user's state directory]",
 )
+@click.option(
+    "--signing-key",
+    type=signing_key_option,
+    metavar="FILE",
+    help="Hear only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
+)
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 @click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
 def main(
@@ -337,6 +355,7 @@ def main(
     settings: tuple[tuple[str, float], ...],
     home: Home | None,
     storage: Path | None,
+    signing_key: bytes | None,
     quiet: bool,
 ) -> None:
     """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
@@ -359,11 +378,14 @@ def main(
         mission, trouble = kept.load_mission(place)
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
+        if signing_key is not None:
+            known = kept.load_signing()
+            kept.keep_signing(signing_key, known.timestamp if known and known.key == signing_key else 0)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
         options = Options(place, boot, log=True)
 
         def build(stored: StoredMission | None) -> Onboard:
-            return Onboard(table, Identity(), options, stored, kept.card)
+            return Onboard(table, Identity(), options, stored, kept.card, kept.load_signing())
 
         stations = [address for address in (*gcs, api) if address is not None]
         ground = GroundInStep(ground_lockstep) if ground_lockstep else GroundStations(tuple(stations))

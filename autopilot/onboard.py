@@ -34,9 +34,11 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    SigningChanged,
     TimesyncAnswered,
     Verdict,
 )
+from autopilot.services.requests import ChangeSigningKey
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
@@ -44,6 +46,7 @@ from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.signing import Signing
 from autopilot.world_parameters import WorldParameters
 from missions.planning import Limits, prepare
 
@@ -84,9 +87,12 @@ class Onboard:
         options: Options,
         mission: StoredMission | None,
         card: Card | None = None,
+        signing: Signing | None = None,
     ) -> None:
         self.parameters = parameters
-        self.endpoint = VehicleEndpoint(identity, options.home, parameters, mission, card)
+        self.endpoint = VehicleEndpoint(
+            identity, options.home, parameters, mission, card, signing, options.boot_unix_us
+        )
         self.now_us = 0
         self.tick = -1
         self.fault = ""  # why the vehicle cannot be flown at all
@@ -245,8 +251,8 @@ class Onboard:
                     self._take_plan(mission)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered():
-                    pass  # the shell waits for it
+                case TimesyncAnswered() | SigningChanged():
+                    pass  # the shell waits for the one and stores the other
         return [event for event in events if not self._world.owns(event)]
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
@@ -274,6 +280,10 @@ class Onboard:
         rehearse(self._setup)
 
     def _decide(self, request: object) -> Verdict:
+        if isinstance(request, ChangeSigningKey):
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         state = self._state

@@ -16,6 +16,7 @@ from pathlib import Path
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.signing import Signing, timestamp_of
 from autopilot.wire.tlog import TlogWriter
 from gcs.analysis.record import FlightMeta, Record
 from gcs.clients import command
@@ -204,6 +205,8 @@ def _fly_running(
     with Session(address) as session:
         session.find()
         client = _client(mission, options, vehicle_home(session))
+    if address.signing_key is not None:
+        client.connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
     truth = _truth_of_a_running_world()
     vehicle = open_address(address)
     try:

@@ -44,6 +44,7 @@ from autopilot.services.requests import (
     SetMessageInterval,
     StoreParameters,
 )
+from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
 from autopilot.services.streams import OFF
@@ -52,6 +53,7 @@ from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
@@ -80,8 +82,11 @@ class VehicleEndpoint:
         parameters: ParameterTable,
         mission: StoredMission | None = None,
         card: Card | None = None,
+        signing: Signing | None = None,
+        boot_unix_us: int = 0,
     ) -> None:
         self.identity = identity
+        self._signing = SigningService(signing, boot_unix_us)
         self._missions = MissionService(home, mission or StoredMission())
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
@@ -89,7 +94,7 @@ class VehicleEndpoint:
         self.files = FileTree(MemoryCard() if card is None else card, made)
         self._ftp = FtpService(self.files)
         self._logs = LogService(self.files)
-        self._timed = (self._missions, self._parameters, self._ftp, self._logs)
+        self._timed = (self._signing, self._missions, self._parameters, self._ftp, self._logs)
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._table: dict[int, Stream] = dict(STREAMS)
@@ -98,6 +103,7 @@ class VehicleEndpoint:
         self._defaults = {key: stream.interval_us for key, stream in self._table.items()}
         self._watched: dict[int, Any] = {}
         self._work = False  # something waits in a queue
+        self._events: list[Event] = []  # of `poll`, until they are taken
         self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
         self._handlers = self._handler_table()
 
@@ -115,22 +121,31 @@ class VehicleEndpoint:
 
     def add_link(self, link: Link, now_us: int = 0) -> None:
         """A link that always gets telemetry, whether or not somebody is heard on it."""
-        self._links[link] = LinkState(True, self._defaults, now_us)
+        self._links[link] = self._new_link(True, now_us)
         self._work = True
 
     def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
         """Handle what came over `link`; answers leave with the next `poll`. No bytes raise anything."""
         events: list[Event] = []
         for received in decode(datagram)[0]:
-            if self._is_own(received):
+            message_id = received.message.get_msgId()  # some messages have a field called id
+            if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
             state = self._heard(link, now_us)
-            message_id = received.message.get_msgId()  # some messages have a field called id
             handler = self._handlers.get(message_id)
             if handler and self._is_for_us(message_id, received.message):
                 peer = Peer(link, received.system, received.component)
                 wrapped = self._decider(state, peer, now_us, decide)
                 self._do(handler(received.message, peer, now_us, wrapped), events)
+        return events
+
+    def tell_time(self, unix_us: int) -> None:
+        """The wall clock, by which messages are signed where the vehicle's clock is not in step with it."""
+        self._signing.tell_time(unix_us)
+
+    def take_events(self) -> list[Event]:
+        """What came up without a message: to be handled as the events of `receive`."""
+        events, self._events = self._events, []
         return events
 
     def say(self, severity: int, text: str) -> None:
@@ -167,7 +182,7 @@ class VehicleEndpoint:
             return []
         self._forget_silent(now_us)
         for service in self._timed:
-            self._do(service.poll(now_us), [])
+            self._do(service.poll(now_us), self._events)
         self._work = False
         taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
         if any(taken.values()) or any(state.announced for state in self._links.values()):
@@ -235,11 +250,16 @@ class VehicleEndpoint:
 
     # ---- links
 
+    def _new_link(self, configured: bool, now_us: int) -> LinkState:
+        taken = {state.number for state in self._links.values()}
+        number = next(number for number in range(len(taken) + 1) if number not in taken)
+        return LinkState(configured, self._defaults, now_us, number & 0xFF, self._signing.signer)
+
     def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)
         if state is None:
             self._make_room()
-            state = self._links[link] = LinkState(False, self._defaults, now_us)
+            state = self._links[link] = self._new_link(False, now_us)
             self._work = True
         state.heard_us = now_us
         return state
@@ -353,6 +373,7 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_MISSION_REQUEST: missions.receive_request,
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: missions.receive_partial,
             m.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST: missions.receive_partial,
+            m.MAVLINK_MSG_ID_SETUP_SIGNING: self._signing.receive_setup,
             m.MAVLINK_MSG_ID_TIMESYNC: answer_timesync,
             m.MAVLINK_MSG_ID_PING: answer_ping,
             m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._ftp.receive,

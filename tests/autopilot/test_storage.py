@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from autopilot.services.mission_store import StoredMission
-from autopilot.storage import MISSION_FILE, PARAMETER_FILE, Storage, StorageError
+from autopilot.storage import MISSION_FILE, PARAMETER_FILE, SIGNING_FILE, Storage, StorageError
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
@@ -71,6 +71,26 @@ def test_a_corrupt_mission_that_cannot_be_set_aside_is_said_too(tmp_path: Path) 
     mission, trouble = storage.load_mission(HOME)
     assert mission is None
     assert "starting without a mission" in trouble
+
+
+def test_a_signing_key_is_kept_for_nobody_else_to_read(tmp_path: Path) -> None:
+    storage, key = Storage(tmp_path), bytes(range(32))
+    assert storage.load_signing() is None
+    for timestamp in (5, 7):
+        storage.keep_signing(key, timestamp)
+        assert (tmp_path / SIGNING_FILE).stat().st_mode & 0o777 == 0o600
+    again = Storage(tmp_path).load_signing()
+    assert again is not None
+    assert (again.key, again.timestamp) == (key, 7)
+    storage.keep_signing(None, 0)
+    assert Storage(tmp_path).load_signing() is None
+
+
+@pytest.mark.parametrize("text", ["", "00", "zz" * 32 + " 5", "00" * 31 + " 5", "00" * 32 + " x", "\xff"])
+def test_a_key_that_cannot_be_read_is_no_reason_to_fly_without(tmp_path: Path, text: str) -> None:
+    (tmp_path / SIGNING_FILE).write_text(text, encoding="latin-1")
+    with pytest.raises(StorageError, match="remove it"):
+        Storage(tmp_path).load_signing()
 
 
 def test_parameters_come_back_and_only_those_that_were_set(tmp_path: Path) -> None:

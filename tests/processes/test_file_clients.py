@@ -1,4 +1,4 @@
-"""Files and logs of a running vehicle through the programs that people use."""
+"""Files, logs, plans and signatures of a running vehicle through the programs that people use."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.processes
 Start = Callable[..., "Program"]
+Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
 CLIENTS = Path(__file__).with_name("clients")
 LOG = os.urandom(50_000)
 LONG_S = 120.0
@@ -31,20 +32,30 @@ LONG_S = 120.0
 @pytest.fixture
 def port(start: Start, tmp_path: Path) -> str:
     """Where a vehicle speaks that stands on the ground and has one log."""
+    return vehicle(start, tmp_path)
+
+
+def vehicle(start: Start, tmp_path: Path, *options: str) -> str:
+    """Start one, wait until it flies with its simulator; the port at which it speaks."""
     sim, truth, ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
     logs = tmp_path / "storage" / "card" / "log"
     logs.mkdir(parents=True)
     (logs / "2026-01-01_00-00-00.ulg").write_bytes(LOG)
     start("sitl", "--listen", sim, "--truth", truth, "--sensors", "ideal")
     storage = ("--storage", str(tmp_path / "storage"))
-    start("autopilot", "--sim", sim, "--gcs", ground, "--api", "none", *storage)
+    program = start("autopilot", "--sim", sim, "--gcs", ground, "--api", "none", *storage, *options)
+    while b"flying with the simulator" not in program.log.read_bytes():
+        try:
+            code = program.process.wait(0.2)
+        except subprocess.TimeoutExpired:
+            continue
+        raise AssertionError(f"autopilot ended with {code}: {program.log.read_text()}")
     return ground.rpartition(":")[2]
 
 
-def told_by(client: str, port: str, directory: Path) -> Any:
-    directory.mkdir()
+def told_by(client: str, *arguments: str) -> Any:
     done = subprocess.run(
-        [sys.executable, str(CLIENTS / client), port, str(directory)],
+        [sys.executable, str(CLIENTS / client), *arguments],
         capture_output=True,
         text=True,
         timeout=LONG_S,
@@ -55,7 +66,8 @@ def told_by(client: str, port: str, directory: Path) -> Any:
 
 
 def test_mavsdk(port: str, tmp_path: Path) -> None:
-    told = told_by("mavsdk_files.py", port, tmp_path / "client")
+    (tmp_path / "client").mkdir()
+    told = told_by("mavsdk_files.py", port, str(tmp_path / "client"))
     assert told["root"] == ["@MISSION", "@PARAM", "etc", "fs"]
     assert told["up"] == "SUCCESS"
     assert told["identical"] is True
@@ -70,7 +82,8 @@ def test_mavsdk(port: str, tmp_path: Path) -> None:
 
 
 def test_pymavlink(port: str, tmp_path: Path) -> None:
-    told = told_by("pymavlink_files.py", port, tmp_path / "client")
+    (tmp_path / "client").mkdir()
+    told = told_by("pymavlink_files.py", port, str(tmp_path / "client"))
     assert told["codes"] == [0, 0, 0, 0, 0, 0, 9, 10]  # protected, not found
     assert told["equal"] is True
     table = autopilot_parameters(load_belief("bebop"))
@@ -135,3 +148,30 @@ def test_mavproxy(mavproxy: Mavproxy, tmp_path: Path) -> None:
     mavproxy.type("log erase")
     mavproxy.type("log list")
     mavproxy.expect("No logs")
+
+
+def test_a_plan_means_the_same_to_mavsdk(port: str, gcs: Gcs, tmp_path: Path) -> None:
+    plan, connect = tmp_path / "square.plan", ("--connect", port)
+    for command in (("upload", "square"), ("download", str(plan))):
+        done = gcs(*command, *connect)
+        assert done.returncode == 0, done.stderr
+    told = told_by("mavsdk_plan.py", port, str(plan))
+    assert len(told["plan"]) > 2
+    assert told["plan"] == told["vehicle"]
+
+
+def test_a_signed_vehicle_hears_who_knows_the_key(start: Start, gcs: Gcs, tmp_path: Path) -> None:
+    secret = os.urandom(32).hex()
+    key = tmp_path / "key"
+    key.touch(0o600)
+    key.write_text(secret)
+    port = vehicle(start, tmp_path, "--signing-key", str(key))
+    connect = ("--connect", port)
+    done = gcs("--signing-key", str(key), "param", "set", "NGC_KX", "6.5", *connect)
+    assert done.returncode == 0, done.stderr
+    assert gcs("param", "set", "NGC_KX", "6.0", *connect).returncode == 1
+    told = told_by("pymavlink_signing.py", port, secret)
+    assert told == {"signed": True, "unsigned": None, "wrong": None, "right": 0, "off": 0}
+    got = gcs("param", "get", "NGC_KX", *connect)
+    assert "6.5" in got.stdout
+    assert not (tmp_path / "storage" / "signing.key").exists()
