@@ -22,12 +22,13 @@ def main(port: str, key: str) -> None:
         ack = link.recv_match(type="COMMAND_ACK", blocking=True, timeout=seconds)
         return None if ack is None else int(ack.result)
 
-    told["signed"] = link.wait_heartbeat(timeout=LONG_S).get_signed()
+    link.wait_heartbeat(timeout=LONG_S)
     told["unsigned"] = acknowledged(SHORT_S)
     link.setup_signing(b"\x55" * 32, sign_outgoing=True, allow_unsigned_callback=lambda *_: True)
     told["wrong"] = acknowledged(SHORT_S)
     link.setup_signing(bytes.fromhex(key), sign_outgoing=True)
     told["right"] = acknowledged(LONG_S)
+    told["signed"] = link.recv_match(type="HEARTBEAT", blocking=True, timeout=LONG_S).get_signed()
     link.mav.setup_signing_send(1, 1, bytes(32), 0)
     link.disable_signing()  # or the vehicle's word on it is not heard
     off = None
