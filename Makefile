@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: help install fly test lint types thesis bench clean
+.PHONY: help install fly test lint types thesis robustness bench clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -33,11 +33,15 @@ types: $(STAMP) ## mypy, strict
 thesis: $(STAMP) ## repeat the thesis's experiments and renew docs/thesis.md
 	$(BIN)/gcs experiments thesis --docs docs/thesis.md
 
+robustness: $(STAMP) ## fly the sweeps of docs/robustness.md and renew its maps
+	$(BIN)/python benchmarks/robustness.py
+
 bench: $(STAMP) ## measure this machine
 	$(BIN)/python benchmarks/plant_convergence.py
 	$(BIN)/python benchmarks/cascade_margin.py
 	$(BIN)/python benchmarks/thesis_assumptions.py
 	$(BIN)/python benchmarks/lockstep.py
+	$(BIN)/python benchmarks/sweep_speed.py
 
 clean: ## remove what was made here
 	rm -rf $(VENV) *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

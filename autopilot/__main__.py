@@ -8,12 +8,15 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import click
 from platformdirs import user_state_path
 
-from autopilot.onboard import Onboard
+from autopilot.onboard import Onboard, Work
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
@@ -47,9 +50,11 @@ from autopilot.wire.shell import (
     shown,
     signing_key_option,
 )
+from missions.planning import Prepared
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
+_BEAT_S = 1.0  # between two heartbeats while the clock stands
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _GROUND_RESEND_S = 0.5
 _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
@@ -105,7 +110,14 @@ class GroundStations:
 
     def send(self, onboard: Onboard) -> None:
         """Send what is due."""
-        for link, datagram in onboard.ground_datagrams():
+        self._send(onboard.ground_datagrams())
+
+    def beat(self, onboard: Onboard) -> None:
+        """A heartbeat while the clock stands and nothing is due."""
+        self._send([(link, onboard.stranded_heartbeat(link)) for link in self._links])
+
+    def _send(self, datagrams: list[tuple[Link, bytes]]) -> None:
+        for link, datagram in datagrams:
             i, address = link  # type: ignore[misc]
             with suppress(OSError):  # nobody listens there yet, or the network is full: lost
                 self._sockets[i].sendto(datagram, address)  # type: ignore[has-type]
@@ -160,6 +172,47 @@ class GroundInStep:
         self._socket.close()
 
 
+class Aside:
+    """Work for which the control loop must not wait, done by a process of its own."""
+
+    def __init__(self) -> None:
+        self._work: Work | None = None
+        self._process: SpawnProcess | None = None
+        self._answer: Connection | None = None
+
+    def attend(self, onboard: Onboard) -> None:
+        """Begin what waits; hand over what is done."""
+        if onboard.work is not None and onboard.work is not self._work:
+            self.close()
+            self._work = onboard.work
+            context = get_context("spawn")
+            self._answer, theirs = context.Pipe(duplex=False)
+            self._process = context.Process(target=_work_aside, args=(onboard.work, theirs), daemon=True)
+            self._process.start()
+            theirs.close()
+        if self._answer is not None and self._work is not None and self._answer.poll():
+            try:
+                onboard.finish(self._work, self._answer.recv())
+            except EOFError:
+                text = "the process that prepares paths has died"
+                onboard.finish(self._work, Prepared(refusal=text, notes=(text,)))
+            self.close()
+
+    def close(self) -> None:
+        """End what goes on."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+        if self._answer is not None:
+            self._answer.close()
+        self._work = self._process = self._answer = None
+
+
+def _work_aside(work: Work, answer: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
+    answer.send(work.done())
+
+
 class Program:
     """The running autopilot: an `Onboard`, and anew whenever the simulator starts again."""
 
@@ -186,6 +239,7 @@ class Program:
             system_status=mavlink.MAV_STATE_BOOT,
             mavlink_version=3,
         )
+        self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
         self._ground.join(self.onboard)
@@ -194,22 +248,30 @@ class Program:
         """Tick for ever."""
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
-        silent = True
+        silent, lost, beaten = True, False, 0.0
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         while True:
             stop.check()
+            self._aside.attend(self.onboard)
             arrived = receive(self._socket)
             if arrived is None:
                 now = time.monotonic()
                 if not silent and now - heard > _SILENCE_S:
                     silent = True
                     self._say(f"no word from the simulator for {_SILENCE_S:g} s; looking for it")
+                    self.onboard.endpoint.say(
+                        mavlink.MAV_SEVERITY_CRITICAL, "Simulator silent: time stands still"
+                    )
+                    lost = True
                 if silent or now - heard > 1.0:
                     self._greet()
                 # the clock stands, but questions are answered
                 if isinstance(self._ground, GroundStations):
                     self._ground.exchange(self.onboard, self._keep, stop)
+                    if lost and now - beaten >= _BEAT_S:
+                        beaten = now
+                        self._ground.beat(self.onboard)
                 continue
             datagram, sender = arrived
             if sender != self._simulator:
@@ -222,6 +284,9 @@ class Program:
                 if silent:
                     silent = False
                     self._say(f"flying with the simulator at {shown(self._simulator)}")
+                    if lost:
+                        lost = False
+                        self.onboard.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again")
                 heard = time.monotonic()
             elif self.onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
@@ -281,6 +346,16 @@ class Program:
         self._end_log()
         self._socket.close()
         self._ground.close()
+        self._aside.close()
+
+
+def _begin_signing(kept: Storage, key: bytes) -> None:
+    """Store the key, with the time of its last use if it was stored already."""
+    known = kept.load_signing()
+    try:
+        kept.keep_signing(key, known.timestamp if known and known.key == key else 0)
+    except OSError as error:
+        raise AutopilotError(f"the signing key cannot be stored: {reason(error)}") from None
 
 
 def _address_or_none(text: str) -> Address | None:
@@ -371,6 +446,7 @@ def main(
     try:
         table = autopilot_parameters(load_belief(vehicle))
         kept = Storage(storage or user_state_path("plumbline"))
+        kept.lock()
         for trouble in kept.load_parameters(table):
             print(f"autopilot: {trouble}", file=sys.stderr)
         apply_settings(table, settings)
@@ -379,10 +455,9 @@ def main(
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
         if signing_key is not None:
-            known = kept.load_signing()
-            kept.keep_signing(signing_key, known.timestamp if known and known.key == signing_key else 0)
+            _begin_signing(kept, signing_key)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
-        options = Options(place, boot, log=True)
+        options = Options(place, boot, clock_waits=in_step, log=True)
 
         def build(stored: StoredMission | None) -> Onboard:
             return Onboard(table, Identity(), options, stored, kept.card, kept.load_signing())

@@ -129,6 +129,8 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     before, plan = flight, flight.plan
     if not plan.steps:
         return flight, _denied("Mission denied: there is none")
+    if plan.prepared.pending:
+        return flight, _later("Mission not ready: its paths are being prepared; try again")
     if plan.prepared.refusal:
         return flight, _denied(f"Mission denied: {plan.prepared.refusal}")
     if flight.phase == Phase.DISARMED:

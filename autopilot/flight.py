@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from math import cos, inf, radians
+from math import cos, inf, nan, radians
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
@@ -92,6 +92,9 @@ class Flight:
     still_since_us: int = -1  # since when the touchdown conditions hold, -1: they do not
     step_anchor: Vec3 | None = None  # where the present mission step began
     following: tuple[Leg, ...] = ()  # what will be flown after `legs`, where that is known
+    slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
+    slack_step: int = -1  # mission step in which it last went slack
+    taut_length_m: float = 0.0  # from load to vehicle when lifting began: of the cable as it is
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +114,8 @@ class Settings:
     least_move_s: float
     limits: Limits  # of the paths of missions
     ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
+    load_weight_n: float
+    snap_speed_m_s: float  # greatest closing speed at which a slack cable is made taut
 
 
 class View(NamedTuple):
@@ -124,6 +129,7 @@ class View(NamedTuple):
     taut: bool
     tilt_rad: float
     complaints: tuple[str, ...]
+    pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
 
 
 class Report(NamedTuple):
@@ -141,7 +147,7 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         speed_m_s=table["MIS_SPEED"],
         accel_m_s2=table["MIS_ACCEL"],
         lift_speed_m_s=table["MIS_LIFT_SPEED"],
-        taut_speed_m_s=table["MIS_TAUT_SPEED"],
+        taut_speed_m_s=min(table["MIS_TAUT_SPEED"], table["MIS_SNAP_SPEED"]),
         load_error_limit_m=table["FS_LOAD_ERR"],
         tilt_limit_rad=radians(table["FS_TILT_DEG"]),
         sensor_age_limit_s=table["FS_SENSOR_S"],
@@ -149,6 +155,8 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         least_move_s=least_move_s(table["VEH_CABLE_LEN"], table["VEH_GRAVITY"]),
         limits=limits_from(table),
         ramp_lag_s=ramp_lag_s,
+        load_weight_n=table["VEH_LOAD_MASS"] * table["VEH_GRAVITY"],
+        snap_speed_m_s=table["MIS_SNAP_SPEED"],
     )
 
 

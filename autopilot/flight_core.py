@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 from typing import NamedTuple
 
 from autopilot.actuation import Actuation, ActuationConstants, resting
 from autopilot.actuation import advance as actuate
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
-from autopilot.control.load_motion import Drag
+from autopilot.control.load_motion import Drag, air_force
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
 from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
-from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, neg
+from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
 from autopilot.geometry.so3 import tilt_angle
-from autopilot.guidance import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION, Calm, Leg, Swing
+from autopilot.guidance import (
+    LOAD_ATTITUDE,
+    LOAD_POSITION,
+    QUAD_ATTITUDE,
+    QUAD_POSITION,
+    Calm,
+    Catch,
+    Leg,
+    Swing,
+)
 from autopilot.laws import Law, Memory
 from autopilot.mixer import MixerResult, mix
 from autopilot.observer import Observed, ObserverConstants, nominal, observe
@@ -65,7 +75,9 @@ def initial_state() -> FlightState:
     return FlightState(blank_state(), Flight(), None, 0, NO_COMMAND, STOPPED, 0, False, resting(), None)
 
 
-def view_of(estimator: EstimatorState, state: State, settings: Settings, now_us: int) -> View:
+def view_of(
+    estimator: EstimatorState, state: State, settings: Settings, now_us: int, pull_n: float = nan
+) -> View:
     """What the supervisor sees."""
     return View(
         now_us,
@@ -76,7 +88,18 @@ def view_of(estimator: EstimatorState, state: State, settings: Settings, now_us:
         estimator.load.taut > 0.0,
         tilt_angle(state.R),
         complaints(estimator, settings.sensor_age_limit_s),
+        pull_n,
     )
+
+
+def felt_pull(before: FlightState, state: State, setup: Setup) -> float:
+    """Pull of the cable on the vehicle (N): what moves it besides weight, rotors, drag and wind."""
+    vehicle, a = setup.vehicle, state.a_quad
+    felt = (a[0], a[1], a[2] + vehicle.gravity)
+    known = axpy(before.actuation.thrust, column(state.R, 2), air_force(state.v_quad, setup.drag))
+    if before.observed is not None:
+        known = add(known, before.observed.push)
+    return dot(sub(scale(vehicle.quad_mass, felt), known), state.q_cable)
 
 
 def step(
@@ -94,7 +117,8 @@ def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState
     """The supervisor's, the law's and the mixer's part of a tick: `before` holds the estimate already."""
     estimator = before.estimator
     state = control_state(estimator)
-    view = view_of(estimator, state, setup.settings, now_us)
+    pull_n = felt_pull(before, state, setup)
+    view = view_of(estimator, state, setup.settings, now_us, pull_n)
     flight, report = advance(before.flight, view, setup.settings)
 
     taut = view.taut
@@ -126,7 +150,10 @@ def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState
 
     leg = flight.legs[0]
     t = leg_time_s(flight, now_us) + setup.law.preview_s
-    jet = jet_ahead(flight, t)
+    if isinstance(leg, Catch):
+        jet = leg.meeting(state.x_quad, state.v_quad, state.x_load, state.v_load, setup.vehicle.gravity)
+    else:
+        jet = jet_ahead(flight, t)
     memory = after.memory
     if memory is None or leg.control_mode != after.control_mode:
         memory = setup.law.start(state, jet[0], jet[1])

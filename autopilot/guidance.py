@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from math import comb, inf, pi, sqrt
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.shaping import Shaped
 from missions.swing import swing
@@ -22,6 +22,7 @@ LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
 QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
 
 LEAST_SWINGS = 1.2  # a move of the load takes at least so many periods of its pendulum, however short it is
+CATCH_S = 0.15  # in which the slack of a cable is taken up in the air
 CALM_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
 STEEPEST_LEAN = 0.7  # sine of the cable's lean that a swinging load is asked for at most
 
@@ -180,6 +181,36 @@ class Slow:
 
 
 @dataclass(frozen=True, slots=True)
+class Catch:
+    """The cable is slack in the air: the vehicle falls with its load and parts from it until it is taut.
+
+    The thrust can only part them faster, never brake that: they part at `closing_m_s`, or as fast as takes up
+    the slack in CATCH_S where that is faster, since meanwhile both fall. What is asked depends on the state
+    and not on time: `meeting`. `anchor` is where the vehicle was.
+    """
+
+    anchor: Vec3
+    length_m: float  # of the cable
+    closing_m_s: float
+    duration_s: float = inf
+    control_mode: int = QUAD_POSITION
+
+    def jet(self, t: float) -> Jet:
+        """The anchor at rest."""
+        return _rest(self.anchor)
+
+    def meeting(self, x_quad: Vec3, v_quad: Vec3, x_load: Vec3, v_load: Vec3, gravity: float) -> Jet:
+        """Motion asked of the vehicle. Only the climb is asked for: with hardly any thrust, turning would
+        need more of it than falling allows."""
+        cable = sub(x_load, x_quad)
+        distance = norm(cable)
+        q = scale(1.0 / max(distance, 1e-6), cable)
+        wanted = max(self.closing_m_s, (self.length_m - distance) / CATCH_S)
+        climb = v_quad[2] + (dot(q, sub(v_load, v_quad)) - wanted) * q[2]
+        return (x_quad, (v_quad[0], v_quad[1], climb), (0.0, 0.0, -gravity), ZERO, ZERO, ZERO, ZERO)
+
+
+@dataclass(frozen=True, slots=True)
 class Creep:
     """Along a straight line at constant speed, without end: until something is touched or pulled taut."""
 
@@ -296,7 +327,7 @@ class Calm:
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
-Leg = Hold | Transfer | Brake | Slow | Creep | Run | Pass | Swing | Calm
+Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Run | Pass | Swing | Calm
 
 
 def asked_jet(leg: Leg, t: float) -> Jet:

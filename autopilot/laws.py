@@ -10,9 +10,16 @@ from autopilot.control import lqr, plumbline, quad_position, thesis
 from autopilot.control.design import Design, Timing, Wanted, design
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
-from autopilot.geometry.linear import Mat3, Vec3, axpy
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, axpy
 from autopilot.observer import Observed, ObserverConstants, observer_constants
-from autopilot.plumbline_tick import PlumblineConstants, ahead_of, hastened, load_position_tick
+from autopilot.plumbline_tick import (
+    PlumblineConstants,
+    SlackConstants,
+    ahead_of,
+    hastened,
+    load_position_tick,
+    quad_position_tick,
+)
 from autopilot.rotor_lag import lag_gain
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.parameters import ParameterTable
@@ -192,7 +199,7 @@ class ThesisLaw(NamedTuple):
         self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
     ) -> tuple[Memory, Command]:
         return quad_position.quad_position(
-            memory, state, reference, 0.0, self.position_gains, self.gains, self.filters, self.vehicle
+            memory, state, reference, 0.0, ZERO, self.position_gains, self.gains, self.filters, self.vehicle
         )
 
 
@@ -348,11 +355,12 @@ class PlumblineLaw(NamedTuple):
     def quad_position(
         self, memory: Memory, state: State, reference: Reference, actuation: Actuation, observed: Observed
     ) -> tuple[Memory, Command]:
-        ahead = ahead_of(state, 0.0, actuation, observed, self.constants)
-        other, wanted = self.other_modes.quad_position(
-            memory.other_modes, ahead.state, reference, actuation, observed
+        others = self.other_modes
+        slack = SlackConstants(others.position_gains, others.gains, others.filters)
+        other, command = quad_position_tick(
+            memory.other_modes, state, reference, actuation, observed, self.constants, slack
         )
-        return memory._replace(other_modes=other), hastened(wanted, ahead, self.constants)
+        return memory._replace(other_modes=other), command
 
 
 _BUILDERS: dict[str, Callable[[ParameterTable, Vehicle], Law]] = {

@@ -20,6 +20,7 @@ cable was slack. The push is learned while the vehicle is off the ground.
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from autopilot.control.load_motion import Drag, air_force
@@ -74,10 +75,21 @@ def nominal(vehicle: Vehicle) -> Observed:
     return Observed(vehicle.load_mass, ZERO, vehicle.load_mass * g * g, g * g, vehicle.quad_mass * g, 0.0)
 
 
+def aloft(vehicle: Vehicle) -> Observed:
+    """As `nominal`, but vehicle and load are off the ground, wherever they are."""
+    return nominal(vehicle)._replace(support=0.0, load_ground=-inf)
+
+
 @kernel
 def standing(observed: Observed, vehicle: Vehicle) -> bool:
     """Whether the ground holds the vehicle."""
     return observed.support > _STANDING * vehicle.quad_mass * vehicle.gravity
+
+
+@kernel
+def lying(observed: Observed, state: State) -> bool:
+    """Whether the load is no higher than where it lay while the cable was slack."""
+    return not state.x_load[2] > observed.load_ground + _OFF_GROUND
 
 
 @kernel
@@ -122,7 +134,7 @@ def observe(
         tension = dot(rest, q)
         pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, felt)
         rest = axpy(-tension, q, rest)
-        if state.x_load[2] > load_ground + _OFF_GROUND and pull > 0.0:
+        if not lying(observed, state) and pull > 0.0:
             correlation += constants.mass * (tension * pull - correlation)
             square += constants.mass * (pull * pull - square)
             found = correlation / square

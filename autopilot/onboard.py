@@ -6,12 +6,13 @@ waits until the shell hands it over, between two ticks.
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from autopilot.decisions import decide, with_plan
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
-from autopilot.flight import Phase, Plan, settings_from
+from autopilot.flight import ON_GROUND, Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
 from autopilot.flight_log import FlightLog, LogChunk, Sample
 from autopilot.laws import (
@@ -27,6 +28,7 @@ from autopilot.scheduler import RateError, divider
 from autopilot.sensor_link import Tick, read_tick
 from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.files import LOG_FOLDER, Card, FileError
+from autopilot.services.heartbeat import heartbeat_message
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
@@ -38,7 +40,7 @@ from autopilot.services.records import (
     TimesyncAnswered,
     Verdict,
 )
-from autopilot.services.requests import ChangeSigningKey
+from autopilot.services.requests import ChangeSigningKey, Reboot
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
@@ -47,11 +49,27 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.wire.signing import Signing
-from autopilot.world_parameters import WorldParameters
-from missions.planning import Limits, prepare
+from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
+from missions.model import Step
+from missions.planning import PENDING, Limits, Prepared, prepare
 
 GROUND_WINDOW_US = 20_000
+_REBOOT = mavlink.MAVLink_command_long_message(
+    1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+)
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
+
+
+class Work(NamedTuple):
+    """The paths of a mission, to be prepared; plain data, so that another process can do it."""
+
+    steps: tuple[Step, ...]
+    sequence: tuple[int, ...]
+    limits: Limits
+
+    def done(self) -> Prepared:
+        """What comes of it; takes from a millisecond to some seconds."""
+        return prepare(self.steps, self.sequence, self.limits)
 
 
 def build_setup(table: ParameterTable, control_every: int) -> Setup:
@@ -70,11 +88,12 @@ def build_setup(table: ParameterTable, control_every: int) -> Setup:
     )
 
 
-def plan_of(mission: StoredMission, home: Home, limits: Limits) -> Plan:
-    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits."""
+def plan_of(mission: StoredMission, home: Home, limits: Limits | None) -> Plan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet."""
     steps = located_steps(mission.items, home)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
-    return Plan(flown, sequence, len(mission.items), prepare(flown, sequence, limits))
+    prepared = PENDING if limits is None else prepare(flown, sequence, limits)
+    return Plan(flown, sequence, len(mission.items), prepared)
 
 
 class Onboard:
@@ -109,7 +128,10 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
+        self._reboot = False  # the simulator is asked to begin anew
         self._setup = build_setup(parameters, 1)
+        self.work: Work | None = None  # what waits for `finish`
+        self._prepared_for = self._setup.settings.limits
         self._take_plan(self.endpoint.mission)
         self._log: FlightLog | None = None
         if options.log:
@@ -138,6 +160,8 @@ class Onboard:
             tick.now_us, self._state.mixed.forces, self.armed, self._options.lockstep
         )
         aside = self._world.messages(self.now_us)
+        if self._reboot:
+            aside.append(_REBOOT)
         self._answer = b"".join(map(self._writer.frame, (command, *aside)))
         return self._answer
 
@@ -233,6 +257,9 @@ class Onboard:
             return
         self.fault = ""
         self._setup = build_setup(self.parameters, every)
+        # a mission under way keeps the paths that it began with
+        if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
+            self._prepare()
 
     # ---- ground
 
@@ -275,6 +302,13 @@ class Onboard:
         self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
         return self.endpoint.datagram(link, mavlink.MAVLink_timesync_message(0, self.now_us * 1000))
 
+    def stranded_heartbeat(self, link: Link) -> bytes:
+        """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
+        snapshot = self._snapshot()._replace(system_status=mavlink.MAV_STATE_CRITICAL)
+        if snapshot.armed:
+            snapshot = snapshot._replace(system_status=mavlink.MAV_STATE_EMERGENCY)
+        return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
+
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self._setup)
@@ -283,6 +317,12 @@ class Onboard:
         if isinstance(request, ChangeSigningKey):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, Reboot) and not request.shutdown:
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "Reboot denied: armed")
+            # the world begins anew, and when its clock does, so does the shell with us
+            self._reboot = True
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
@@ -293,10 +333,32 @@ class Onboard:
         return verdict
 
     def _take_plan(self, mission: StoredMission) -> None:
-        plan = plan_of(mission, self._options.home, self._setup.settings.limits)
-        for note in plan.prepared.notes:
-            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
+        plan = plan_of(mission, self._options.home, None)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
+        plan, limits = self._state.flight.plan, self._setup.settings.limits
+        self._prepared_for = limits
+        self.work = Work(plan.steps, plan.sequence, limits)
+        self._have_prepared(PENDING)
+        if self._options.clock_waits or self._state.flight.phase in ON_GROUND:
+            self.finish(self.work, self.work.done())
+
+    def finish(self, work: Work, prepared: Prepared) -> None:
+        """Take what came of `work`, unless there is other work by now."""
+        if work is not self.work:
+            return
+        self.work = None
+        for note in prepared.notes:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
+        self._have_prepared(prepared)
+
+    def _have_prepared(self, prepared: Prepared) -> None:
+        flight = self._state.flight
+        flight = replace(flight, plan=replace(flight.plan, prepared=prepared))
+        self._state = self._state._replace(flight=flight)
 
     def _snapshot(self) -> Snapshot:
         return make_snapshot(

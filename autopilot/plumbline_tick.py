@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.actuation import Actuation, ActuationConstants
-from autopilot.control import plumbline
+from autopilot.control import plumbline, quad_position, thesis
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.observer import Observed, loaded, standing
+from autopilot.observer import Observed, loaded, lying, standing
 from autopilot.prediction import Ahead, predict, stay
 from autopilot.rotor_lag import hasten
 
@@ -26,6 +26,14 @@ class PlumblineConstants(NamedTuple):
     lag_gain: float
     period: float  # s
     vehicle: Vehicle
+
+
+class SlackConstants(NamedTuple):
+    """What the vehicle is flown with while the cable is slack."""
+
+    position_gains: quad_position.QuadPositionGains
+    gains: thesis.ThesisGains
+    filters: thesis.ThesisFilters
 
 
 @kernel
@@ -62,6 +70,32 @@ def hastened(wanted: Command, ahead: Ahead, constants: PlumblineConstants) -> Co
 
 
 @kernel
+def quad_position_tick(
+    memory: thesis.ThesisMemory,
+    state: State,
+    reference: Reference,
+    actuation: Actuation,
+    observed: Observed,
+    constants: PlumblineConstants,
+    slack: SlackConstants,
+) -> tuple[thesis.ThesisMemory, Command]:
+    """Vehicle position mode, for a slack cable. The reference is that of the instant of the command."""
+    ahead = ahead_of(state, 0.0, actuation, observed, constants)
+    memory, wanted = quad_position.quad_position(
+        memory,
+        ahead.state,
+        reference,
+        0.0,
+        observed.push,
+        slack.position_gains,
+        slack.gains,
+        slack.filters,
+        constants.vehicle,
+    )
+    return memory, hastened(wanted, ahead, constants)
+
+
+@kernel
 def load_position_tick(
     memory: plumbline.PlumblineMemory,
     state: State,
@@ -72,11 +106,28 @@ def load_position_tick(
 ) -> tuple[plumbline.PlumblineMemory, Command]:
     """Load position mode. The reference is that of the instant at which the command comes into force."""
     ahead = ahead_of(state, 1.0, actuation, observed, constants)
+    then, thrust = ahead.state, ahead.thrust
+    if lying(observed, state):
+        # the ground gives what the rotors do not yet
+        vehicle = constants.vehicle
+        thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
+        memory = plumbline.PlumblineMemory(0.0, memory.integral)
+        then = State(
+            state.x_load,
+            state.v_load,
+            then.q_cable,
+            then.q_cable_dot,
+            then.x_quad,
+            then.v_quad,
+            then.R,
+            then.omega_body,
+            then.a_quad,
+        )
     memory, wanted = plumbline.load_position(
         memory,
-        ahead.state,
+        then,
         reference,
-        ahead.thrust,
+        thrust,
         ahead.moment,
         constants.gains,
         constants.drag,

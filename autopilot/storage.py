@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from autopilot.card import DirectoryCard
 from autopilot.flight_log import LogChunk
 from autopilot.services import files
@@ -18,6 +20,7 @@ MISSION_FILE = "mission.bin"
 PARAMETER_FILE = "parameters.txt"
 SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
 CARD_DIRECTORY = "card"  # what clients reach by FILE_TRANSFER_PROTOCOL
+LOCK_FILE = "lock"
 
 
 class StorageError(OSError):
@@ -31,6 +34,7 @@ class Storage:
         self._directory = directory
         self._parameters: dict[str, float] = {}
         self._logs: set[files.Path] = set()  # begun by this process
+        self._lock = FileLock(directory / LOCK_FILE)
         try:
             directory.mkdir(parents=True, exist_ok=True)
             self.card = DirectoryCard(directory / CARD_DIRECTORY)
@@ -38,6 +42,18 @@ class Storage:
             raise StorageError(
                 f"--storage {directory}: {error.strerror}; name a directory that can be made"
             ) from None
+
+    def lock(self) -> None:
+        """Keep other autopilots out until this object or the process is gone."""
+        try:
+            self._lock.acquire(blocking=False)
+        except Timeout:
+            raise StorageError(
+                f"--storage {self._directory}: another autopilot keeps its mission and parameters there; "
+                "name another directory"
+            ) from None
+        except OSError as error:
+            raise StorageError(f"--storage {self._directory}: {error.strerror}") from None
 
     def load_mission(self, home: Home) -> tuple[StoredMission | None, str]:
         """The stored mission, and what is wrong with the file if it is none (empty: nothing)."""

@@ -32,6 +32,7 @@ from autopilot.guidance import (
     QUAD_ATTITUDE,
     QUAD_POSITION,
     Calm,
+    Catch,
     Creep,
     Hold,
     Leg,
@@ -83,6 +84,10 @@ TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
     (P.RETURN, E.MISSION): P.MISSION,
     (P.RETURN, E.LAND): P.LOWER,
     (P.LOWER, E.LOAD_DOWN): P.SET_DOWN,
+    (P.LIFT, E.LOAD_DOWN): P.SET_DOWN,
+    (P.HOLD, E.LOAD_DOWN): P.SET_DOWN,
+    (P.MISSION, E.LOAD_DOWN): P.SET_DOWN,
+    (P.RETURN, E.LOAD_DOWN): P.SET_DOWN,
     (P.LOWER, E.HOLD): P.HOLD,
     (P.LOWER, E.MISSION): P.MISSION,
     (P.LOWER, E.RETURN): P.RETURN,
@@ -99,17 +104,25 @@ INFO, WARNING, CRITICAL = (
 )
 
 CLEARANCE = 0.6  # height over the load, in cable lengths, at which the slack vehicle moves sideways
+ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable taut is moved over it
 ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
 LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
+LIFT_OFF_US = 1_000_000  # after which a load that is being lifted is off the ground
+LYING_SPEED = 0.3  # m/s, less of a fallen load is noise or creep
 STILL_SPEED, STILL_US = 0.05, 200_000
 IDLE_DISARM_US = 10_000_000
 FAILSAFE_DISARM_US = 3_000_000
 SETTLE_S = 3.0  # hold after an attitude run
 NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
+SLACK, PULLED = 0.1, 0.3  # weights of the load: less is no pull of the cable, more is one
+FALLING = 1.0  # m/s, of a load that was caught and nobody lowers
+RESCUE_SHARE = 0.5  # of gravity: deceleration of a load that was caught
+LEAST_GAP = 0.005  # m by which a cable must be too short for its ends to be believed slack
+SLACK_US, PULL_US = 20_000, 100_000  # for which it must be so
 LEAST_HEIGHT = 0.3  # m over home, at which a load that was being lifted or lowered is held or carried
 STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load accelerates
 TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have come taut
@@ -179,7 +192,10 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
         t = leg_time_s(flight, view.now_us)
         slow = slow_leg(flight.legs[0], t, settings.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
-    brake = brake_leg(x, v, a, settings.accel_m_s2, settings.least_move_s)
+    accel, least_s = settings.accel_m_s2, settings.least_move_s
+    if v[2] < -FALLING:  # out of a fall: there is no time to lose
+        accel, least_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * least_s
+    brake = brake_leg(x, v, a, accel, least_s)
     return (brake,), brake.end
 
 
@@ -242,8 +258,14 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
     )
 
 
-def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings) -> Leg:
-    return carry_leg(begin, end, speed, settings.accel_m_s2, settings.least_move_s)
+def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, least_s: float = 0.0) -> Leg:
+    return carry_leg(begin, end, speed, settings.accel_m_s2, max(least_s, settings.least_move_s))
+
+
+def _least_s(flight: Flight) -> float:
+    """What the transfer of the present step takes at least, for rotors, cable and tilt."""
+    least = flight.plan.prepared.least_s
+    return least[flight.step] if flight.step < len(least) else 0.0
 
 
 def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -269,12 +291,12 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
                 fade = min(settings.least_move_s, float(path.table[-1, 1]))
                 go = Pass(path, sub(here, path.start), fade)
             else:
-                go = _carry(here, there, flight.speed_m_s, settings)
+                go = _carry(here, there, flight.speed_m_s, settings, _least_s(flight))
             return (go, Hold(there, max(hold - _borrowed(flight), 0.0))) if hold > 0.0 else (go,)
         case Delay(duration_s=duration):
             return (Hold(here, max(duration - _borrowed(flight), 0.0)),)
         case ReturnHome():
-            return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings),)
+            return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings, _least_s(flight)),)
         case Signals():
             return (Run(here, _path_of(flight, flight.step) or unshaped(step)),)
         case AttitudeRun(
@@ -347,9 +369,18 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         return _to(flight, E.DISARM, view, settings, (INFO, "Disarmed: nothing was asked of the vehicle"))
     if flight.phase == P.FAILSAFE and view.now_us - flight.phase_start_us > FAILSAFE_DISARM_US:
         return _to(flight, E.DISARM, view, settings, (WARNING, "Disarmed after failsafe"))
+    if flight.phase in CARRYING:
+        flight = _note_slack(flight, view, settings)
+        caught = _watch_slack(flight, view, settings)
+        if caught is not None:
+            return caught
     if flight.phase == P.TAUTEN and len(flight.legs) == 1:
-        if view.taut:
+        flight = _note_pull(flight, view, settings)
+        if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= PULL_US:
+            flight = replace(flight, taut_length_m=norm(sub(view.x_quad, view.x_load)))
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
+        flight = _over_load(flight, view)
+    if flight.phase == P.TAUTEN and len(flight.legs) == 1:
         if flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(flight, settings):
             text = "Cable never taut, landing; check VEH_CABLE_LEN"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
@@ -483,6 +514,82 @@ def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
         if down:
             return flight if flight.still_since_us >= 0 else replace(flight, still_since_us=view.now_us)
     return flight if flight.still_since_us < 0 else replace(flight, still_since_us=-1)
+
+
+def _over_load(flight: Flight, view: View) -> Flight:
+    """The rising vehicle, moved over a load that was not seen well from the ground."""
+    creep = flight.legs[0]
+    assert isinstance(creep, Creep)
+    at = creep.jet(leg_time_s(flight, view.now_us))[0]
+    over = (view.x_load[0], view.x_load[1], at[2])
+    if norm(sub(over, at)) <= ASTRAY:
+        return flight
+    legs = (
+        transfer_leg(at, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        replace(creep, begin=over),
+    )
+    return replace(flight, legs=legs, leg_start_us=view.now_us)
+
+
+def _share_pulled(view: View, settings: Settings) -> float:
+    """Pull of the cable in weights of the load; by its length alone where no accelerometer tells."""
+    if isfinite(view.pull_n):
+        return view.pull_n / settings.load_weight_n
+    return 1.0 if view.taut else 0.0
+
+
+def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
+    """Note since when the cable that is being tautened pulls.
+
+    It counts as taut a little before it is: if lifting began then, it would come taut in the middle of it.
+    """
+    pulls = _share_pulled(view, settings) > PULLED and view.taut
+    if pulls == (flight.still_since_us >= 0):
+        return flight
+    return replace(flight, still_since_us=view.now_us if pulls else -1)
+
+
+def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
+    """Note since when the cable is slack although the load should hang on it; while it is caught: taut.
+
+    A gust can hide or feign a pull, a tracker's noise a few millimetres: both must tell of a small gap.
+    """
+    if isinstance(flight.legs[0], Catch):
+        noted = view.taut
+    else:
+        gap = flight.taut_length_m - norm(sub(view.x_quad, view.x_load))
+        loose = not view.taut or (gap > LEAST_GAP and _share_pulled(view, settings) < SLACK)
+        lifting = flight.phase == P.LIFT and view.now_us - flight.phase_start_us < LIFT_OFF_US
+        on_ground = lifting or (flight.phase == P.LOWER and isinstance(flight.legs[0], Creep))
+        noted = loose and not on_ground
+    if noted == (flight.slack_since_us >= 0):
+        return flight
+    return replace(flight, slack_since_us=view.now_us if noted else -1)
+
+
+def _watch_slack(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report] | None:
+    """Catch a load that falls freely; take the phase up again when it hangs on the cable."""
+    fallen = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < LYING_SPEED
+    if isinstance(flight.legs[0], Catch) and fallen:
+        flight = replace(flight, on_mission=False, slack_since_us=-1)
+        return _to(flight, E.LOAD_DOWN, view, settings, (CRITICAL, "The load fell to the ground: landing"))
+    if flight.slack_since_us < 0:
+        return None
+    lasted_us = view.now_us - flight.slack_since_us
+    if not isinstance(flight.legs[0], Catch):
+        if lasted_us < SLACK_US:
+            return None
+        catch = Catch(view.x_quad, flight.taut_length_m, settings.snap_speed_m_s)
+        caught = replace(flight, legs=(catch,), leg_start_us=view.now_us, slack_since_us=-1)
+        return caught, Report(((WARNING, "Cable slack: falling with the load to catch it"),))
+    if lasted_us < PULL_US and not (lasted_us >= SLACK_US and _share_pulled(view, settings) > SLACK):
+        return None
+    again = flight.on_mission and flight.slack_step == flight.step
+    flight = replace(flight, legs=(), slack_since_us=-1, slack_step=flight.step if flight.on_mission else -1)
+    if again:  # the step itself asks for it
+        held = enter(replace(flight, on_mission=False), P.HOLD, view, settings)
+        return held, Report(((CRITICAL, "Cable slack again in this mission item: holding"),))
+    return enter(flight, flight.phase, view, settings), Report(((INFO, "Load caught"),))
 
 
 def _taut_by(flight: Flight, settings: Settings) -> float:

@@ -65,6 +65,7 @@ class Options:
     home: Home
     boot_unix_us: int
     lockstep: bool = True
+    clock_waits: bool = True  # for the autopilot, however long it works
     log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` gives
 
 

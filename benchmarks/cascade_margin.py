@@ -39,7 +39,7 @@ from autopilot.control.design import Timing, Wanted, design
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Reference, State, Vehicle
-from autopilot.observer import nominal
+from autopilot.observer import aloft
 from autopilot.plumbline_tick import PlumblineConstants, load_position_tick
 from autopilot.rotor_lag import lag_gain
 
@@ -192,6 +192,7 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
                 state,
                 vehicle_reference,
                 vehicle.load_mass,
+                ZERO,
                 QUAD_POSITION_GAINS,
                 settings.gains,
                 filters,
@@ -241,7 +242,7 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
     """
     constants = plumbline_constants(settings, vehicle)
     reference = Reference((ZERO,) * 7, HEADING)
-    observed = nominal(vehicle)._replace(support=0.0)
+    observed = aloft(vehicle)
     rows = constants.actuation.whole + 1
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 

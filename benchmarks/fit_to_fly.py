@@ -24,6 +24,7 @@ import numpy as np
 
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.tlog import TlogWriter, read_tlog
+from gcs.analysis.metrics import step_window
 from gcs.analysis.record import FlightMeta, flight_record
 from gcs.analysis.samples import Samples, samples_of
 from gcs.analysis.step import find_step
@@ -64,7 +65,12 @@ ROWS = (
     ),
     Row("C lab load -50 %", "case-c", {"load_error_max_m": 0.100}, settings={"SIM_LOAD_MASS": 0.05}),
     Row("C lab load +50 %", "case-c", {"load_error_max_m": 0.100}, settings={"SIM_LOAD_MASS": 0.15}),
-    Row("gust lab", "gust", {"gust_recovery_50mm_s": 3.0}),
+    Row(
+        "gust lab",
+        "hover",
+        {"gust_recovery_50mm_s": 3.0},
+        settings={"SIM_GUST_E": 5.0, "SIM_GUST_AT_S": 18.0, "SIM_GUST_FOR_S": 2.0},
+    ),
     Row("B lab 72 ms", "case-b", {"load_error_max_m": 0.040}, settings={"SIM_ACT_DELAY_MS": 72.0}),
     Row("B lab 72, told 62", "case-b", {}, settings={"SIM_ACT_DELAY_MS": 72.0, "VEH_ACT_DELAY": 62.0}),
     Row("B lab 72, told 82", "case-b", {}, settings={"SIM_ACT_DELAY_MS": 72.0, "VEH_ACT_DELAY": 82.0}),
@@ -81,12 +87,12 @@ class Flown:
 
 
 def before_step_max(samples: Samples) -> float | None:
-    """Greatest distance (m) of the true load from where the step starts, before it starts."""
-    window = np.flatnonzero(samples.in_mission & np.isfinite(samples.desired_m).all(axis=1))
-    step = find_step(samples.time_s[window], samples.desired_m[window], samples.desired_m_s[window])
+    """Greatest distance (m) of the true load from where the asked step starts, before it starts."""
+    window = step_window(samples)
+    step = find_step(samples.time_s[window], samples.asked_m[window], samples.asked_m_s[window])
     if step is None:
         return None
-    before = samples.in_mission & (samples.time_s <= step.start_s)
+    before = window & (samples.time_s <= step.start_s)
     return float(np.linalg.norm(samples.actual_m[before] - step.origin_m, axis=1).max())
 
 

@@ -10,7 +10,7 @@ from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.display import say
 from gcs.errors import GcsError, RefusedError
-from gcs.link import Address, monotonic_us, unix_us
+from gcs.link import LOOPBACK, TRUTH_PORT, Address, monotonic_us, unix_us
 from gcs.session import Session
 from gcs.stopping import StopRequest
 
@@ -18,6 +18,8 @@ from gcs.stopping import StopRequest
 def capture_to(path: Path, address: Address, duration_s: float | None) -> int:
     """Write what is said until `duration_s` is over or somebody asks to stop; returns how many messages."""
     with Session(address) as session, StopRequest("stopping") as stop:
+        if not session.listen_to_truth():
+            say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the log will have no truth of the simulator")
         target = session.find()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -34,6 +36,10 @@ def capture_to(path: Path, address: Address, duration_s: float | None) -> int:
             def sent(datagram: bytes, now_us: int) -> None:
                 capture.on_sent(datagram)
 
+            def truth(datagram: bytes, now_us: int) -> None:
+                capture.on_truth(datagram)
+
+            session.on_truth = truth
             session.on_received = received
             session.on_sent = sent
             for message_id in REPORT_MESSAGES:

@@ -19,5 +19,11 @@ class NoVehicleError(GcsError):
     """Nobody answered, or somebody stopped answering."""
 
 
+class StoppedError(GcsError):
+    """Somebody stopped it before there was anything to show."""
+
+    exit_code = EXIT_INTERRUPTED
+
+
 class RefusedError(GcsError):
     """The vehicle answered no."""

@@ -30,9 +30,10 @@ from gcs.errors import (
     EXIT_INTERRUPTED,
     EXIT_NOT_MET,
     GcsError,
+    StoppedError,
 )
 from gcs.flight_loops import run_lockstep, run_wall_clock
-from gcs.link import LOOPBACK, Address, UdpSocket, free_port, open_address, unix_us
+from gcs.link import LOOPBACK, TRUTH_PORT, Address, UdpSocket, free_port, open_address, unix_us
 from gcs.missions_checked import load_checked
 from gcs.processes import Processes
 from gcs.reporting import make_report
@@ -42,7 +43,6 @@ from missions.legs import expected_duration_s
 from missions.model import Mission
 
 LAWS = {"thesis": 0, "lqr": 1, "plumbline": 2}  # the value of CTL_LAW
-TRUTH_PORT = 14560
 ONBOARD_LOG = "flight.ulg"
 WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 _EXIT = {
@@ -72,6 +72,7 @@ class FlightOptions:
     connect: Address | None
     quiet: bool
     force: bool
+    overwrite: bool
     limit_s: float | None
 
 
@@ -95,7 +96,8 @@ def fly(options: FlightOptions) -> Flight:
         options.mission, options.vehicle, options.force or _tried_anyway(options), options.law == "plumbline"
     )
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    with _Folder(out) as folder, StopRequest("stopping; Ctrl-C again abandons the report") as stop:
+    hint = "stopping; Ctrl-C again abandons the report"
+    with _Folder(out, options.overwrite) as folder, StopRequest(hint) as stop:
         watch = _Stopwatch()
         tlog = out / "flight.tlog"
         with tlog.open("wb") as file:
@@ -107,7 +109,9 @@ def fly(options: FlightOptions) -> Flight:
         wall_s = watch.stop()
         outcome = client.outcome or Outcome("interrupted")
         if tlog.stat().st_size == 0:
-            raise GcsError(outcome.reason or "stopped before the vehicle said anything")
+            if stop:
+                raise StoppedError("stopped before the vehicle said anything")
+            raise GcsError(outcome.reason or "the vehicle said nothing")
         folder.keep()
         try:
             record = make_report(tlog, out, _meta(mission, options, outcome, wall_s), options.quiet)
@@ -312,14 +316,17 @@ class _Folder:
 
     _OURS = ("flight.tlog", ONBOARD_LOG, "sitl.log", "autopilot.log")
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, overwrite: bool) -> None:
         self._path = path
+        self._overwrite = overwrite
         self._kept = False
 
     def keep(self) -> None:
         self._kept = True
 
     def __enter__(self) -> _Folder:
+        if not self._overwrite and (self._path / self._OURS[0]).exists():
+            raise GcsError(f"--out {self._path}: holds a flight already; name another, or add --overwrite")
         try:
             self._path.mkdir(parents=True, exist_ok=True)
             if not os.access(self._path, os.W_OK):

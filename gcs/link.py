@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from gcs.errors import GcsError
 
 DEFAULT_PORT = 14550
+TRUTH_PORT = 14560  # where sitl sends what is true
 LOOPBACK = "127.0.0.1"
 _DATAGRAM = 65_535
 _BUFFER = 4 * 1024 * 1024  # the fast streams of a second, and a report being written meanwhile

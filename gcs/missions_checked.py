@@ -49,7 +49,5 @@ def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) 
 def _refuse(mission: Mission, vehicle: str, shaped: bool) -> None:
     found = violations(mission, vehicle, shaped)
     if found:
-        more = f" (and {len(found) - 1} more, see gcs check)" if len(found) > 1 else ""
-        raise GcsError(
-            f"{mission.name} cannot be flown by vehicle {vehicle}: {found[0]}{more}; --force tries"
-        )
+        listed = "; ".join(map(str, found))
+        raise GcsError(f"{mission.name} cannot be flown by vehicle {vehicle}: {listed}; --force tries")

@@ -10,11 +10,21 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients import command
 from gcs.clients.connection import Connection
+from gcs.clients.datagrams import messages
 from gcs.clients.operation import Operation, Result, Status, Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.display import StepDisplay
 from gcs.errors import GcsError, NoVehicleError, RefusedError
-from gcs.link import Address, monotonic_us, open_address, unix_us, wait
+from gcs.link import (
+    LOOPBACK,
+    TRUTH_PORT,
+    Address,
+    UdpSocket,
+    monotonic_us,
+    open_address,
+    unix_us,
+    wait,
+)
 
 FIND_S = 5.0
 REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may come a little later
@@ -31,6 +41,8 @@ class Session:
         self.address = address
         self.on_received: Seen | None = None
         self.on_sent: Seen | None = None
+        self.on_truth: Seen | None = None
+        self._truth: UdpSocket | None = None
         self._find_s = FIND_S if find_s is None else find_s
         self._connection = Connection()
         if address.signing_key is not None:
@@ -43,6 +55,14 @@ class Session:
         if self._connection.target is None:
             raise NoVehicleError("no vehicle was looked for")
         return self._connection.target
+
+    def listen_to_truth(self) -> bool:
+        """Hear the simulated world too, as far as nobody else listens to it; False if somebody does."""
+        try:
+            self._truth = UdpSocket(LOOPBACK, TRUTH_PORT)
+        except GcsError:
+            return False
+        return True
 
     def find(self) -> Target:
         """Wait for the vehicle's heartbeat."""
@@ -115,6 +135,11 @@ class Session:
             self.on_sent(datagram, now_us)
 
     def _receive(self, now_us: int, operation: Operation | None) -> None:
+        for datagram in self._truth.drain() if self._truth else ():
+            if self.on_truth is not None:
+                self.on_truth(datagram, now_us)
+            for one in messages(datagram)[0]:
+                self.view.update_truth(one.message)
         for datagram in self._socket.drain():
             if self.on_received is not None:
                 self.on_received(datagram, now_us)
@@ -129,6 +154,8 @@ class Session:
 
     def close(self) -> None:
         self._socket.close()
+        if self._truth is not None:
+            self._truth.close()
 
     def __enter__(self) -> Session:
         return self

@@ -125,8 +125,9 @@ class PathReport:
     def __str__(self) -> str:
         return (
             f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s, at most "
-            f"{1e3 * self.distance_m:.1f} mm from the path asked; rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, tension from "
-            f"{self.tension_low_n:.2f} N, tilt to {self.tilt_deg:.0f} deg"
+            f"{1e3 * self.distance_m:.1f} mm from the path asked; rotors {self.rotor_low_n:.2f} ... "
+            f"{self.rotor_high_n:.2f} N, tension from {self.tension_low_n:.2f} N, "
+            f"tilt to {self.tilt_deg:.0f} deg"
         )
 
 

@@ -24,12 +24,11 @@ _SUFFIX = ".toml"
 
 
 class MissionFileError(ValueError):
-    """The file or the name given is at fault. `problems` has one line each; str() is the first of them."""
+    """The file or the name given is at fault. `problems` has one line each; str() has them all."""
 
     def __init__(self, problems: Sequence[str]) -> None:
         self.problems = tuple(problems)
-        more = len(self.problems) - 1
-        super().__init__(self.problems[0] + (f" (and {more} more)" if more else ""))
+        super().__init__("; ".join(self.problems))
 
 
 def shipped() -> tuple[str, ...]:

@@ -7,23 +7,37 @@ chose.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import dist
+from math import cos, dist
 from typing import NamedTuple
 
 from autopilot.geometry.linear import Vec3, add
 from missions.demand import Bounds
-from missions.model import Delay, Land, ReturnHome, Signals, Sine, Speed, Step, Takeoff, Term, Waypoint
+from missions.legs import legs
+from missions.model import (
+    Delay,
+    Land,
+    Mission,
+    ReturnHome,
+    Signals,
+    Sine,
+    Speed,
+    Step,
+    Takeoff,
+    Term,
+    Waypoint,
+)
 from missions.shaping import Shaped, shape, unshaped
 from missions.signals import evaluate, signal_table
-from missions.survey import Body
+from missions.survey import Body, Peaks, survey_transfer
 from missions.waypoints import MOST_POINTS, NEAREST_M, Passage, passage
 
 AS_ASKED, SLOW_DOWN, REFUSE = 0, 1, 2
 SLOWEST = 4.0  # times as long as asked
 _SLOWER = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, SLOWEST)
 _HALVINGS = 3
+_LONGER, _LONGER_TRIES = 1.05, 60  # of a transfer
 
 
 class Limits(NamedTuple):
@@ -46,9 +60,12 @@ class Prepared:
     made: tuple[Shaped | Passage | None, ...] = ()
     notes: tuple[str, ...] = ()
     refusal: str = ""
+    pending: bool = False  # the paths are not there yet
+    least_s: tuple[float, ...] = ()  # for each step: what its transfer takes at least, 0 where nothing binds
 
 
 UNPREPARED = Prepared()
+PENDING = Prepared(pending=True)
 
 
 def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits) -> Prepared:
@@ -77,7 +94,32 @@ def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits) -> P
             notes.append(f"Item {item}: {trouble}")
             found = unshaped(step)
         made.append(found)
-    return Prepared(tuple(made), tuple(notes), refusal)
+    least = tuple(_transfer_times(steps, limits)) if limits.shaped else ()
+    return Prepared(tuple(made), tuple(notes), refusal, least_s=least)
+
+
+def _transfer_times(steps: Sequence[Step], limits: Limits) -> Iterator[float]:
+    """For each step the least time (s) of its transfer within the bounds; 0 where these do not bind."""
+    mission = Mission("", "", "", (), tuple(steps))
+    for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2):
+        duration = leg.transfer_s
+        if not isinstance(leg.step, Waypoint | ReturnHome) or duration == 0.0:
+            yield 0.0
+            continue
+        for _ in range(_LONGER_TRIES):
+            if _transfer_fits(survey_transfer(leg.begin, leg.end, duration, limits.body), limits.bounds):
+                break
+            duration *= _LONGER
+        yield 0.0 if duration == leg.transfer_s else duration
+
+
+def _transfer_fits(along: Peaks, bounds: Bounds) -> bool:
+    return (
+        along.rotor_high.value <= bounds.rotor_high
+        and along.rotor_low.value >= bounds.rotor_low
+        and along.tension_low.value >= bounds.tension_low
+        and cos(along.tilt.value) >= bounds.cos_tilt
+    )
 
 
 def _passages(steps: Sequence[Step], limits: Limits) -> dict[int, Passage]:

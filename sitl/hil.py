@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite, nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3, apply_transposed, norm, sub
 from autopilot.geometry.so3 import rotation_from_quat
@@ -40,6 +40,12 @@ _DIVERGED = mavlink.MAVLink_statustext_message(
 )
 _TRACKER, _CAMERA, _ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
 _FIX = {"3d": mavlink.GPS_FIX_TYPE_3D_FIX, "rtk": mavlink.GPS_FIX_TYPE_RTK_FIXED}
+
+
+def _asks_reboot(message: Any) -> bool:
+    if message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
+        return False
+    return bool(message.command == mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN and message.param1 == 1.0)
 
 
 class PacingFigures(NamedTuple):
@@ -76,26 +82,32 @@ class HilSimulator:
         truth_every: int = 2,
     ) -> None:
         """`truth` as its file has it; `table` holds the SIM_* parameters, which may change in flight."""
-        settings = settings_of(table)
-        core = SimCore(apply_parameters(truth, table), profile, settings, seed)
         self.pacing = PacingFigures()
-        self.missed = 0  # ticks without an answer in time
-        self.rejected = 0  # controls that were not numbers
-        self.answered = False  # the present tick was
-        self._core = core
         self._file_truth = truth
         self._profile = profile
+        self._seed = seed
         self._parameters = ParameterServer(table)
         self._home = home
         self._lockstep = lockstep
         self._truth_every = truth_every
-        self._stated = stated_of(profile, settings.noise_scale)
         self._fix = _FIX[profile.gnss.fix] if profile.gnss else 0
         self._satellites = profile.gnss.satellites if profile.gnss else 0
         encoder = profile.cable_sensor is not None and profile.cable_sensor.kind == "encoder"
         self._cable_id = _ENCODER if encoder else _CAMERA
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
+        self._begin()
+
+    def _begin(self) -> None:
+        """The world at time 0, with the parameters in force."""
+        table = self._parameters.table
+        settings = settings_of(table)
+        core = SimCore(apply_parameters(self._file_truth, table), self._profile, settings, self._seed)
+        self.missed = 0  # ticks without an answer in time
+        self.rejected = 0  # controls that were not numbers
+        self.answered = False  # the present tick was
+        self._core = core
+        self._stated = stated_of(self._profile, settings.noise_scale)
         self._command: Rotors = STOPPED
         self._command_us = -1  # the tick that the last command answers
         self._inertial = ImuReading(_ZERO, _ZERO)
@@ -105,6 +117,7 @@ class HilSimulator:
         self._truth: bytes | None = None
         self._truth_made = False
         self._gust_told = _ZERO
+        self._reboot = False  # asked for
 
     @classmethod
     def build(
@@ -192,6 +205,8 @@ class HilSimulator:
             self.answered = self.answered or current
         if self.answered and not was_answered:  # a repeated datagram changes nothing
             for message in aside:
+                if _asks_reboot(message):
+                    self._reboot = True
                 if self._parameters.receive(message):
                     self._retune()
         return self.answered
@@ -208,7 +223,10 @@ class HilSimulator:
         self._stated = stated_of(self._profile, settings.noise_scale)
 
     def advance(self) -> None:
-        """Move the world to the next tick under the last command."""
+        """Move the world to the next tick under the last command, or back to its beginning if so asked."""
+        if self._reboot:
+            self._begin()
+            return
         if not self._lockstep:
             if not self.answered:
                 self.missed += 1

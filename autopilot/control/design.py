@@ -19,8 +19,8 @@ Near hover the law is u = -K x on the chain e_i, x_L, v_L, q, q', theta, Omega o
 
     v_L' = -g q    q'' = -(m g / m_Q L)(q + theta)    Omega' = M / J    M' = (u - M) / tau_a
 
-and the poles are those of three loops, one inside the other, and omega_i. With prediction over d the loop holds
-for every delay between d - delta and d + delta, by the small-gain theorem, if
+and the poles are those of three loops, one inside the other, and omega_i. With prediction over d the loop
+holds for every delay between d - delta and d + delta, by the small-gain theorem, if
 
     delta omega |K exp(A d) G(i omega)| / |1 + K G(i omega)| < 1 at all omega,
     G(s) = (s - A)^-1 b exp(-s T / 2)

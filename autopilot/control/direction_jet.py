@@ -15,6 +15,8 @@
     A'  = -k_i e_x - k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
     A'' = -k_i e_v - k_x e_a - k_v e_j + m x_d''''         + m_Q L (s'' q + 2 s' q' + s q'')
 
+What the errors ask for, k_i e_i + k_x e_x + k_v e_v, is bounded smoothly by half the weight (`saturated`).
+
 e_a = x_L'' - x_d'' and e_j = x_L''' - x_d''' are what the model says of the load (`load_motion`), not
 differences of what was measured; s' = 2 q'.q'', s'' = 2 (q''.q'' + q'.q'''). The derivatives of q_c = -A/|A|
 follow exactly. The thesis passes q_c through a filter for them; and to take the derivatives of the reference
@@ -23,6 +25,7 @@ alone, leaving out those of the errors, makes the cascade unstable with its gain
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from autopilot.control.load_attitude import DirectionCommand
@@ -30,9 +33,11 @@ from autopilot.control.load_motion import LoadMotion
 from autopilot.control.load_position import load_position_force
 from autopilot.control.records import Jet, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, add3, dot, norm, scale, sub, times
+from autopilot.geometry.linear import Vec3, add, add3, axpy, dot, norm, scale, sub, times
 from autopilot.geometry.s2 import unit_derivatives
 
+# of the weight: what the errors may ask for, however great they are
+GREATEST_FEEDBACK = 0.5
 # N; a shorter A has no direction to follow
 _LEAST_FORCE = 1e-3
 
@@ -48,6 +53,19 @@ class PositionJet(NamedTuple):
 
 
 @kernel
+def saturated(v: Vec3, v_dot: Vec3, v_ddot: Vec3, limit: float) -> tuple[Vec3, Vec3, Vec3]:
+    """limit v / sqrt(limit^2 + v^2), which is v while v is small and never longer than `limit`; with its
+    derivatives."""
+    n = sqrt(limit * limit + dot(v, v))
+    u = scale(1.0 / n, v)
+    n_dot = dot(u, v_dot)
+    u_dot = scale(1.0 / n, axpy(-n_dot, u, v_dot))
+    n_ddot = dot(u_dot, v_dot) + dot(u, v_ddot)
+    u_ddot = scale(1.0 / n, axpy(-2.0 * n_dot, u_dot, axpy(-n_ddot, u, v_ddot)))
+    return scale(limit, u), scale(limit, u_dot), scale(limit, u_ddot)
+
+
+@kernel
 def position_jet(
     state: State,
     motion: LoadMotion,
@@ -60,7 +78,7 @@ def position_jet(
 ) -> PositionJet:
     """A, A', A'' along the motion of the model; the gains are diagonals in the world frame.
 
-    With k_i = 0 it is (3-43).
+    With k_i = 0 and small errors it is (3-43).
     """
     q, q_dot = state.q_cable, state.q_cable_dot
     at = load_position_force(
@@ -87,13 +105,18 @@ def position_jet(
     s_ddot = 2.0 * (dot(motion.q_ddot, motion.q_ddot) + dot(q_dot, motion.q_dddot))
     swing_dot = add(scale(s_dot, q), scale(s, q_dot))
     swing_ddot = add3(scale(s_ddot, q), scale(2.0 * s_dot, q_dot), scale(s, motion.q_ddot))
-    asked, asked_dot = scale(mass, jet[3]), scale(mass, jet[4])
-    closed_dot = add3(times(k_i, at.e_x), times(k_x, at.e_v), times(k_v, e_a))
-    closed_ddot = add3(times(k_i, at.e_v), times(k_x, e_a), times(k_v, e_j))
+    wanted = add3(times(k_i, e_i), times(k_x, at.e_x), times(k_v, at.e_v))
+    closed, closed_dot, closed_ddot = saturated(
+        wanted,
+        add3(times(k_i, at.e_x), times(k_x, at.e_v), times(k_v, e_a)),
+        add3(times(k_i, at.e_v), times(k_x, e_a), times(k_v, e_j)),
+        GREATEST_FEEDBACK * mass * vehicle.gravity,
+    )
+    open_loop = add(at.A, add(times(k_x, at.e_x), times(k_v, at.e_v)))
     return PositionJet(
-        sub(at.A, times(k_i, e_i)),
-        sub(add(asked, scale(reach, swing_dot)), closed_dot),
-        sub(add(asked_dot, scale(reach, swing_ddot)), closed_ddot),
+        sub(open_loop, closed),
+        sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), closed_dot),
+        sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), closed_ddot),
         at.e_x,
         at.e_v,
     )

@@ -21,8 +21,9 @@ which is a hundredth of the rest, F' = f' R e_3 + W x f R e_3. Then
     (2-31)    m (x_L'' + g e_3) = T q           m x_L''' = T' q + T q'
     (2-36)    m_Q L q'' = p q - F - m_Q L s q   m_Q L q''' = p' q + p q' - F' - m_Q L (s' q + s q')
 
-with p' = q'.F + q.F', s' = 2 q'.q'', T' = p' - m_Q L s'. Model: the cable is massless, inextensible, taut and
-attached at the centre of mass; the air is at rest and does not hold the load.
+with p' = q'.F + q.F', s' = 2 q'.q'', T' = p' - m_Q L s'. A cable that would have to push does nothing: T =
+0. Model: the cable is massless, inextensible, taut and attached at the centre of mass; the air is at rest
+and does not hold the load.
 """
 
 from __future__ import annotations
@@ -68,13 +69,15 @@ def load_motion(state: State, thrust: float, thrust_rate: float, air: Vec3, vehi
 
     s = dot(q_dot, q_dot)
     p = dot(q, F)
-    T = p - reach * s
+    # the cable pulls or does nothing
+    T = min(0.0, p - reach * s)
     a_load = sub(scale(T / mass, q), (0.0, 0.0, vehicle.gravity))
-    q_ddot = scale(1.0 / reach, sub(scale(T, q), F))
+    q_ddot = axpy(-s, q, scale(1.0 / reach, sub(scale(p, q), F)))
 
     s_dot = 2.0 * dot(q_dot, q_ddot)
-    T_dot = dot(q_dot, F) + dot(q, F_dot) - reach * s_dot
+    T_dot = dot(q_dot, F) + dot(q, F_dot) - reach * s_dot if T < 0.0 else 0.0
     turned = add(scale(T_dot, q), scale(T, q_dot))
     j_load = scale(1.0 / mass, turned)
-    q_dddot = scale(1.0 / reach, sub(turned, F_dot))
+    turning = sub(axpy(dot(q_dot, F) + dot(q, F_dot), q, scale(p, q_dot)), F_dot)
+    q_dddot = sub(scale(1.0 / reach, turning), axpy(s_dot, q, scale(s, q_dot)))
     return LoadMotion(a_load, j_load, q_ddot, q_dddot)

@@ -33,6 +33,7 @@ caller knows better than the law: `autopilot.actuation`.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from autopilot.control.direction_jet import PositionJet, direction_jet, position_jet
@@ -75,6 +76,13 @@ GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask fo
 _LEAST_FORCE = 1e-3
 # sine of the least angle between heading and thrust axis at which R_c is differentiated
 _LEAST_SINE = 1e-2
+# tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
+_GREATEST_LEAN = 2.7
+_LEAST_LIFT = 0.2
+# of the pull along the cable: what is exerted across it at most
+_GREATEST_ACROSS = 0.7
+_GREATEST_RATE = 15.0  # rad/s
+_FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
 
 
 class PlumblineGains(NamedTuple):
@@ -144,13 +152,45 @@ def flat_force(jet: Jet, vehicle: Vehicle) -> tuple[Vec3, Vec3, Vec3]:
 
 
 @kernel
-def commanded_attitude(F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: State) -> AttitudeCommand:
-    """R_c of (3-27) with Omega_c, Omega_c'; without the rates where F vanishes or lies along the heading."""
+def gently(v: Vec3, greatest: float) -> Vec3:
+    """v, never longer than `greatest`: smooth, and 0.2 % shorter than v where v is 0.3 times that."""
+    share = dot(v, v) / max(greatest * greatest, _LEAST_FORCE * _LEAST_FORCE)
+    return scale(1.0 / sqrt(sqrt(1.0 + share * share)), v)
+
+
+@kernel
+def no_longer(v: Vec3, greatest: float) -> Vec3:
+    """v, shortened to `greatest` where it is longer."""
+    n = norm(v)
+    return v if n <= greatest else scale(greatest / n, v)
+
+
+@kernel
+def commanded_attitude(
+    F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: State, vehicle: Vehicle
+) -> AttitudeCommand:
+    """R_c of (3-27) with Omega_c, Omega_c', no faster than the rotors can turn the vehicle.
+
+    Without the rates where F vanishes, lies along the heading or is more level than the vehicle may lean.
+    """
     zero: Vec3 = (0.0, 0.0, 0.0)
+    sideways = norm((F[0], F[1], 0.0))
+    upward = max(F[2], _LEAST_LIFT * vehicle.quad_mass * vehicle.gravity)
+    if sideways > _GREATEST_LEAN * upward:
+        shrink = _GREATEST_LEAN * upward / sideways
+        return AttitudeCommand(
+            attitude_towards((shrink * F[0], shrink * F[1], upward), b1_d, state.R), zero, zero
+        )
     n = norm(F)
     if n < _LEAST_FORCE or norm(cross(F, b1_d)) < _LEAST_SINE * n:
         return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
-    return attitude_from_axes(F, F_dot, F_ddot, b1_d, zero, zero)
+    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, zero, zero)
+    J = max(vehicle.inertia[0], vehicle.inertia[1])
+    return AttitudeCommand(
+        attitude.R_c,
+        no_longer(attitude.Omega_c, _GREATEST_RATE),
+        no_longer(attitude.Omega_c_dot, vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J),
+    )
 
 
 @kernel
@@ -183,7 +223,7 @@ def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, veh
         v,
         q,
         q_dot,
-        sub(state.x_quad, scale(L, sub(q, state.q_cable))),
+        add(state.x_quad, sub(sub(x, state.x_load), scale(L, sub(q, state.q_cable)))),
         add(state.v_quad, sub(sub(v, state.v_load), scale(L, sub(q_dot, state.q_cable_dot)))),
         mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, turning)))),
         axpy(h, turning, state.omega_body),
@@ -214,7 +254,10 @@ def wanted_force(
         vehicle.quad_mass,
         vehicle.cable_length,
     )
-    return WantedForce(sub(direction.F, air), position, direction, q_c)
+    along = dot(state.q_cable, direction.F)
+    pull = scale(along, state.q_cable)
+    across = gently(sub(direction.F, pull), _GREATEST_ACROSS * norm(position.A))
+    return WantedForce(sub(add(pull, across), air), position, direction, q_c)
 
 
 @kernel
@@ -281,7 +324,7 @@ def load_position(
     F_dot = scale(0.5 / STEP, sub(F_after, F_before))
     F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
 
-    attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state)
+    attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state, vehicle)
     result = attitude_moment(
         state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
     )
@@ -306,4 +349,6 @@ def load_position(
     held = norm(times(gains.k_i, integral))
     if held > GREATEST_HELD * weight:
         integral = scale(GREATEST_HELD * weight / held, integral)
-    return PlumblineMemory(dot(F_dot, b3) + dot(F, b3_dot), integral), command
+    fastest = 4.0 * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
+    thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
+    return PlumblineMemory(thrust_rate, integral), command

@@ -79,6 +79,7 @@ def quad_position(
     state: State,
     reference: Reference,
     carried_mass: float,
+    push: Vec3,
     position_gains: QuadPositionGains,
     gains: ThesisGains,
     filters: ThesisFilters,
@@ -87,15 +88,13 @@ def quad_position(
     """x_Q follows the reference, whose velocity and acceleration are used as given.
 
     `carried_mass`, kg, is what hangs on the vehicle: 0 while the cable is slack, the load's mass when it is
-    not. e_x, e_v of the command are errors of the vehicle. Of the memory only the attitude filters are
-    used.
+    not; `push`, N, world, is what the wind does to the vehicle by belief. e_x, e_v of the command are
+    errors of the vehicle. Of the memory only the attitude filters are used.
     """
     x_d, v_d, a_d = reference.jet[0], reference.jet[1], reference.jet[2]
     mass = vehicle.quad_mass + carried_mass
-    F = limited_force(
-        position_force(state.x_quad, state.v_quad, x_d, v_d, a_d, position_gains, mass, vehicle.gravity),
-        mass * vehicle.gravity,
-    )
+    wanted = position_force(state.x_quad, state.v_quad, x_d, v_d, a_d, position_gains, mass, vehicle.gravity)
+    F = limited_force(sub(wanted, push), mass * vehicle.gravity)
     R_c = attitude_towards(F, reference.b1_d, state.R)
     memory, command = quad_attitude(memory, state, R_c, thrust_along(F, state.R), gains, filters, vehicle)
     zero: Vec3 = (0.0, 0.0, 0.0)

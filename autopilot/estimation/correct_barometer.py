@@ -38,6 +38,7 @@ def correct_barometer(
             a.gnss,
             a.horizontal_slow,
             a.vertical_slow,
+            a.reversion,
             a.field,
             a.magnetic_age,
             age,

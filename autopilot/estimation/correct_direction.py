@@ -56,6 +56,7 @@ def put(load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float) -> 
         load.tension,
         load.pull,
         load.pulled_s,
+        load.held_s,
         age_s,
         0.0,
         CAMERA,

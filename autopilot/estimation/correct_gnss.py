@@ -58,6 +58,10 @@ STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
 ANYWHERE_STD = 100.0  # m: the first fix says where
 MAGNETIC_FRESH_S = 0.2
+# A slow error that returns to zero makes the best estimate of the place half of the first and half of the last
+# fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was, and be
+# carried by the velocities: so the drift is believed to return to zero ten times as slowly as it wanders.
+PLAIN_REVERSION = 0.1
 
 
 @kernel
@@ -76,15 +80,16 @@ def level_heading(accel: Vec3, field: Vec3, north: Vec3) -> tuple[Vec3, Vec3, Ve
 
 
 @kernel
-def with_slow(aids: AidEstimate, error: Vec3, horizontal: float, vertical: float) -> AidEstimate:
-    """The aids with the receiver's slow error and its deviation."""
+def with_slow(aids: AidEstimate, horizontal: float, vertical: float, reversion: float) -> AidEstimate:
+    """The aids with the deviations of the receiver's slow error."""
     return AidEstimate(
         aids.mounting,
         aids.heading,
         aids.barometer,
-        error,
+        aids.gnss,
         horizontal,
         vertical,
+        reversion,
         aids.field,
         aids.magnetic_age,
         aids.barometer_age,
@@ -114,6 +119,7 @@ def laid(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
         0.0,
         0.0,
         load.pull,
+        0.0,
         0.0,
         load.age_s,
         0.0,
@@ -202,7 +208,12 @@ def correct_gnss(
     n = state.size
     share = tuning.rtk_white if fix.rtk > 0.0 else tuning.gnss_white
     slow = sqrt(1.0 - share * share)
-    aids = with_slow(state.aids, state.aids.gnss, slow * fix.horizontal_std, slow * fix.vertical_std)
+    aids = with_slow(
+        state.aids,
+        slow * fix.horizontal_std,
+        slow * fix.vertical_std,
+        1.0 if fix.rtk > 0.0 else PLAIN_REVERSION,
+    )
     state = with_aids(state, aids)
     starting = state.vehicle.source == NOBODY
     if starting:

@@ -66,6 +66,7 @@ def placed(load: LoadEstimate, x_load: Vec3, v_load: Vec3, cov: Covariance2, age
         load.tension,
         load.pull,
         load.pulled_s,
+        load.held_s,
         age_s,
         0.0,
         TRACKER,

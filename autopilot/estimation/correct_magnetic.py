@@ -46,6 +46,7 @@ def with_field(state: EstimatorState, field: Vec3, age: float) -> EstimatorState
             a.gnss,
             a.horizontal_slow,
             a.vertical_slow,
+            a.reversion,
             field,
             age,
             a.barometer_age,

@@ -42,6 +42,8 @@ class Transit(NamedTuple):
     taut: float
     horizontal_slow: float
     vertical_slow: float
+    reversion: float  # of the receiver's slow error, in units of the rate at which it changes
+    cable_accel_std: float  # rad/s^2
 
 
 @kernel
@@ -103,6 +105,7 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
     """The covariance dt seconds on, in place, with the noise of one sample."""
     P, steps = history.covariance, history.steps
     forget = dt / tuning.gnss_time
+    keep = 1.0 - forget * to.reversion
     count = _plan(steps, to, dt)
     for turn in range(2):
         for k in range(count):
@@ -111,7 +114,7 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
                 P[i, j] += factor * P[of, j]
         for i in range(GNSS, n):
             for j in range(n):
-                P[i, j] *= 1.0 - forget
+                P[i, j] *= keep
         if turn == 0:
             for i in range(n):
                 for j in range(i):
@@ -132,7 +135,7 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
         for i in range(3):
             P[VELOCITY + i, RATE] -= s * to.across[i]
             P[VELOCITY + i, RATE + 1] -= s * to.along[i]
-        model = s / to.length + tuning.cable_accel_std * tuning.cable_accel_std * dt * dt
+        model = s / to.length + to.cable_accel_std * to.cable_accel_std * dt * dt
         P[RATE, RATE] += model
         P[RATE + 1, RATE + 1] += model
     if n == SIZE:

@@ -23,6 +23,7 @@ from autopilot.estimation.records import (
     RING_LENGTH,
     SIZE,
     TRACKER,
+    VELOCITY,
     AidEstimate,
     Covariance2,
     Doubt,
@@ -40,6 +41,11 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on the ground, it is not known
+# For so long after the cable came taut a load that pulls less than this share of what hanging would is taken as
+# lying: the pendulum then means little.
+LIFTING_S, LIFTING_PULL = 4.0, 0.8
+LIFTING_ACCEL_STD = 5.0  # rad/s^2
+SPEED_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
 LAID_WALK = 0.01  # m per square root of a second, of a load that lies where it was laid
 
 
@@ -105,6 +111,7 @@ def predict_taut(
         tension,
         load.pull,
         load.pulled_s,
+        load.held_s + dt,
         load.age_s + dt,
         load.rejected,
         load.source,
@@ -112,15 +119,20 @@ def predict_taut(
 
 
 @kernel
-def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, dt: float) -> LoadEstimate:
-    """A load by itself: it goes on as it did if it is tracked, else it lies where it was laid."""
+def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History, dt: float) -> LoadEstimate:
+    """A load by itself: it goes on as it did if it is tracked, else it lies where it was laid.
+
+    The covariance of a lying load is that of its place seen from the vehicle, which a wrong velocity shifts.
+    """
     x_load, v_load, covariance = load.x_load, load.v_load, load.covariance
     if load.source == TRACKER:
         x_load = axpy(dt, v_load, x_load)
         covariance = grow2(covariance, dt, SLACK_ACCEL_STD)
     else:
         aa, ab, bb = covariance
-        covariance = (aa + LAID_WALK * LAID_WALK * dt, ab, bb)
+        P = history.covariance
+        speed_var = 0.5 * (P[VELOCITY, VELOCITY] + P[VELOCITY + 1, VELOCITY + 1])
+        covariance = (aa + (LAID_WALK * LAID_WALK + SPEED_TIME_S * speed_var) * dt, ab, bb)
     separation = sub(x_load, vehicle.x_quad)
     distance = norm(separation)
     q, across, q_dot = load.q_cable, load.across, load.q_cable_dot
@@ -141,6 +153,7 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, dt: float) -> Lo
         0.0,
         load.pull,
         load.pulled_s,
+        load.held_s + dt,
         load.age_s + dt,
         load.rejected,
         load.source,
@@ -192,6 +205,7 @@ def predict(
     load, aids = state.load, state.aids
     vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, tuning, dt)
     a = vehicle.accel_quad
+    lying = load.source != TRACKER and load.held_s < LIFTING_S and load.pull < LIFTING_PULL * load.tension
     motion = Transit(
         (a[0], a[1], a[2] + tuning.gravity),
         R,
@@ -203,13 +217,15 @@ def predict(
         load.taut,
         aids.horizontal_slow,
         aids.vertical_slow,
+        aids.reversion,
+        LIFTING_ACCEL_STD if lying else tuning.cable_accel_std,
     )
     if vehicle.source > 0.0:
         transit(history, motion, tuning, dt, state.size)
     if load.taut > 0.0:
         load = predict_taut(load, vehicle, tuning, dt)
     else:
-        load = predict_slack(load, vehicle, dt)
+        load = predict_slack(load, vehicle, history, dt)
     load = watch(load, vehicle, history, imu, thrust, tuning, dt)
     predicted = EstimatorState(
         state.time_s + dt,
@@ -222,6 +238,7 @@ def predict(
             aids.gnss,
             aids.horizontal_slow,
             aids.vertical_slow,
+            aids.reversion,
             aids.field,
             aids.magnetic_age + dt,
             aids.barometer_age + dt,

@@ -173,6 +173,7 @@ class LoadEstimate(NamedTuple):
     tension: float
     pull: float  # N along the cable: what the vehicle's acceleration leaves of the believed thrust, smoothed
     pulled_s: float  # for how long the pull has spoken against `taut`
+    held_s: float  # since the cable came taut or slack
     age_s: float
     rejected: float
     source: float  # NOBODY, TRACKER or CAMERA
@@ -187,6 +188,7 @@ class AidEstimate(NamedTuple):
     gnss: Vec3  # m, the slow error of the receiver
     horizontal_slow: float  # m, its standard deviation as last stated
     vertical_slow: float
+    reversion: float  # 1 with carrier phase, else less: see `correct_gnss`
     field: Vec3  # the magnetometer's last reading, body
     magnetic_age: float
     barometer_age: float
@@ -264,11 +266,12 @@ def blank_state() -> EstimatorState:
             tension=0.0,
             pull=0.0,
             pulled_s=0.0,
+            held_s=0.0,
             age_s=inf,
             rejected=0.0,
             source=NOBODY,
         ),
-        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, ZERO, inf, inf, 0.0),
+        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, inf, inf, 0.0),
         doubt=Doubt(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
         resets=0.0,

@@ -81,7 +81,7 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("VEH_GRAVITY", belief.gravity_m_s2, 0.1, 30.0, "m/s^2", "Acceleration of gravity"),
             p(
                 "CTL_LAW",
-                0.0,
+                float(LAWS.index("plumbline")),
                 0.0,
                 len(LAWS) - 1.0,
                 "",
@@ -250,6 +250,14 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("MIS_ROTOR_MARG", 15.0, 0.0, 45.0, "%", "Range of a rotor kept free for control at either end"),
             p("MIS_TILT_DEG", 45.0, 1.0, 80.0, "deg", "Greatest tilt of the vehicle along a shaped path"),
             p("MIS_TENSION", 30.0, 0.0, 90.0, "%", "Least tension along a shaped path, of the load's weight"),
+            p(
+                "MIS_SNAP_SPEED",
+                0.25,
+                0.02,
+                5.0,
+                "m/s",
+                "Greatest closing speed at which a slack cable is made taut",
+            ),
             p("FS_LOAD_ERR", 5.0, 0.05, 1000.0, "m", "Load position error at which the flight is given up"),
             p("FS_TILT_DEG", 120.0, 10.0, 180.0, "deg", "Tilt at which the flight is given up"),
             p(

@@ -30,6 +30,7 @@ ATTITUDE_MODES = (
     mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE,
     mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE,
 )
+_TRACKED_MODES = (*ATTITUDE_MODES, mavlink.PLUMBLINE_CONTROL_LOAD_POSITION)
 PHASE_NAMES = {
     value: entry.name.removeprefix("PLUMBLINE_PHASE_").lower()
     for value, entry in mavlink.enums["PLUMBLINE_PHASE"].items()
@@ -95,6 +96,8 @@ def samples_of(telemetry: Telemetry) -> Samples:
     """Setpoint and estimate are sent on the ticks of the truth: then nothing is interpolated."""
     truth, setpoint, estimate = telemetry.load_truth, telemetry.setpoint, telemetry.load_estimated
     time_s = truth.time_s
+    # a setpoint without a law that follows it is the estimate, sent so that the message is whole
+    tracked = np.isin(_whole_as_of(telemetry, setpoint.control_mode, time_s), _TRACKED_MODES)[:, None]
     # the derivative of the desired velocity is sent too, so that it is a cubic between stamps as well
     return Samples(
         time_s=time_s,
@@ -104,8 +107,14 @@ def samples_of(telemetry: Telemetry) -> Samples:
         in_mission=in_window(telemetry, time_s),
         actual_m=truth.position_m,
         actual_m_s=truth.velocity_m_s,
-        desired_m=hermite(setpoint.time_s, setpoint.position_m, setpoint.velocity_m_s, time_s),
-        desired_m_s=hermite(setpoint.time_s, setpoint.velocity_m_s, setpoint.acceleration_m_s2, time_s),
+        desired_m=np.where(
+            tracked, hermite(setpoint.time_s, setpoint.position_m, setpoint.velocity_m_s, time_s), np.nan
+        ),
+        desired_m_s=np.where(
+            tracked,
+            hermite(setpoint.time_s, setpoint.velocity_m_s, setpoint.acceleration_m_s2, time_s),
+            np.nan,
+        ),
         asked_m=hermite(setpoint.time_s, setpoint.asked_m, setpoint.asked_m_s, time_s),
         asked_m_s=linear(setpoint.time_s, setpoint.asked_m_s, time_s),
         estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),

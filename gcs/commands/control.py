@@ -14,10 +14,13 @@ from gcs.link import Address
 from gcs.session import Session
 
 
-def _send(address: Address, make: Callable[[Session], Operation]) -> None:
+def _send(address: Address, make: Callable[[Session], Operation], begins: bool = False) -> None:
+    """`begins`: what is asked for begins with arming if the vehicle is not armed."""
     with Session(address) as session:
         session.find()
-        click.echo(session.run(make(session)).text)
+        text = session.run(make(session)).text
+        waits = "; it begins when the vehicle is armed: gcs arm" if begins and not session.view.armed else ""
+        click.echo(text + waits)
 
 
 @click.command("arm")
@@ -47,9 +50,9 @@ def disarm_command(force: bool, address: Address) -> None:
 def start_command(address: Address) -> None:
     """Fly the mission on the vehicle from its first item.
 
-    The vehicle must be armed.
+    A disarmed vehicle accepts it and begins when it is armed.
     """
-    _send(address, lambda session: command.start_mission(session.target))
+    _send(address, lambda session: command.start_mission(session.target), begins=True)
 
 
 @click.command("pause")
@@ -89,7 +92,7 @@ def takeoff_command(altitude_m: float | None, address: Address) -> None:
             return command.takeoff(session.target)
         return command.takeoff(session.target, vehicle_home(session).altitude_m + altitude_m)
 
-    _send(address, make)
+    _send(address, make, begins=True)
 
 
 @click.command("land")

@@ -19,7 +19,7 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
 @click.option(
     "--law",
     type=click.Choice(["thesis", "lqr", "plumbline"]),
-    default="thesis",
+    default="plumbline",
     show_default=True,
     help="Control law to fly with.",
 )
@@ -68,6 +68,7 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
     help="Give up after so many seconds of the vehicle's clock.  [default: 1.5 x expected + 60]",
 )
 @click.option("--force", is_flag=True, help="Fly even what the vehicle cannot do.")
+@click.option("--overwrite", is_flag=True, help="Even if --out holds an earlier flight: it is lost.")
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress and no table, only the outcome.")
 @click.pass_context
@@ -85,6 +86,7 @@ def fly_command(
     connect: Address | None,
     limit_s: float | None,
     force: bool,
+    overwrite: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -127,6 +129,7 @@ def fly_command(
             connect=connect,
             quiet=quiet or as_json,
             force=force,
+            overwrite=overwrite,
             limit_s=limit_s,
         )
     )

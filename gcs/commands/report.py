@@ -34,7 +34,9 @@ def report_command(source: Path, out: Path | None, as_json: bool, quiet: bool) -
     record = make_report(tlog, folder, None, quiet or as_json)
     if as_json:
         print_json(record)
-        return
-    if not quiet:
+    elif not quiet:
         print_record(record)
-    click.echo(f"report: {folder / 'report.html'}")
+    if record["outcome"] == "no telemetry":
+        raise GcsError(f"{tlog}: there is no telemetry of a Plumbline vehicle in it")
+    if not as_json:
+        click.echo(f"report: {folder / 'report.html'}")

@@ -20,6 +20,7 @@ _LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a se
 def status_command(as_json: bool, address: Address) -> None:
     """Show what the vehicle says of itself."""
     with Session(address) as session:
+        session.listen_to_truth()
         session.find()
         session.watch(lambda: False, _LISTEN_S, "listening")
         record = _record(session.view)
@@ -54,6 +55,7 @@ def _record(view: VehicleView) -> dict[str, Any]:
         "battery_v": None if battery is None else battery.voltage_battery * 1e-3,
         "rate_hz": None if world is None else world.rate_hz,
         "late_p99_us": None if world is None else world.late_p99_us,
+        "missed_ticks": None if world is None else world.missed,
         "texts": [text.text for text in view.texts],
     }
 

@@ -30,7 +30,7 @@ class FlightProcesses:
     def start(self, experiment: Experiment, directory: Path, core: int) -> Child:
         """Start a flight; its words go to gcs.log in `directory`."""
         arguments = ["fly", experiment.case, "--law", experiment.law, "--vehicle", experiment.vehicle]
-        arguments += ["--sensors", SENSORS, "--seed", str(SEED), "--lockstep", "--force"]
+        arguments += ["--sensors", SENSORS, "--seed", str(SEED), "--lockstep", "--force", "--overwrite"]
         child = Child("gcs", [*arguments, "--out", str(directory)], directory / LOG_FILE)
         # it and its own children share one core while they are in lockstep: not the one of its neighbour
         if hasattr(os, "sched_setaffinity"):

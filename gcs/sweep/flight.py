@@ -17,10 +17,10 @@ from autopilot.decisions import arming_complaints, decide, with_plan
 from autopilot.estimation.filter import control_state
 from autopilot.estimation.records import ImuReading, new_history
 from autopilot.flight import CARRYING as CARRYING_PHASES
-from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, View, leg_time_s
+from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, View, jet_ahead, leg_time_s
 from autopilot.flight_core import FlightState, Setup, control, initial_state, view_of
 from autopilot.geometry.linear import ZERO
-from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Creep
+from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Creep, asked_jet
 from autopilot.observer import nominal
 from autopilot.onboard import Onboard, build_setup, plan_of
 from autopilot.scheduler import divider, is_due
@@ -39,18 +39,19 @@ from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.mission_items import WireItem, encode_mission
 from gcs.clients.flight import READY_LIMIT_US, TIME_FACTOR, TIME_MARGIN_S
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep import kernel as k
-from gcs.sweep.legs import COLUMNS, jets
+from gcs.sweep.legs import COLUMNS, jets, jets_ahead
 from gcs.sweep.link import link_model
 from gcs.sweep.pilot import FUSED_LAWS, Pilot, PilotModel
 from gcs.sweep.plan import simulated
 from gcs.sweep.world import Floats, new_world
 from missions.legs import expected_duration_s
 from missions.model import Mission
+from missions.planning import Limits
 from sitl.hil import HilSimulator
 from sitl.sensors.files import load_profile
 from sitl.sensors.profile import Profile
@@ -84,6 +85,7 @@ class Flown:
     mission_s: float = nan
     load_error_max_m: float = nan
     load_error_rms_m: float = nan
+    tracking_error_max_m: float = nan
     estimator_error_max_m: float = nan
     saturated_fraction: float = nan
     psi_R_max: float = nan
@@ -122,6 +124,12 @@ def _profile(name: str) -> Profile:
     return load_profile(name)
 
 
+@lru_cache(maxsize=64)
+def _plan(items: tuple[WireItem, ...], limits: Limits) -> Plan:
+    """Shaping paths takes seconds; it depends on nothing else."""
+    return plan_of(StoredMission(items), Home(), limits)
+
+
 class _Flight:
     """A flight on its way."""
 
@@ -140,9 +148,7 @@ class _Flight:
         self.tick_us = settings.tick_us
         self.every = divider(1e6 / self.tick_us, table["CTL_RATE_HZ"], "CTL_RATE_HZ")
         self.setup: Setup = build_setup(table, self.every)
-        plan: Plan = plan_of(
-            StoredMission(tuple(encode_mission(mission, home))), home, self.setup.settings.limits
-        )
+        plan = _plan(tuple(encode_mission(mission, home)), self.setup.settings.limits)
         self.state: FlightState = initial_state()
         self.state = self.state._replace(flight=with_plan(self.state.flight, plan))
         self.history = new_history()
@@ -152,7 +158,7 @@ class _Flight:
         self.inertial = ImuReading(ZERO, ZERO)
         self.figures = k.NO_FIGURES
         self.model = k.AutopilotModel(
-            link_model(profile, settings.noise_scale),
+            link_model(profile, settings.noise_scale, home),
             self.setup.tuning,
             PilotModel(
                 self.setup.law,
@@ -194,16 +200,18 @@ class _Flight:
 
     def _stretch(self, stretch: k.Stretch, decided: bool) -> None:
         state, now_us = self.state, self.world.now_us
-        targets = references = _NO_ROWS
+        targets = references = asked = _NO_ROWS
         flight = state.flight
         if stretch.flown != k.GROUND:
             n = stretch.stop_tick - self.world.tick + 1
             since_us = now_us - flight.leg_start_us
             times: Floats = np.asarray((since_us + self.tick_us * np.arange(n)) * 1e-6, np.float64)
             preview_s = self.setup.law.preview_s
-            targets = references = jets(flight.legs[0], times)
+            targets = references = jets_ahead(flight, times)
             if preview_s != 0.0:
-                references = jets(flight.legs[0], times + preview_s)
+                references = jets_ahead(flight, times + preview_s)
+            if stretch.counts:
+                asked = jets(flight.legs[0], times, asked=True)
         slack_before = self.world.plant.slack_events
         self.world, after, self.figures = k.fly_stretch(
             self.world,
@@ -213,6 +221,7 @@ class _Flight:
             stretch,
             targets,
             references,
+            asked,
             self.world_model,
             self.buffers,
             self.history,
@@ -252,13 +261,14 @@ class _Flight:
             self._hear(report.texts, phase)
             flight = self.state.flight
             if self._counts(flight):
-                target = np.ravel(flight.legs[0].jet(leg_time_s(flight, now_us))[0])
+                t = leg_time_s(flight, now_us)
                 self.figures = k.counted(
                     self.figures,
                     self.world.plant,
                     self.state.estimator,
                     self._pilot(),
-                    (float(target[0]), float(target[1]), float(target[2])),
+                    jet_ahead(flight, t)[0],
+                    asked_jet(flight.legs[0], t)[0],
                 )
         self._ground_turn(now_us)
         self._judge(now_us)
@@ -317,6 +327,7 @@ class _Flight:
         flown.mission_s = self.mission_us * 1e-6
         if f.samples > 0.0:
             flown.load_error_max_m = f.error_max
+            flown.tracking_error_max_m = f.tracking_max
             flown.load_error_rms_m = sqrt(f.error_square / f.samples)
             flown.estimator_error_max_m = f.estimator_error_max
             flown.saturated_fraction = f.saturated / f.ticks

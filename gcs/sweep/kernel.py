@@ -61,9 +61,10 @@ class Stretch(NamedTuple):
 class Figures(NamedTuple):
     """Of the mission, tick by tick, from the true state."""
 
-    error_max: float  # m
+    error_max: float  # m, from where the mission asks the load to be
     error_square: float  # m^2, summed
     samples: float
+    tracking_max: float  # m, from the path that is flown
     psi_R_max: float
     psi_q_max: float
     saturated: float  # ticks
@@ -75,7 +76,9 @@ class Figures(NamedTuple):
     rotor_max: float
 
 
-NO_FIGURES = Figures(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float("inf"), 0.0, 0.0, float("inf"), -float("inf"))
+NO_FIGURES = Figures(
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, float("inf"), 0.0, 0.0, float("inf"), -float("inf")
+)
 
 
 @kernel
@@ -145,14 +148,18 @@ def may_decide(
 
 
 @kernel
-def counted(f: Figures, plant: PlantState, estimator: EstimatorState, pilot: Pilot, target: Vec3) -> Figures:
-    """The figures with those of this tick; `target` is where the load is to be."""
-    error = norm(sub(plant.x_load, target))
+def counted(
+    f: Figures, plant: PlantState, estimator: EstimatorState, pilot: Pilot, target: Vec3, asked: Vec3
+) -> Figures:
+    """The figures with those of this tick; `asked` is where the mission asks the load to be, `target` where
+    the autopilot does."""
+    error = norm(sub(plant.x_load, asked))
     force = plant.rotor_force
     return Figures(
         max(f.error_max, error),
         f.error_square + error * error,
         f.samples + 1.0,
+        max(f.tracking_max, norm(sub(plant.x_load, target))),
         max(f.psi_R_max, pilot.command.psi_R),
         max(f.psi_q_max, pilot.command.psi_q),
         f.saturated + (1.0 if pilot.mixed.saturated != 0 else 0.0),
@@ -186,6 +193,7 @@ def fly_stretch(
     stretch: Stretch,
     targets: Floats,
     references: Floats,
+    asked: Floats,
     world_model: WorldModel,
     buffers: Buffers,
     history: History,
@@ -206,7 +214,15 @@ def fly_stretch(
         _trace(trace, world)
         dt = 0.0 if world.tick == 0 else world_model.tick_us * 1e-6
         estimator, inertial = estimate(
-            estimator, history, inertial, world.now_us, buffers, model.link, model.tuning, dt
+            estimator,
+            history,
+            inertial,
+            world.now_us,
+            buffers,
+            model.link,
+            model.tuning,
+            dt,
+            pilot.actuation.thrust,
         )
         if world.tick >= stretch.stop_tick:
             break
@@ -222,6 +238,6 @@ def fly_stretch(
                 reference = reference_of(references[at])
                 pilot = air_tick(pilot, state, taut, reference, stretch.flown == CARRYING, model.pilot)
                 if stretch.counts:
-                    figures = counted(figures, world.plant, estimator, pilot, target)
+                    figures = counted(figures, world.plant, estimator, pilot, target, vector(asked[at], 0))
         world = tick(world, wire_forces(pilot.mixed.forces), world_model, buffers)
     return world, Autopilot(estimator, inertial, pilot), figures

@@ -4,58 +4,106 @@ from __future__ import annotations
 
 import numpy as np
 
+from autopilot.flight import Flight
 from autopilot.geometry.kernel import kernel
-from autopilot.guidance import Creep, Hold, Leg, Run, Transfer
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.guidance import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
 from gcs.sweep.world import Floats
-from missions.signals import SignalTable, evaluate
+from missions.shaping import evaluate_asked, evaluate_shaped
+from missions.signals import Jet, SignalTable
+from missions.splines import PieceTable
 from missions.transfer import transfer
+from missions.waypoints import evaluate_path
 
 COLUMNS = 21  # position and six derivatives
 
 
 @kernel
-def _put(row: Floats, jet: tuple[tuple[float, float, float], ...]) -> None:
+def _put(row: Floats, jet: Jet) -> None:
     for i in range(7):
         for j in range(3):
             row[3 * i + j] = jet[i][j]
 
 
 @kernel
-def _transfers(
-    times: Floats,
-    begin: tuple[float, float, float],
-    end: tuple[float, float, float],
-    duration: float,
-    out: Floats,
-) -> None:
+def _transfers(times: Floats, begin: Vec3, end: Vec3, duration: float, out: Floats) -> None:
     for k in range(times.shape[0]):
         _put(out[k], transfer(begin, end, duration, times[k]))
 
 
 @kernel
-def _runs(times: Floats, anchor: tuple[float, float, float], table: SignalTable, out: Floats) -> None:
+def _runs(
+    times: Floats,
+    anchor: Vec3,
+    table: SignalTable,
+    pieces: PieceTable,
+    duration: float,
+    lead: float,
+    asked: bool,
+    out: Floats,
+) -> None:
     for k in range(times.shape[0]):
-        _put(out[k], evaluate(table, times[k]))
+        if asked:
+            _put(out[k], evaluate_asked(table, duration, times[k] - lead))
+        else:
+            _put(out[k], evaluate_shaped(table, pieces, duration, times[k] - lead))
         for j in range(3):
             out[k, j] = anchor[j] + out[k, j]
 
 
-def jets(leg: Leg, times_s: Floats) -> Floats:
-    """(n, 21) `leg.jet` at each of the n times (s into the leg): by machine code for the kinds that last."""
+@kernel
+def _passes(
+    times: Floats, table: PieceTable, begin_s: float, offset: Vec3, fade_s: float, out: Floats
+) -> None:
+    fading = np.zeros(COLUMNS)
+    for k in range(times.shape[0]):
+        at = begin_s + times[k]
+        _put(out[k], evaluate_path(table, at))
+        _put(fading, transfer(offset, ZERO, fade_s, at))
+        for j in range(COLUMNS):
+            out[k, j] = out[k, j] + fading[j]
+
+
+def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
+    """(n, 21) `leg.jet` (or `asked_jet`) at each of the n times (s into the leg): in machine code for the
+    kinds that last."""
     found = np.zeros((len(times_s), COLUMNS))
-    # a subclass may mean something else
-    kind = type(leg)
-    if kind is Transfer:
-        _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)  # type: ignore[union-attr]
-    elif kind is Run:
-        _runs(times_s, leg.anchor, leg.table, found)  # type: ignore[union-attr]
-    elif kind is Hold:
-        found[:, :3] = leg.position  # type: ignore[union-attr]
-    elif kind is Creep:
+    # by the very type: a leg of another type may mean something else
+    if type(leg) is Transfer:
+        _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
+    elif type(leg) is Run:
+        path = leg.path
+        _runs(times_s, leg.anchor, path.table, path.pieces, path.duration_s, path.lead_s, asked, found)
+    elif type(leg) is Pass:
+        _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
+    elif type(leg) is Hold:
+        found[:, :3] = leg.position
+    elif type(leg) is Creep:
         for j in range(3):
-            found[:, j] = leg.begin[j] + times_s * leg.velocity[j]  # type: ignore[union-attr]
-        found[:, 3:6] = leg.velocity  # type: ignore[union-attr]
+            found[:, j] = leg.begin[j] + times_s * leg.velocity[j]
+        found[:, 3:6] = leg.velocity
     else:
         for k, t in enumerate(times_s.tolist()):
-            found[k] = np.ravel(leg.jet(t))
+            found[k] = np.ravel(asked_jet(leg, t) if asked else leg.jet(t))
+    return found
+
+
+def jets_ahead(flight: Flight, times_s: Floats) -> Floats:
+    """(n, 21) `autopilot.flight.jet_ahead` at n times (s into the present leg), which do not decrease."""
+    found = np.zeros((len(times_s), COLUMNS))
+    chain = [flight.legs[0]]
+    for after in (*flight.legs[1:], *flight.following):
+        if after.control_mode != chain[0].control_mode:
+            break
+        chain.append(after)
+    begin, t = 0, times_s
+    for i, leg in enumerate(chain):
+        end = len(times_s)
+        if i + 1 < len(chain):
+            end = begin + int(np.searchsorted(t, leg.duration_s, side="left"))
+            found[begin:end] = jets(leg, t[: end - begin])
+            t = t[end - begin :] - leg.duration_s
+            begin = end
+        else:
+            found[begin:end] = jets(leg, t)
     return found

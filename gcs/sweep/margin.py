@@ -19,7 +19,7 @@ from autopilot.actuation import Actuation, advance, steady
 from autopilot.control.records import Reference, State, Vehicle
 from autopilot.flight_core import Setup
 from autopilot.geometry.linear import E1, ZERO, Vec3
-from autopilot.observer import nominal
+from autopilot.observer import aloft
 from autopilot.onboard import build_setup
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
@@ -139,7 +139,7 @@ def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
     vehicle, law = setup.vehicle, setup.law
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
-    observed = nominal(vehicle)._replace(support=0.0)
+    observed = aloft(vehicle)
     rows = setup.actuation.whole + 2  # of the queue; later ones are not looked at
     hover = np.zeros(MOTION)
 

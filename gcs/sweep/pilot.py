@@ -16,10 +16,11 @@ from autopilot.control import lqr, quad_position, thesis
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO
 from autopilot.laws import Law, LqrLaw, Memory, PlumblineLaw, PlumblineMemory, ThesisLaw
 from autopilot.mixer import MixerResult, mix
 from autopilot.observer import Observed, ObserverConstants, observe
-from autopilot.plumbline_tick import ahead_of, hastened, load_position_tick
+from autopilot.plumbline_tick import SlackConstants, load_position_tick, quad_position_tick
 
 FUSED_LAWS = (ThesisLaw, LqrLaw, PlumblineLaw)
 
@@ -66,7 +67,7 @@ def thesis_quad_position(
 ) -> tuple[Any, Command]:
     """`ThesisLaw.quad_position`."""
     return quad_position.quad_position(
-        memory, state, reference, 0.0, law.position_gains, law.gains, law.filters, law.vehicle
+        memory, state, reference, 0.0, ZERO, law.position_gains, law.gains, law.filters, law.vehicle
     )
 
 
@@ -125,9 +126,12 @@ def _quad_position(law: Any, memory: Any, state: Any, reference: Any, actuation:
         def of_plumbline(
             law: Any, memory: Any, state: Any, reference: Any, actuation: Any, observed: Any
         ) -> Any:
-            ahead = ahead_of(state, 0.0, actuation, observed, law.constants)
-            other, wanted = thesis_quad_position(law.other_modes, memory.other_modes, ahead.state, reference)
-            return PlumblineMemory(memory.position, other), hastened(wanted, ahead, law.constants)
+            others = law.other_modes
+            slack = SlackConstants(others.position_gains, others.gains, others.filters)
+            other, command = quad_position_tick(
+                memory.other_modes, state, reference, actuation, observed, law.constants, slack
+            )
+            return PlumblineMemory(memory.position, other), command
 
         return of_plumbline
     return None

@@ -215,7 +215,7 @@ def make_plan(
 
 def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
     try:
-        simulated = sim_parameters(load_truth(vehicle))
+        world = sim_parameters(load_truth(vehicle))
         table = autopilot_parameters(load_belief(vehicle))
     except ValueError as error:
         raise PlanError(str(error)) from None
@@ -226,11 +226,11 @@ def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
             )
         if name == "CTL_LAW":
             raise PlanError("CTL_LAW is what --law says; give --law instead")
-        holder = simulated if name.startswith("SIM_") and name in simulated else table
+        holder = world if name.startswith("SIM_") and name not in table else table
         try:
             holder.set(name, value)
             if name == "SIM_RATE_HZ":
-                settings_of(simulated)
+                settings_of(world)
         except ParameterError as error:
             raise PlanError(str(error)) from None
 

@@ -60,6 +60,9 @@ class WorldModel(NamedTuple):
     wind: Vec3  # mean, ENU, m/s
     gust_std: float  # m/s
     gust_tau_s: float
+    pulse: Vec3  # ENU, m/s
+    pulse_at_us: int  # negative: never
+    pulse_for_us: int
 
 
 class World(NamedTuple):
@@ -209,10 +212,14 @@ def tick(world: World, forces: Rotors, model: WorldModel, buffers: Buffers) -> W
         last[1 + i] = forces[i]
     ring[1] += 1
     wind, gusting = model.wind, world.gust
+    if model.pulse_at_us >= 0 and model.pulse_at_us <= now_us < model.pulse_at_us + model.pulse_for_us:
+        wind = add(wind, model.pulse)
+    else:
+        wind = add(wind, ZERO)
     if model.gust_std != 0.0:
         normals = gaussian(Noise(model.seed, _GUSTS, world.tick, 1.0), 0)
         gusting = gust(gusting, model.gust_std, model.gust_tau_s, model.tick_us / 1000000, normals)
-        wind = add(model.wind, gusting)
+        wind = add(wind, gusting)
     plant, command = world.plant, world.command
     while now_us < end_us:
         while ring[1] > 0 and commands[ring[0], 0] <= now_us:
@@ -276,6 +283,9 @@ def new_world(
         settings.wind,
         settings.gust_std,
         settings.gust_tau_s,
+        settings.pulse,
+        settings.pulse_at_us,
+        settings.pulse_for_us,
     ]
     model = WorldModel(*parts)
     clock = np.zeros((SENSORS, 9), dtype=np.int64)

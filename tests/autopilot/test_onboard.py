@@ -18,7 +18,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, Takeoff, Waypoint
 
-from .conftest import ACCEPTED, GCS, TICK_S, Craft
+from .conftest import ACCEPTED, GCS, TICK_S, Craft, at_phase
 
 DENIED = mavlink.MAV_RESULT_DENIED
 TICK_US = round(TICK_S * 1e6)
@@ -190,11 +190,11 @@ def test_a_parameter_set_in_flight_is_flown_with_at_once() -> None:
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
     setup = craft.onboard._setup
-    name, kind = b"NGC_KX", mavlink.MAV_PARAM_TYPE_REAL32
+    name, kind = b"QP_KX", mavlink.MAV_PARAM_TYPE_REAL32
     craft.send(mavlink.MAVLink_param_set_message(1, 1, name, 5.0, kind))
     craft.tick()
     assert craft.onboard._setup is not setup
-    assert craft.onboard._setup.law.gains.k_x == (5.0, 5.0, 5.0)
+    assert craft.onboard._setup.law.other_modes.position_gains.k_x[0] == 5.0
     assert craft.onboard._setup.control_every == setup.control_every
     craft.wait(1.0)
     assert craft.flight.phase == Phase.MISSION
@@ -235,3 +235,31 @@ def test_arming_waits_for_the_estimate_and_says_so() -> None:
     texts = [m.text for m in messages if m.get_type() == "STATUSTEXT"]
     assert texts == ["Arming denied: no vehicle pose from a tracker"]
     assert ACCEPTED == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_a_reboot_is_handed_to_the_simulator_and_both_begin_anew() -> None:
+    craft = Craft(Takeoff(1.0), Land())
+    craft.begin()
+    craft.wait(1.0)
+    reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    assert craft.command(reboot, 1.0) == mavlink.MAV_RESULT_DENIED, "armed"
+    craft.run(at_phase(Phase.DISARMED))
+    assert craft.command(reboot, 1.0) == ACCEPTED
+    craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
+    for _ in range(3):  # the answer that asks, and the ticks of the new world
+        answer = craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
+        if answer is not None:
+            craft.simulator.receive(answer)
+        craft.simulator.advance()
+    assert craft.simulator.now_us < 20_000
+    for _ in range(4):
+        craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
+    assert craft.onboard.out_of_time >= 3, "by which the shell knows that it is to begin anew too"
+
+
+def test_a_vehicle_whose_sensors_are_silent_still_says_that_it_is_there() -> None:
+    craft = Craft(Takeoff(1.0), Land())
+    craft.begin()
+    (received,), _ = decode(craft.onboard.stranded_heartbeat(GCS))
+    assert received.message.system_status == mavlink.MAV_STATE_EMERGENCY
+    assert received.message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED

@@ -152,3 +152,12 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     again = table()
     Storage(tmp_path).load_parameters(again)
     assert again["NGC_KX"] == 5.0
+
+
+def test_a_directory_serves_one_autopilot_at_a_time(tmp_path: Path) -> None:
+    first, second = Storage(tmp_path), Storage(tmp_path)
+    first.lock()
+    with pytest.raises(StorageError, match="another autopilot keeps its mission and parameters there"):
+        second.lock()
+    del first
+    second.lock()

@@ -30,19 +30,23 @@ tauten    land                   set_down
 lift      legs done              hold
 lift      hold                   hold
 lift      land                   lower
+lift      load on the ground     set_down
 hold      hold                   hold
 hold      fly the mission        mission
 hold      return                 return
 hold      land                   lower
+hold      load on the ground     set_down
 mission   legs done              hold
 mission   hold                   hold
 mission   fly the mission        mission
 mission   return                 return
 mission   land                   lower
+mission   load on the ground     set_down
 return    legs done              lower
 return    hold                   hold
 return    fly the mission        mission
 return    land                   lower
+return    load on the ground     set_down
 lower     load on the ground     set_down
 lower     hold                   hold
 lower     fly the mission        mission

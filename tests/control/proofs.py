@@ -403,6 +403,7 @@ def hover_asks_for_weight_alone(laws: SimpleNamespace, model: SimpleNamespace, v
                 state,
                 Reference(quad_jet, b1_d),
                 vehicle.load_mass,
+                (0.0, 0.0, 0.0),
                 laws.QUAD_POSITION_GAINS,
                 gains,
                 filters,
@@ -490,7 +491,7 @@ def errors_reach_the_command(laws: SimpleNamespace, model: SimpleNamespace, vehi
     close(command.e_v, state.v_load, EXACT)
     reference = Reference((x_d, v_d, zero, zero, zero, zero, zero), (1.0, 0.0, 0.0))
     command = laws.quad_position(
-        memory, state, reference, 0.0, laws.QUAD_POSITION_GAINS, gains, filters, vehicle
+        memory, state, reference, 0.0, (0.0, 0.0, 0.0), laws.QUAD_POSITION_GAINS, gains, filters, vehicle
     )[1]
     close(command.e_x, np.subtract(state.x_quad, x_d), EXACT)
     close(command.e_v, np.subtract(state.v_quad, v_d), EXACT)

@@ -116,6 +116,7 @@ def fly(
                 state,
                 reference,
                 vehicle.load_mass,
+                (0.0, 0.0, 0.0),
                 quad_position.QUAD_POSITION_GAINS,
                 gains,
                 filters,

@@ -70,7 +70,7 @@ def test_compiled_laws_are_the_plain_ones_to_the_bit(
             memory, second = room.load_attitude(memory, state, down, heading, 5.0, gains, filters, bebop)
             memory, third = room.quad_attitude(memory, state, level, 5.0, gains, filters, bebop)
             memory, fourth = room.quad_position(
-                memory, state, reference, 0.1, position_gains, gains, filters, bebop
+                memory, state, reference, 0.1, zero, position_gains, gains, filters, bebop
             )
             memories[n] = memory
             mixed = room.mix(first.thrust, first.moment, bebop, 1.0)

@@ -236,7 +236,27 @@ def test_shipped_missions_are_listed():
 def test_check_says_that_it_can_be_flown():
     result = run("check", "square", "--json")
     assert result.exit_code == EXIT_DONE
-    assert json.loads(result.stdout) == {"mission": "square", "vehicle": "bebop", "violations": []}
+    told = json.loads(result.stdout)
+    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "paths": []}
+
+
+def test_check_tells_how_signals_will_be_flown():
+    told = json.loads(run("check", "case-a", "--json").stdout)
+    (path,) = told["paths"]
+    assert (path["item"], path["kind"]) == (2, "signals")
+    # measured 11.1 mm and 0.30 ... 1.64 N
+    assert 0.001 < path["distance_m"] < 0.013
+    assert 0.2 < path["rotor_low_n"] < path["rotor_high_n"] < 1.75
+
+
+def test_check_refuses_a_load_dragged_along_the_ground(tmp_path):
+    file = tmp_path / "low.toml"
+    file.write_text(
+        'title = "Low"\n[[items]]\ntype = "takeoff"\naltitude_m = 0.01\n[[items]]\ntype = "land"\n'
+    )
+    result = run("check", str(file))
+    assert result.exit_code == EXIT_ERROR
+    assert "0.01 m above the ground" in result.stdout
 
 
 # ---- a running vehicle

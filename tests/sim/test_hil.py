@@ -328,6 +328,24 @@ def test_a_cable_that_comes_taut_is_told_of(answerer, messages) -> None:
     assert 0 <= first_taut - snap.time_usec <= 4000  # truth goes out on every second tick
 
 
+def test_a_reboot_begins_anew_with_the_parameters_in_force(answerer, messages) -> None:
+    plain = answerer().fly(HilSimulator.build(seed=4, settings={"SIM_WIND_E": 2.0}), 100)
+    simulator = HilSimulator.build(seed=4)
+    answerer().fly(simulator, 60)
+    set_parameter(simulator, answerer, "SIM_WIND_E", 2.0)
+    answerer().fly(simulator, 20)
+    pilot = answerer()
+    reboot = mavlink.MAVLink_command_long_message(1, 26, 246, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert simulator.receive(pilot.answer(simulator.now_us) + pilot.writer.frame(reboot))
+    simulator.advance()
+    assert simulator.now_us == 0
+
+    def without_sequence(datagrams: list[bytes]) -> list[str]:
+        return [str(message) for datagram in datagrams for message in messages(datagram)]
+
+    assert without_sequence(answerer().fly(simulator, 100)) == without_sequence(plain)
+
+
 def test_status_carries_what_the_shell_measured(answerer, messages) -> None:
     simulator = HilSimulator.build(lockstep=False)
     simulator.advance()

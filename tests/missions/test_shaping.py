@@ -1,0 +1,196 @@
+"""Shaped signals: within the bounds, near the asked path, without a jump, and ready in time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import acos, cos, inf, nextafter, pi, radians
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from missions.demand import Bounds, commanded, demand, slopes
+from missions.fileformat import load_mission
+from missions.model import Signals, Sine, Term
+from missions.optimise import NO_ROWS, Goal, Problem
+from missions.planning import AS_ASKED, REFUSE, SLOW_DOWN, Limits, prepare, slow_down, trouble_of
+from missions.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, shape, unshaped
+from missions.splines import Array, Basis
+from missions.survey import Body
+
+BODY = Body(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.02, 0.012)
+BOUNDS = Bounds(0.294, 1.666, 0.294, cos(radians(45.0)), 0.02)
+LIMITS = Limits(BODY, BOUNDS, True, 0.05, REFUSE, 1.5, 1.5, False)
+# samples of an optimisation are 10 ms apart, those here 1 ms: in between a bound may be passed by so much
+BETWEEN_N = 0.05
+
+
+def signals_of(name: str) -> Signals:
+    return next(step for step in load_mission(name).steps if isinstance(step, Signals))
+
+
+def edge(height: float, rise: float, axis: str = "y", by: float | None = None) -> Signals:
+    return Signals(rise + 4.0, (Term(axis, height, 0.0, rise, None, 0.0, (), by),))
+
+
+def along(shaped: Shaped, spacing: float = 1e-3) -> tuple[Array, Array, Array]:
+    """Times, jets of the flown path, positions of the asked one."""
+    times = np.arange(-shaped.lead_s, shaped.duration_s + shaped.tail_s, spacing)
+    return times, path_jets(shaped, times), asked_jets(shaped.table, shaped.duration_s, times)[0]
+
+
+def assert_within(shaped: Shaped, bounds: Bounds = BOUNDS) -> None:
+    _, jets, _ = along(shaped)
+    found = demand(jets, BODY)
+    asked = commanded(found, 1e-3, bounds.rotor_tau)
+    assert asked.max() <= bounds.rotor_high + BETWEEN_N
+    assert asked.min() >= bounds.rotor_low - BETWEEN_N
+    assert found[:, 4].min() >= bounds.tension_low - BETWEEN_N
+    assert found[:, 5].min() >= bounds.cos_tilt - BETWEEN_N
+
+
+def test_what_can_be_flown_is_flown_exactly_as_asked() -> None:
+    """Case B has a smooth envelope: nothing is to be changed."""
+    shaped = shape(signals_of("case-b"), BODY, BOUNDS)
+    _, jets, asked = along(shaped, 0.01)
+    assert len(shaped.pieces) == 0
+    assert (shaped.lead_s, shaped.tail_s, shaped.distance_m, shaped.reason) == (0.0, 0.0, 0.0, "")
+    assert np.array_equal(jets[0], asked)
+
+
+@pytest.mark.parametrize("name", ["case-a", "case-b-extended", "case-c"])
+def test_shipped_signals_keep_within_the_bounds_near_the_asked_path(name: str) -> None:
+    shaped = shape(signals_of(name), BODY, BOUNDS)
+    assert trouble_of(shaped, LIMITS) == ""
+    assert_within(shaped)
+    # measured: 11.1 mm where Case A is asked to be early, 0.2 mm elsewhere
+    assert shaped.distance_m < (0.013 if name == "case-a" else 0.001)
+
+
+def test_the_distance_told_is_the_greatest_there_is() -> None:
+    shaped = shape(signals_of("case-a"), BODY, BOUNDS)
+    _, jets, asked = along(shaped)
+    away = np.linalg.norm(jets[0] - asked, axis=1).max()
+    # the path bends by 3 m/s^2 within the millisecond between two samples
+    assert shaped.distance_m == pytest.approx(away, abs=1e-5)
+
+
+def test_case_a_arrives_as_it_is_asked_and_waits_until_it_begins() -> None:
+    step = signals_of("case-a")
+    shaped = shape(step, BODY, BOUNDS)
+    times, jets, _ = along(shaped)
+    y = jets[0][:, 1]
+    by = step.terms[0].rise_90_by_s
+    assert by is not None
+    assert times[np.argmax(y >= 0.9 * 0.25)] <= by + 1e-3
+    assert np.abs(y[times <= 0.0]).max() <= HELD_M
+    # measured 1.3 %
+    assert y.max() <= 1.03 * 0.25
+    free = shape(replace(step, terms=(replace(step.terms[0], rise_90_by_s=None),)), BODY, BOUNDS)
+    times, jets, _ = along(free)
+    # of the half-sine itself, to the width of the window
+    assert times[np.argmax(jets[0][:, 1] >= 0.225)] == pytest.approx(0.79 * acos(-0.8) / pi, abs=3e-3)
+    assert free.distance_m < 0.003
+
+
+def test_a_shaped_path_has_no_jump_up_to_the_sixth_derivative() -> None:
+    for name in ("case-a", "case-c"):
+        shaped = shape(signals_of(name), BODY, BOUNDS)
+        joints = np.unique(shaped.pieces[:, :2])
+        sides = [path_jets(shaped, np.array([nextafter(t, -inf), t])) for t in joints]
+        jumps = np.max([np.abs(s[:, 1] - s[:, 0]).max(axis=1) for s in sides], axis=0)
+        # coefficients are tens of metres to sixteen digits; each derivative divides by an interval
+        assert (jumps <= 1e-10 / INTERVAL_S ** np.arange(7)).all(), jumps
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    height=st.floats(0.02, 1.0),
+    rise=st.floats(0.5, 3.0),
+    axis=st.sampled_from("xyz"),
+    down=st.booleans(),
+)
+def test_any_step_is_within_the_bounds_or_said_not_to_be(
+    height: float, rise: float, axis: str, down: bool
+) -> None:
+    shaped = shape(edge(-height if down else height, rise, axis), BODY, BOUNDS)
+    times, jets, _ = along(shaped)
+    if not shaped.reason:
+        assert_within(shaped)
+        assert np.abs(jets[0][times <= 0.0]).max() <= HELD_M + 1e-4
+        assert jets[0][-1] == pytest.approx(path_jets(shaped, times[-1:] + 1.0)[0, 0], abs=1e-3)
+    # what takes a second for a quarter of a metre is gentle: it must not be refused
+    if height <= 0.25 * rise**2:
+        assert trouble_of(shaped, LIMITS) == ""
+
+
+def test_preparation_slows_refuses_or_flies_as_asked() -> None:
+    hasty = edge(1.0, 0.5)
+    for choice in (AS_ASKED, SLOW_DOWN, REFUSE):
+        prepared = prepare((hasty,), (3,), LIMITS._replace(when_infeasible=choice))
+        (made,) = prepared.made
+        assert isinstance(made, Shaped)
+        assert "3" in prepared.notes[0]
+        assert bool(prepared.refusal) == (choice == REFUSE)
+        if choice == SLOW_DOWN:
+            assert made.slowed > 1.0
+            assert made.duration_s == pytest.approx(made.slowed * hasty.duration_s)
+            assert_within(made)
+        else:
+            assert len(made.pieces) == 0
+
+
+def test_slowing_down_is_no_slower_than_it_must_be() -> None:
+    hasty = edge(1.0, 0.7)
+    slowed = slow_down(hasty, LIMITS)
+    assert slowed is not None
+    assert trouble_of(slowed, LIMITS) == ""
+    # the search ends within a few percent
+    quicker = edge(1.0, 0.7 * slowed.slowed * 0.93)
+    assert trouble_of(shape(quicker, BODY, BOUNDS), LIMITS) != ""
+
+
+def test_a_swing_beyond_the_rotors_is_named() -> None:
+    waves = Term("z", 0.4, 0.0, 10.0, 5.0, 10.0, (Sine(1.5),))
+    shaped = shape(Signals(25.0, (waves,)), BODY, BOUNDS)
+    assert "too much" in shaped.reason or "exceeds what can be flown" in shaped.reason
+
+
+def test_without_shaping_the_asked_path_is_flown() -> None:
+    step = signals_of("case-a")
+    (made,) = prepare((step,), (0,), LIMITS._replace(shaped=False)).made
+    assert made == replace(unshaped(step), table=made.table, pieces=made.pieces)  # type: ignore[union-attr]
+
+
+def test_the_slopes_of_the_demand_are_its_derivatives() -> None:
+    rng = np.random.default_rng(3)
+    sizes = np.array([1.0, 1.0, 1.0, 5.0, 30.0, 200.0, 2000.0])
+    jets = rng.normal(size=(7, 5, 3)) * sizes[:, None, None]
+    change = rng.normal(size=(7, 5, 3)) * sizes[:, None, None] * 1e-5
+    found = np.einsum("irod,oid->ir", slopes(jets, BODY), change)
+    true = 0.5 * (demand(jets + change, BODY) - demand(jets - change, BODY))
+    # central differences of second order, steps of 1e-5 of the size
+    assert found == pytest.approx(true, rel=1e-4, abs=1e-7)
+
+
+def test_the_quadratic_programme_is_the_least_squares_solution_where_nothing_binds() -> None:
+    """The same cost, minimised by dense least squares over all free coefficients."""
+    basis = Basis(0.0, 0.8, 20)
+    fixed = basis.ends(np.zeros((7, 3)), np.vstack([[0.0, 0.01, 0.0], np.zeros((6, 3))]))
+    times = np.linspace(0.0, 0.8, 4 * 20 + 1)
+    target = np.zeros((81, 3))
+    target[:, 1] = 0.01 * np.clip((times - 0.2) / 0.4, 0.0, 1.0)
+    goal = Goal(target, 1e6, ((6, 1e-7),))
+    wide = Bounds(-inf, inf, -inf, -2.0, 0.0)
+    solution = Problem(basis, fixed, BODY, wide, goal, NO_ROWS).solve()
+    values, first = basis.band(times, 7)
+    dense = np.zeros((7, 81, basis.count))
+    for order in range(7):
+        for i, begin in enumerate(first):
+            dense[order, i, begin : begin + 10] = values[order, i]
+    rows = np.vstack([1e3 * dense[0], 1e-3 * np.sqrt(0.1) * dense[6]])
+    aim = np.vstack([1e3 * target, np.zeros_like(target)])
+    best, *_ = np.linalg.lstsq(rows[:, basis.free], aim - rows @ fixed, rcond=None)
+    # of coefficients of 10 mm, by two solvers of a system of condition 1e8
+    assert solution.coefficients[basis.free] == pytest.approx(best, abs=1e-7)

@@ -1,0 +1,107 @@
+"""What may be swept, and in which order it is flown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gcs.sweep.plan import Plan, PlanError, Varied, from_json, load_plan, make_plan, read_varied, store_plan
+
+
+def test_ranges_and_lists() -> None:
+    assert read_varied("sim_noise_scale=0.5:4:8", False).values == (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
+    assert read_varied("SIM_DROP_PCT=0:0.3:4", False).values == (0.0, 0.1, 0.2, 0.3)
+    assert read_varied("SIM_SENS_LAT_MS=0,5,10", False) == Varied("SIM_SENS_LAT_MS", (0.0, 5.0, 10.0), False)
+    assert read_varied("SIM_SENS_LAT_MS=0:10", True) == Varied("SIM_SENS_LAT_MS", (0.0, 10.0), True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "SIM_WIND_E",
+        "=1,2",
+        "SIM_WIND_E=",
+        "SIM_WIND_E=1,x",
+        "SIM_WIND_E=1,,2",
+        "SIM_WIND_E=1,nan",
+        "SIM_WIND_E=2:1:3",
+        "SIM_WIND_E=1:2:1",
+        "SIM_WIND_E=1:2:2.5",
+        "SIM_WIND_E=1:2:3:4",
+        "SIM_WIND_E=1:2",
+    ],
+)
+def test_what_is_no_variation_is_refused_with_its_text(text: str) -> None:
+    with pytest.raises(PlanError, match=f"--vary {text}") as caught:
+        read_varied(text, False)
+    assert caught.value.exit_code == 2
+
+
+def planned(short: str, varied: list[Varied], settings: dict[str, float], sample: int = 0) -> Plan:
+    return make_plan(short, "bebop", "lab", ["thesis"], [1], varied, settings, sample)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("SIM_NOISE_SCAL", 1.0, "did you mean SIM_NOISE_SCALE"),
+        ("SIM_NOISE_SCALE", -1.0, "SIM_NOISE_SCALE"),
+        ("SIM_LOSS_PCT", 1.0, "ground link"),
+        ("CTL_LAW", 1.0, "--law"),
+        ("SIM_RATE_HZ", 300.0, "take one of"),
+        ("NGC_KX", 1e9, "NGC_KX"),
+    ],
+)
+def test_wrong_parameters_are_refused(short: str, name: str, value: float, says: str) -> None:
+    with pytest.raises(PlanError, match=says):
+        planned(short, [Varied(name, (value,), False)], {})
+    with pytest.raises(PlanError, match=says):
+        planned(short, [], {name: value})
+
+
+def test_wrong_combinations_are_refused(short: str) -> None:
+    wind = Varied("SIM_WIND_E", (1.0, 2.0), False)
+    with pytest.raises(PlanError, match="twice"):
+        planned(short, [wind, wind], {})
+    with pytest.raises(PlanError, match="varied and set"):
+        planned(short, [wind], {"SIM_WIND_E": 1.0})
+    with pytest.raises(PlanError, match="there is none"):
+        planned(short, [], {}, sample=3)
+    with pytest.raises(PlanError, match="nowhere"):
+        make_plan("nowhere", "bebop", "lab", ["thesis"], [1], [], {}, 0)
+
+
+def test_every_setting_is_flown_with_every_law_and_seed(short: str) -> None:
+    varied = [Varied("SIM_WIND_E", (1.0, 2.0), False), Varied("NGC_KX", (5.0, 6.0, 7.0), False)]
+    plan = make_plan(short, "bebop", "lab", ["thesis", "lqr"], [1, 2], varied, {"SIM_WIND_N": 1.0}, 0)
+    cases = list(plan.cases())
+    assert [case.index for case in cases] == list(range(plan.flights)) and plan.flights == 24
+    assert len({(case.law, case.seed, case.varied) for case in cases}) == 24
+    conditions = plan.conditions(cases[-1])
+    assert conditions.seed == 2
+    assert conditions.settings == {"SIM_WIND_E": 2.0, "NGC_KX": 7.0, "SIM_WIND_N": 1.0, "CTL_LAW": 1.0}
+
+
+def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) -> None:
+    varied = [Varied("SIM_WIND_E", (1.0, 3.0), True), Varied("SIM_DROP_PCT", (0.0, 10.0), False)]
+    plan = planned(short, varied, {}, sample=40)
+    cases = list(plan.cases())
+    wind = sorted(case.varied[0] for case in cases)
+    # one in each fortieth of the range: that is what makes it a Latin hypercube
+    assert [int((value - 1.0) / 2.0 * 40) for value in wind] == list(range(40))
+    assert sorted(case.varied[1] for case in cases) == [0.0] * 20 + [10.0] * 20
+    assert list(from_json(plan.to_json()).cases()) == cases
+
+
+def test_a_directory_holds_one_plan(plan: Plan, tmp_path: Path) -> None:
+    store_plan(tmp_path, plan, "gcs sweep", "1", "code")
+    store_plan(tmp_path, plan, "gcs sweep again", "1", "code")
+    assert load_plan(tmp_path) == plan
+    other = Plan(plan.mission, "bebop", "lab", ("lqr",), (1,), (), ())
+    with pytest.raises(PlanError, match="another sweep"):
+        store_plan(tmp_path, other, "gcs sweep", "1", "code")
+    with pytest.raises(PlanError, match="other code"):
+        store_plan(tmp_path, plan, "gcs sweep", "1", "changed")
+    with pytest.raises(PlanError, match="no sweep"):
+        load_plan(tmp_path / "empty")
