@@ -35,7 +35,6 @@ class ActuationConstants(NamedTuple):
 
     whole: int  # n, whole periods in the delay
     late: float  # c, s
-    rest: float  # T - c, s
     lag: float  # tau, s
     kept_late: float  # share of the way left after c: exp(-c / tau)
     kept_rest: float  # after T - c
@@ -64,7 +63,6 @@ def actuation_constants(delay: float, lag: float, period: float) -> ActuationCon
     return ActuationConstants(
         whole,
         late,
-        period - late,
         lag,
         kept(late),
         kept(period - late),

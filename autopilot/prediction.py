@@ -154,17 +154,18 @@ def predict(
         m = _glide(m, at, row, constants.kept_half, period, taut, push, drag, vehicle)
         thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept)
     x_load, v_load, x_quad, v_quad = state.x_load, state.v_load, m.x, m.v
+    q, q_dot = state.q_cable, state.q_cable_dot
     if taut > 0.0:
         L = vehicle.cable_length
-        x_load, v_load = m.x, m.v
+        x_load, v_load, q, q_dot = m.x, m.v, m.q, m.q_dot
         # what the estimate says the cable's ends are apart stays
         x_quad = add(state.x_quad, sub(sub(m.x, state.x_load), scale(L, sub(m.q, state.q_cable))))
         v_quad = add(state.v_quad, sub(sub(m.v, state.v_load), scale(L, sub(m.q_dot, state.q_cable_dot))))
     ahead = State(
         x_load,
         v_load,
-        m.q,
-        m.q_dot,
+        q,
+        q_dot,
         x_quad,
         v_quad,
         rotation_from_quat(m.quat),

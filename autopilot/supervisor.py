@@ -380,8 +380,9 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             flight = replace(flight, taut_length_m=norm(sub(view.x_quad, view.x_load)))
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
         flight = _over_load(flight, view)
-    if flight.phase == P.TAUTEN and len(flight.legs) == 1:
-        if flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(flight, settings):
+        if len(flight.legs) == 1 and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
+            flight, settings
+        ):
             text = "Cable never taut, landing; check VEH_CABLE_LEN"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
     if flight.phase in (P.LOWER, P.SET_DOWN):

@@ -10,7 +10,6 @@
 | k_x, k_v       | k_x, k_v      | `design` | N/m, N s/m | (3-43)   |
 | e_i, k_i       | integral, k_i | `design` | m s, N/m/s | e_i' = e_x |
 | F              | F             |          | N          | (3-31)   |
-| F_d            | F_d           |          | N          | m (x_d'' + g e_3) - m_Q L q_d'' |
 | f, f'          | thrust, thrust_rate |    | N, N/s     | (3-35)   |
 | D              | air           | `PLB_DRAG`, `PLB_DRAG_2` | N | drag and wind on the vehicle |
 
@@ -20,9 +19,9 @@ What the thesis filters is computed here:
 * q_c' and q_c'' are those of (3-42) along the motion of the model under the thrust that the rotors give now
   (`load_motion`, `direction_jet`), feedback and all.
 * F' and F'' are differences of F along the motion of the model, under the thrust and moment that the rotors
-  give now; of the thrust's second derivative only what the reference asks for is counted. Near hover F
-  depends on load and cable alone, F' on the attitude, F'' on the body rate besides: so the poles are those of
-  the three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
+  give now, whose own second derivative is left out: on the path F hardly depends on it. Near hover F depends
+  on load and cable alone, F' on the attitude, F'' on the body rate besides: so the poles are those of the
+  three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
 * The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
   count.
 * f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
@@ -64,9 +63,8 @@ from autopilot.geometry.linear import (
     sub,
     times,
 )
-from autopilot.geometry.s2 import normalise, unit_derivatives
+from autopilot.geometry.s2 import normalise
 from autopilot.geometry.so3 import exp
-from missions.flatness import unit_derivatives_4
 
 STEP = 2e-3  # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
 
@@ -128,27 +126,6 @@ PLUMBLINE_GAINS = PlumblineGains(
 def start() -> PlumblineMemory:
     """Memory of a law that begins now: the thrust is taken for steady."""
     return PlumblineMemory(0.0, (0.0, 0.0, 0.0))
-
-
-@kernel
-def flat_force(jet: Jet, vehicle: Vehicle) -> tuple[Vec3, Vec3, Vec3]:
-    """F_d, F_d', F_d'' (N, N/s, N/s^2): the force that flies the load along the jet exactly.
-
-    The weight at rest where the jet asks for free fall, which has no such force.
-    """
-    mass = vehicle.quad_mass + vehicle.load_mass
-    reach = vehicle.quad_mass * vehicle.cable_length
-    pull: Vec3 = (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity)
-    if mass * norm(pull) < _LEAST_FORCE:
-        zero: Vec3 = (0.0, 0.0, 0.0)
-        return (0.0, 0.0, mass * vehicle.gravity), zero, zero
-    # q_d = -u
-    _, _, u2, u3, u4 = unit_derivatives_4(pull, jet[3], jet[4], jet[5], jet[6])
-    return (
-        axpy(reach, u2, scale(mass, pull)),
-        axpy(reach, u3, scale(mass, jet[3])),
-        axpy(reach, u4, scale(mass, jet[4])),
-    )
 
 
 @kernel
@@ -265,7 +242,8 @@ def force_beside(
     state: State,
     motion: LoadMotion,
     turning: Vec3,
-    rotors: Vec3,
+    f: float,
+    f_dot: float,
     jet: Jet,
     e_i: Vec3,
     h: float,
@@ -274,12 +252,10 @@ def force_beside(
     push: Vec3,
     vehicle: Vehicle,
 ) -> Vec3:
-    """F, N, as it will be h seconds later; `rotors` are f, f', f''."""
-    f, f_dot, f_ddot = rotors
+    """F, N, as it will be h seconds later, while the thrust f (N) changes by f' (N/s)."""
     then = shifted_state(state, motion, turning, h, vehicle)
     air = add(air_force(then.v_quad, drag), push)
-    thrust = f + h * f_dot + 0.5 * h * h * f_ddot
-    moved = load_motion(then, thrust, f_dot + h * f_ddot, air, vehicle)
+    moved = load_motion(then, f + h * f_dot, f_dot, air, vehicle)
     e_x, e_v = sub(state.x_load, jet[0]), sub(state.v_load, jet[1])
     summed = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
     return wanted_force(then, moved, air, shifted_jet(jet, h), summed, gains, vehicle).F
@@ -312,14 +288,33 @@ def load_position(
     J, W = vehicle.inertia, state.omega_body
     torque = sub(moment, cross(W, times(J, W)))
     turning: Vec3 = (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
-    F_d, F_d_dot, F_d_ddot = flat_force(jet, vehicle)
-    u, u_dot, _ = unit_derivatives(F_d, F_d_dot, F_d_ddot)
-    rotors: Vec3 = (thrust, memory.thrust_rate, dot(u, F_d_ddot) + dot(u_dot, F_d_dot))
     F_after = force_beside(
-        state, motion, turning, rotors, jet, memory.integral, STEP, gains, drag, push, vehicle
+        state,
+        motion,
+        turning,
+        thrust,
+        memory.thrust_rate,
+        jet,
+        memory.integral,
+        STEP,
+        gains,
+        drag,
+        push,
+        vehicle,
     )
     F_before = force_beside(
-        state, motion, turning, rotors, jet, memory.integral, -STEP, gains, drag, push, vehicle
+        state,
+        motion,
+        turning,
+        thrust,
+        memory.thrust_rate,
+        jet,
+        memory.integral,
+        -STEP,
+        gains,
+        drag,
+        push,
+        vehicle,
     )
     F_dot = scale(0.5 / STEP, sub(F_after, F_before))
     F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))

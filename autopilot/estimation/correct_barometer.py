@@ -39,6 +39,7 @@ def correct_barometer(
             a.horizontal_slow,
             a.vertical_slow,
             a.reversion,
+            a.debt,
             a.field,
             a.magnetic_age,
             age,

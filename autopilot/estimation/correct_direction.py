@@ -1,8 +1,8 @@
 """Correction by the direction to the load as a camera or an encoder sees it, in body axes.
 
 With m = exp(c) R^T q, c the mounting error about the body's forward and left axes, the direction R exp(-c) m
-differs from q by its own error, by attitude x q and by (R c) x q. While the cable is slack the load lies on the
-ground: it is where the line of sight meets its height.
+differs from q by its own error, by attitude x q and by (R c) x q. While the cable is slack the load lies on
+the ground: it is where the line of sight meets its height.
 """
 
 from __future__ import annotations
@@ -95,7 +95,10 @@ def see_lying(
 def correct_direction(
     state: EstimatorState, history: History, reading: DirectionReading, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The state after the reading; `history` is corrected along with it. Ignored where a tracker sees the load."""
+    """The state after the reading; `history` is corrected along with it.
+
+    Ignored where a tracker sees the load.
+    """
     load = state.load
     if state.vehicle.source == NOBODY or load.source == TRACKER:
         return state

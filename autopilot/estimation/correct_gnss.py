@@ -58,8 +58,8 @@ STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
 ANYWHERE_STD = 100.0  # m: the first fix says where
 MAGNETIC_FRESH_S = 0.2
-# A slow error that returns to zero makes the best estimate of the place half of the first and half of the last
-# fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was, and be
+# A slow error that returns to zero makes the best estimate of the place half of the first and half of the
+# last fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was, be
 # carried by the velocities: so the drift is believed to return to zero ten times as slowly as it wanders.
 PLAIN_REVERSION = 0.1
 
@@ -90,6 +90,7 @@ def with_slow(aids: AidEstimate, horizontal: float, vertical: float, reversion: 
         horizontal,
         vertical,
         reversion,
+        aids.debt,
         aids.field,
         aids.magnetic_age,
         aids.barometer_age,
@@ -201,7 +202,10 @@ def fix_row(history: History, past: Past, k: int, n: int) -> None:
 def correct_gnss(
     state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The state after the fix; `history` is corrected along with it. Ignored where a tracker places the vehicle."""
+    """The state after the fix; `history` is corrected along with it.
+
+    Ignored where a tracker places the vehicle.
+    """
     if state.vehicle.source == TRACKER:
         return state
     state = heard(state, fix.age_s, SIZE)

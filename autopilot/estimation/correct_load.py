@@ -53,7 +53,7 @@ def update2(
 
 @kernel
 def placed(load: LoadEstimate, x_load: Vec3, v_load: Vec3, cov: Covariance2, age_s: float) -> LoadEstimate:
-    """A tracked load where its own filter has it; a slack cable's direction follows with the next prediction."""
+    """A tracked load where its own filter has it; the direction follows with the next prediction."""
     return LoadEstimate(
         x_load,
         v_load,
@@ -77,7 +77,7 @@ def placed(load: LoadEstimate, x_load: Vec3, v_load: Vec3, cov: Covariance2, age
 def start_load(
     state: EstimatorState, history: History, reading: LoadReading, tuning: EstimatorTuning
 ) -> EstimatorState:
-    """The load by itself where the reading has it; a cable long enough is found taut at the next prediction."""
+    """The load by itself where the reading has it; the next prediction finds whether it hangs."""
     measured = reading.velocity_std >= 0.0
     age = reading.age_s
     v_load = reading.v_load if measured else (0.0, 0.0, 0.0)

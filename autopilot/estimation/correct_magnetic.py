@@ -1,7 +1,7 @@
-"""Correction by a magnetometer: the heading alone. How strong the field is and how it dips need not be known.
+"""Correction by a magnetometer: the heading alone; strength and dip of the field need not be known.
 
-With u = R m the measured field in the world and e magnetic north, a small attitude error phi shows as the angle
-from e to u's level part, phi . (e3 - (u_z / |u_level|) e): a tilt feigns heading where the field is steep.
+With u = R m the measured field in the world and e magnetic north, a small attitude error phi shows as the
+angle from e to u's level part, phi . (e3 - (u_z / |u_level|) e): a tilt feigns heading in a steep field.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ def with_field(state: EstimatorState, field: Vec3, age: float) -> EstimatorState
             a.horizontal_slow,
             a.vertical_slow,
             a.reversion,
+            a.debt,
             field,
             age,
             a.barometer_age,

@@ -106,7 +106,7 @@ def start_by_pose(
     renew(history, V_QUAD, 3, (v[0], v[1], v[2], 0.0))
     renew(history, QUAT, 4, pose.quat_wxyz)
     begin(history)
-    load = moved_load(state.load, vehicle, history)
+    load = moved_load(state.load, vehicle, history, 0.0)
     return with_load(with_vehicle(state, vehicle, state.resets + 1.0), load, state.resets + 1.0)
 
 

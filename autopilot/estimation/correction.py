@@ -1,16 +1,16 @@
 """What all corrections share: the past a reading speaks of, rows of its Jacobian, and the state moved by it.
 
-A reading of `age` ago is a function of the errors of *then*; `row` wants them in errors of *now*. Errors move by
-x' = F x, and back over the age
+A reading of `age` ago is a function of the errors of *then*; `row` wants them in errors of *now*. Errors move
+by x' = F x, and back over the age
 
     attitude(then)  = attitude + age R gyro bias
     velocity(then)  = velocity - attitude x S + age R accel bias
     position(then)  = position - age velocity + attitude x D - age^2/2 R accel bias
     direction(then) = (1 + age^2 k / 2) direction - age rate,    k = q . f / L
 
-with f the specific force in the world, S its integral since then and D that of (s - then) f. S and D follow from
-the velocities and positions of then and now in the ring. Left out: the noise that came in since then, the turn
-of R within the age, and in the cable's direction what attitude and bias drive within the age.
+with f the specific force in the world, S its integral since then and D that of (s - then) f. S and D follow
+from the velocities and positions of then and now in the ring. Left out: the noise that came in since, the
+turn of R within the age, and in the cable's direction what attitude and bias drive within the age.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from autopilot.estimation.records import (
     ACROSS,
     ATTITUDE,
     BAROMETER,
+    CAMERA,
     DIRECTION,
     GNSS,
     GYRO_BIAS,
@@ -215,7 +216,7 @@ def with_aids(state: EstimatorState, aids: AidEstimate) -> EstimatorState:
 
 @kernel
 def heard(state: EstimatorState, age: float, size: int) -> EstimatorState:
-    """The state that keeps the ring corrected as far back as `age`, with an error state of at least `size`."""
+    """The state with its ring corrected as far back as `age` from now on, and at least `size` errors."""
     return EstimatorState(
         state.time_s,
         state.vehicle,
@@ -270,7 +271,7 @@ def load_at(load: LoadEstimate, age_s: float, rejected: float, source: float) ->
 
 
 @kernel
-def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History) -> LoadEstimate:
+def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, plain: float) -> LoadEstimate:
     """The cable moved by the correction in `error`; while taut the load is where it ends."""
     e = history.error
     along = cross(load.q_cable, load.across)
@@ -284,6 +285,9 @@ def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History) -
     if load.taut > 0.0:
         x_load = axpy(length, q, vehicle.x_quad)
         v_load = axpy(length, q_dot, vehicle.v_quad)
+    elif load.source == CAMERA and plain > 0.0:
+        # where it lies is known from the vehicle, which a plain receiver places no better than the load
+        x_load = add(x_load, (e[POSITION], e[POSITION + 1], 0.0))
     return LoadEstimate(
         x_load,
         v_load,
@@ -308,9 +312,10 @@ def inject(state: EstimatorState, history: History) -> EstimatorState:
     """The state moved by the correction in `error`, and the ring with it."""
     e, v, a = history.error, state.vehicle, state.aids
     turned = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
+    moved = (e[POSITION], e[POSITION + 1], e[POSITION + 2])
     shift = (e[GYRO_BIAS], e[GYRO_BIAS + 1], e[GYRO_BIAS + 2])
     vehicle = VehicleEstimate(
-        add(v.x_quad, (e[POSITION], e[POSITION + 1], e[POSITION + 2])),
+        add(v.x_quad, moved),
         add(v.v_quad, (e[VELOCITY], e[VELOCITY + 1], e[VELOCITY + 2])),
         quat_normalise(quat_multiply(turned, v.quat_wxyz)),
         sub(v.omega_body, shift),
@@ -331,6 +336,7 @@ def inject(state: EstimatorState, history: History) -> EstimatorState:
             a.horizontal_slow,
             a.vertical_slow,
             a.reversion,
+            add(a.debt, moved) if a.reversion < 1.0 else a.debt,
             a.field,
             a.magnetic_age,
             a.barometer_age,
@@ -340,7 +346,7 @@ def inject(state: EstimatorState, history: History) -> EstimatorState:
     return EstimatorState(
         state.time_s,
         vehicle,
-        moved_load(state.load, vehicle, history),
+        moved_load(state.load, vehicle, history, 1.0 if a.reversion < 1.0 else 0.0),
         aids,
         state.doubt,
         state.last_imu,

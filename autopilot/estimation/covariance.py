@@ -1,7 +1,7 @@
-"""The covariance of the error state: moved in time by its known sparsity, and narrowed by one scalar at a time.
+"""The covariance of the error state: moved in time by its known sparsity, narrowed by one scalar at a time.
 
-An error x of the state obeys x' = F x + noise. `transit` applies Phi = I + F dt to the rows of P, transposes and
-applies it again, Phi (Phi P)^T = Phi P Phi^T, so that each of the two passes runs along rows.
+An error x of the state obeys x' = F x + noise. `transit` applies Phi = I + F dt to the rows of P, transposes
+and applies it again, Phi (Phi P)^T = Phi P Phi^T, so that each of the two passes runs along rows.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from autopilot.estimation.records import (
     LoadReading,
     PoseReading,
 )
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.linear import Vec3, sub
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.wire.parameters import ParameterTable
 
@@ -122,14 +122,18 @@ def estimate(
 
 
 def control_state(state: EstimatorState) -> State:
-    """What the laws are told."""
-    vehicle, load = state.vehicle, state.load
+    """What the laws are told.
+
+    A plain receiver places the vehicle by metres, and every correction of its velocity moves the place by
+    decimetres at once: those are passed on over seconds, so that the load is not sent after them.
+    """
+    vehicle, load, debt = state.vehicle, state.load, state.aids.debt
     return State(
-        load.x_load,
+        sub(load.x_load, debt),
         load.v_load,
         load.q_cable,
         load.q_cable_dot,
-        vehicle.x_quad,
+        sub(vehicle.x_quad, debt),
         vehicle.v_quad,
         rotation_from_quat(vehicle.quat_wxyz),
         vehicle.omega_body,

@@ -41,10 +41,11 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on the ground, it is not known
-# For so long after the cable came taut a load that pulls less than this share of what hanging would is taken as
+# For so long after the cable came taut a load that pulls less than this share of a hanging one's is taken as
 # lying: the pendulum then means little.
 LIFTING_S, LIFTING_PULL = 4.0, 0.8
 LIFTING_ACCEL_STD = 5.0  # rad/s^2
+DEBT_TIME_S = 4.0  # in which a plain receiver's corrections are passed on
 SPEED_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
 LAID_WALK = 0.01  # m per square root of a second, of a load that lies where it was laid
 
@@ -223,10 +224,10 @@ def predict(
     if vehicle.source > 0.0:
         transit(history, motion, tuning, dt, state.size)
     if load.taut > 0.0:
-        load = predict_taut(load, vehicle, tuning, dt)
+        at_end = predict_taut(load, vehicle, tuning, dt)
     else:
-        load = predict_slack(load, vehicle, history, dt)
-    load = watch(load, vehicle, history, imu, thrust, tuning, dt)
+        at_end = predict_slack(load, vehicle, history, dt)
+    load = watch(at_end, vehicle, history, imu, thrust, tuning, dt)
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,
@@ -239,6 +240,7 @@ def predict(
             aids.horizontal_slow,
             aids.vertical_slow,
             aids.reversion,
+            scale(1.0 - dt / DEBT_TIME_S, aids.debt),
             aids.field,
             aids.magnetic_age + dt,
             aids.barometer_age + dt,

@@ -14,8 +14,8 @@ from autopilot.geometry.so3 import IDENTITY_QUAT, Quat
 Array = NDArray[np.float64]
 
 # The error state, all but the biases in world axes: position, velocity and attitude of the vehicle
-# (R = exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own two
-# axes: direction, rate, and its length. Flights with trackers alone need no more.
+# (R = exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own
+# two axes: direction, rate, and its length. Flights with trackers alone need no more.
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
 DIRECTION, RATE, LENGTH = 15, 17, 19
 TRACKED_SIZE = 20
@@ -110,7 +110,7 @@ class DirectionReading(NamedTuple):
 
 
 class EstimatorTuning(NamedTuple):
-    """What the estimator believes. Deviations of IMU and models are those of one sample, walks of a second."""
+    """What the estimator believes. Deviations of IMU and models are of one sample, walks of a second."""
 
     cable_length: float
     quad_mass: float
@@ -160,7 +160,7 @@ class VehicleEstimate(NamedTuple):
 
 
 class LoadEstimate(NamedTuple):
-    """Load and cable. While slack, `covariance` is that of load (position, velocity), the same on each axis."""
+    """Load and cable. While slack, `covariance` is that of load (position, velocity), alike on each axis."""
 
     x_load: Vec3
     v_load: Vec3
@@ -189,6 +189,7 @@ class AidEstimate(NamedTuple):
     horizontal_slow: float  # m, its standard deviation as last stated
     vertical_slow: float
     reversion: float  # 1 with carrier phase, else less: see `correct_gnss`
+    debt: Vec3  # m, of late corrections that those who fly by the estimate have yet to be told
     field: Vec3  # the magnetometer's last reading, body
     magnetic_age: float
     barometer_age: float
@@ -271,7 +272,7 @@ def blank_state() -> EstimatorState:
             rejected=0.0,
             source=NOBODY,
         ),
-        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, inf, inf, 0.0),
+        aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
         doubt=Doubt(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
         resets=0.0,

@@ -1,7 +1,7 @@
 """Whether the cable is taut, and what becomes of the error state when it comes taut or slack.
 
-Taut, the load is where the cable ends and its error that of vehicle and cable; slack, it is tracked or lies by
-itself. A tracked load tells by its distance. Else the pull tells: what the vehicle's acceleration leaves
+Taut, the load is where the cable ends and its error that of vehicle and cable; slack, it is tracked or lies
+by itself. A tracked load tells by its distance. Else the pull tells: what the vehicle's acceleration leaves
 of the believed thrust, m_Q (R a) - f R e3, along the cable.
 """
 
@@ -30,8 +30,8 @@ from autopilot.geometry.so3 import rotation_from_quat
 
 TAUT_ABOVE = 0.985  # share of the cable length at which a tracked load's slack cable counts as taut
 SLACK_BELOW = 0.965  # and at which a taut one counts as slack
-PULL_TAUT, PULL_SLACK = 0.4, 0.2  # share of the load's weight that must be felt, and that is too little
-PULL_TAUT_S, PULL_SLACK_S = 0.1, 0.15  # for how long
+PULL_TAUT, PULL_SLACK = 0.8, 0.2  # share of the load's weight that must be felt, and that is too little
+PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 PULL_DISTANCE = 0.75  # share of the cable length below which no pull is believed
 PULL_TIME_S = 0.04  # in which the felt pull is smoothed
 SEEN_S = 1.0  # a cable is not taken as taut while the load has not been seen for so long
@@ -79,8 +79,8 @@ def _with(load: LoadEstimate, taut: float, length: float, pull: float, pulled_s:
 
 @kernel
 def _tie(P: Array, first: int, of: int, across: Vec3, along: Vec3, d: float) -> None:
-    """Rows of b_i . (load - vehicle) / d, for a load whose error has nothing in common with the rest: what comes
-    in through the vehicle. `of` lies before `first`, so that the rows' own block finds what was just set."""
+    """Rows of b_i . (load - vehicle) / d, for a load whose error has nothing in common with the rest: what
+    comes in through the vehicle. `of` lies before `first`, so that the rows' own block finds what was set."""
     for j in range(SIZE):
         p0, p1, p2 = P[of, j], P[of + 1, j], P[of + 2, j]
         one = -(across[0] * p0 + across[1] * p1 + across[2] * p2) / d

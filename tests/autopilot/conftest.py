@@ -16,6 +16,7 @@ from autopilot.decisions import ACCEPTED as ACCEPTANCE
 from autopilot.decisions import decide, with_plan
 from autopilot.estimation.filter import Readings, estimate, estimator_tuning
 from autopilot.estimation.records import (
+    TRACKED_SIZE,
     EstimatorState,
     EstimatorTuning,
     ImuReading,
@@ -171,6 +172,7 @@ class Trace:
 
     t: Array
     states: list[EstimatorState] = field(default_factory=list)
+    covariances: list[Array] = field(default_factory=list)  # of the error state
 
     def of(self, what: Callable[[EstimatorState], Any]) -> Array:
         return np.array([what(state) for state in self.states])
@@ -220,6 +222,7 @@ def track(
             state, history, Readings(imu, tuple(poses), tuple(loads)), tuning, TICK_S if k else 0.0
         )
         trace.states.append(state)
+        trace.covariances.append(history.covariance[:TRACKED_SIZE, :TRACKED_SIZE].copy())
     return trace
 
 

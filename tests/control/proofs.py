@@ -495,6 +495,10 @@ def errors_reach_the_command(laws: SimpleNamespace, model: SimpleNamespace, vehi
     )[1]
     close(command.e_x, np.subtract(state.x_quad, x_d), EXACT)
     close(command.e_v, np.subtract(state.v_quad, v_d), EXACT)
+    pushed = laws.quad_position(
+        memory, state, reference, 0.0, (0.0, 0.0, 0.3), laws.QUAD_POSITION_GAINS, gains, filters, vehicle
+    )[1]
+    close(pushed.thrust, command.thrust - 0.3, EXACT)
 
 
 PROOFS: tuple[Any, ...] = (

@@ -1,0 +1,69 @@
+"""The gains of `plumbline`: they keep what is asked for, whatever the vehicle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from autopilot.control.design import Timing, Wanted, design, feedback, gains_of, level_axis
+from autopilot.control.records import Vehicle
+
+WANTED = Wanted(0.012, integral_ratio=0.2, cable_ratio=1.5, attitude_ratio=4.0, zeta=0.9, noise=1.0)
+# four times as heavy a vehicle, a longer cable
+HEAVY = Vehicle(2.0, 0.5, 2.0, (0.02, 0.022, 0.04), 9.81, 0.25, 0.02, 0.0, 10.0)
+
+
+def test_tolerance_is_what_was_asked_for_and_costs_bandwidth(bebop: Vehicle) -> None:
+    fastest = math.inf
+    for delay in (0.0, 0.012, 0.072):
+        found = design(WANTED, Timing(delay, 0.02, 0.01, 0.004), bebop)
+        assert found.tolerance == pytest.approx(0.012, rel=1e-3)
+        assert found.omega_R < fastest
+        fastest = found.omega_R
+        assert found.omega_R / found.omega_q == pytest.approx(4.0)
+        assert found.omega_q / found.omega_x == pytest.approx(1.5)
+    wider = design(WANTED._replace(tolerance=0.02), Timing(0.072, 0.02, 0.01, 0.004), bebop)
+    assert wider.omega_R < fastest
+
+
+def test_noise_takes_over_where_it_is_great(bebop: Vehicle) -> None:
+    timing = Timing(0.0, 0.02, 0.01, 0.004)
+    room = bebop.rotor_max - 0.25 * 0.5 * 9.81
+    found = design(WANTED._replace(noise=10.0), timing, bebop)
+    assert 3.0 * found.rotor_deviation == pytest.approx(room, rel=1e-3)
+    assert found.tolerance > 0.012
+    assert found.omega_R < design(WANTED, timing, bebop).omega_R
+
+
+@pytest.mark.parametrize("vehicle", ["bebop", "heavy"])
+def test_poles_are_those_of_the_three_loops(vehicle: str, bebop: Vehicle) -> None:
+    """Of the chain with the law's own gains, written down loop by loop."""
+    v = bebop if vehicle == "bebop" else HEAVY
+    omega_i, omega_x, omega_q, omega_R, zeta = 0.5, 2.5, 4.0, 15.0, 0.8
+    gains = gains_of(omega_i, omega_x, omega_q, omega_R, zeta, v)
+    m, reach, J = v.quad_mass + v.load_mass, v.quad_mass * v.cable_length, v.inertia[0]
+    A, b = level_axis(v, J, 0.01)
+    chain, b = A[:7, :7], np.append(np.zeros(6), 1.0 / J)
+    # rows that give q_c, then F / (m g) = theta_c, from the chain's state; each rate is a row times the chain
+    q_c = np.array([gains.k_i[0], gains.k_x[0], gains.k_v[0], 0.0, 0.0, 0.0, 0.0]) / (m * v.gravity)
+    e_q = np.eye(7)[3] - q_c
+    # m_Q L q'' = -F - m g q across the cable
+    wished = q_c @ chain @ chain - (gains.k_q * e_q + gains.k_omega * (e_q @ chain)) / reach
+    theta_c = -np.eye(7)[3] - reach / (m * v.gravity) * wished
+    e_R = np.eye(7)[5] - theta_c
+    u = J * (theta_c @ chain @ chain) - gains.k_R[0] * e_R - gains.k_Omega[0] * (e_R @ chain)
+    closed = np.poly(chain + np.outer(b, u))
+    expected = np.array([1.0, omega_i])
+    for omega in (omega_x, omega_q, omega_R):
+        expected = np.convolve(expected, [1.0, 2.0 * zeta * omega, omega * omega])
+    np.testing.assert_allclose(closed, expected, rtol=1e-6)
+    np.testing.assert_allclose(feedback(A, J, expected)[:7], -u, rtol=1e-6, atol=1e-9)
+
+
+def test_another_vehicle_gets_gains_of_its_own() -> None:
+    found = design(WANTED, Timing(0.02, 0.05, 0.02, 0.004), HEAVY)
+    assert found.tolerance == pytest.approx(0.012, rel=1e-3)
+    assert 3.0 * found.rotor_deviation < HEAVY.rotor_max - 0.25 * 2.5 * 9.81
+    assert found.gains.k_R[0] == pytest.approx(0.02 * found.omega_R**2)
