@@ -100,6 +100,8 @@ class LogService:
 
     def next_timer(self) -> int:
         """When `poll` has something to send, in us."""
+        if not self._clients:
+            return NEVER_US
         return min((client.due_us for client in self._clients.values() if client.waiting), default=NEVER_US)
 
     def poll(self, now_us: int) -> list[Output]:
