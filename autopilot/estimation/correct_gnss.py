@@ -59,8 +59,8 @@ STARTING_SPEED_STD = 0.2  # m/s
 ANYWHERE_STD = 100.0  # m: the first fix says where
 MAGNETIC_FRESH_S = 0.2
 # A slow error that returns to zero makes the best estimate of the place half of the first and half of the
-# last fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was, be
-# carried by the velocities: so the drift is believed to return to zero ten times as slowly as it wanders.
+# last fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was,
+# be carried by the velocities: so the drift is believed to return to zero ten times as slowly as it wanders.
 PLAIN_REVERSION = 0.1
 
 

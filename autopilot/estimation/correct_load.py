@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.estimation.correct_pose import REJECTIONS_BEFORE_RESET
+from autopilot.estimation.correct_pose import KNOCK_STD, REFUSED_BY_KNOCK, REJECTIONS_BEFORE_RESET
 from autopilot.estimation.correction import (
     Past,
     add_direction,
@@ -34,6 +34,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, dot, norm, scale, sub
 
 SLACK_FROM = 0.8  # share of the cable length below which a short distance is an outlier, not a slack cable
+REFUSED_BELOW = 0.98  # share below which readings that the pendulum does not explain show a slack cable
 SLACK_READINGS = 3.0  # that in a row must show a short distance
 REACH = 1.5  # cable lengths from the vehicle beyond which no load is believed
 
@@ -80,12 +81,27 @@ def start_load(
     """The load by itself where the reading has it; the next prediction finds whether it hangs."""
     measured = reading.velocity_std >= 0.0
     age = reading.age_s
-    v_load = reading.v_load if measured else (0.0, 0.0, 0.0)
+    was = state.load.v_load if state.load.source == TRACKER else (0.0, 0.0, 0.0)
+    v_load = reading.v_load if measured else was
     position_var = reading.position_std * reading.position_std
     rate_var = reading.velocity_std * reading.velocity_std if measured else 1.0
     cov = (position_var + age * age * rate_var, age * rate_var, rate_var)
     load = slacken(state.load, history, position_var, rate_var)
-    return with_load(state, placed(load, reading.x_load, v_load, cov, age), state.resets + 1.0)
+    x_load = axpy(age, v_load, reading.x_load)
+    return with_load(state, placed(load, x_load, v_load, cov, age), state.resets + 1.0)
+
+
+@kernel
+def knocked(load: LoadEstimate, history: History) -> LoadEstimate:
+    """The load whose velocity may have jumped."""
+    P = history.covariance
+    aa, ab, bb = load.covariance
+    knock = KNOCK_STD * KNOCK_STD
+    if load.taut > 0.0:
+        for i in range(2):
+            P[RATE + i, RATE + i] += knock / (load.length * load.length)
+        return load
+    return placed(load, load.x_load, load.v_load, (aa, ab, bb + knock), load.age_s)
 
 
 @kernel
@@ -97,6 +113,8 @@ def refuse_load(
     distance = norm(sub(reading.x_load, state.vehicle.x_quad))
     if load.rejected + 1.0 >= REJECTIONS_BEFORE_RESET and distance < REACH * tuning.cable_length:
         return start_load(state, history, reading, tuning)
+    if load.rejected + 1.0 == REFUSED_BY_KNOCK:
+        load = knocked(load, history)
     return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, TRACKER), state.resets)
 
 
@@ -168,7 +186,10 @@ def correct_load(
         off += innovation[i] * innovation[i] / (spread(history, n) + position_var)
     distance = norm(sub(reading.x_load, past.x_quad)) / tuning.cable_length
     short = SLACK_FROM < distance < SLACK_BELOW
-    if not off <= 3.0 * tuning.gate_sigma * tuning.gate_sigma or short:
+    refused = not off <= 3.0 * tuning.gate_sigma * tuning.gate_sigma
+    if refused or short:
+        # nearer the threshold the pendulum tells: it no longer is one
+        short = short or SLACK_FROM < distance < REFUSED_BELOW
         if short and load.rejected + 1.0 >= SLACK_READINGS:
             return start_load(state, history, reading, tuning)
         return refuse_load(state, history, reading, tuning)

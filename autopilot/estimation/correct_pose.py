@@ -44,6 +44,9 @@ from autopilot.geometry.linear import ZERO, sub
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 
 REJECTIONS_BEFORE_RESET = 50.0
+# A hard knock (the ground, a cable that comes taut) is over between two samples of the accelerometer: after
+# so many refusals the velocity may have changed by about so much, m/s.
+REFUSED_BY_KNOCK, KNOCK_STD = 4.0, 0.3
 STARTING_SPEED_STD = 1.0  # m/s, where no velocity is measured
 UNKNOWN_HEIGHT_STD = 1.0  # m, of the barometer's zero
 
@@ -133,6 +136,9 @@ def correct_pose(
     if not off <= 3.0 * tuning.gate_sigma * tuning.gate_sigma:
         vehicle = state.vehicle
         if vehicle.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
+            if vehicle.rejected + 1.0 == REFUSED_BY_KNOCK:
+                for i in range(3):
+                    history.covariance[VELOCITY + i, VELOCITY + i] += KNOCK_STD * KNOCK_STD
             refused = vehicle_at(vehicle, vehicle.age_s, vehicle.rejected + 1.0)
             return with_vehicle(state, refused, state.resets)
         return start_by_pose(state, history, pose, tuning)

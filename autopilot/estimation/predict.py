@@ -95,9 +95,10 @@ def predict_taut(
     q, q_dot = load.q_cable, load.q_cable_dot
     accel_quad = vehicle.accel_quad
     force = (accel_quad[0], accel_quad[1], accel_quad[2] + tuning.gravity)
-    q_ddot = axpy(-dot(q_dot, q_dot), q, scale(-1.0 / load.length, tangent(q, force)))
+    half = normalise(axpy(0.5 * dt, q_dot, q))  # as `force` is of half way
+    q_ddot = axpy(-dot(q_dot, q_dot), half, scale(-1.0 / load.length, tangent(half, force)))
     accel_load = axpy(load.length, q_ddot, accel_quad)
-    tension = max(0.0, -tuning.load_mass * (dot(q, accel_load) + tuning.gravity * q[2]))
+    tension = max(0.0, -tuning.load_mass * (dot(half, accel_load) + tuning.gravity * half[2]))
     q_next = normalise(axpy(0.5 * dt * dt, q_ddot, axpy(dt, q_dot, q)))
     rate = tangent(q_next, axpy(dt, q_ddot, q_dot))
     return LoadEstimate(

@@ -30,6 +30,9 @@ from autopilot.geometry.so3 import rotation_from_quat
 
 TAUT_ABOVE = 0.985  # share of the cable length at which a tracked load's slack cable counts as taut
 SLACK_BELOW = 0.965  # and at which a taut one counts as slack
+# A tracked load comes taut once its speed against the vehicle is known to this (m/s), or after a while: the
+# filter is linear in a direction that a wrong speed would soon turn far.
+SPEED_KNOWN, KNOWN_S = 0.2, 1.0
 PULL_TAUT, PULL_SLACK = 0.8, 0.2  # share of the load's weight that must be felt, and that is too little
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 PULL_DISTANCE = 0.75  # share of the cable length below which no pull is believed
@@ -150,7 +153,9 @@ def watch(
     distance = norm(sub(load.x_load, vehicle.x_quad))
     if load.source == TRACKER:
         load = _with(load, load.taut, load.length, pull, 0.0)
-        if load.taut == 0.0 and distance > TAUT_ABOVE * tuning.cable_length:
+        speed_var = load.covariance[2] + history.covariance[VELOCITY, VELOCITY]
+        known = speed_var < SPEED_KNOWN * SPEED_KNOWN or load.held_s > KNOWN_S
+        if load.taut == 0.0 and known and distance > TAUT_ABOVE * tuning.cable_length:
             return tauten(load, history, tuning, distance)
         return load
     weight = tuning.load_mass * tuning.gravity
