@@ -4,7 +4,6 @@ against the flat trajectory, its rotors against rotors, and what it flies.
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import math
 import sys
@@ -278,15 +277,15 @@ def on_the_path_it_asks_for_what_the_path_needs(
 def what_the_path_needs_across_is_not_bounded(
     law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 ) -> None:
-    """The reference's share is -m_Q L q_d'' across the cable, by differences; a weight at most, where its cable
-    whirls; nothing where it falls freely. On a path that asks for 2.3 N across, nothing is missing."""
+    """The reference's share is -m_Q L q_d'' across the cable, by differences; a weight at most, where its
+    cable whirls; nothing where it falls freely. On a path that asks for 2.3 N across, nothing is missing."""
     m_Q, m_L, L, J, g = vehicle[:5]
     weight = (m_Q + m_L) * g
     q = (0.0, 0.0, -1.0)
     path = 0.3 * np.random.default_rng(38).normal(size=(7, 3))
 
     def q_d(t: float) -> Any:
-        return -model.unit(np.array(polynomial(path, t)[2]) + [0.0, 0.0, g])
+        return -model.unit(np.add(polynomial(path, t)[2], [0.0, 0.0, g]))
 
     whirl = differences(q_d)[1]
     expected = -m_Q * L * np.array([whirl[0], whirl[1], 0.0])
@@ -444,14 +443,15 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
     gains, rate = GAINS._replace(k_i=(20.0, 20.0, 20.0)), 10.0
     rng = np.random.default_rng(34)
     h = 1e-3
-    for _ in range(3):
-        q = model.unit([0.03 * rng.normal(), 0.03 * rng.normal(), -1.0])
-        w = np.cross(q, 0.05 * rng.normal(size=3))
-        R = model.rodrigues(0.03 * rng.normal(size=3))
+    # the last swings and turns so that Omega' counts
+    for size, turning in ((1.0, 1.0), (1.0, 1.0), (6.0, 20.0)):
+        q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
+        w = np.cross(q, 0.05 * size * rng.normal(size=3))
+        R = model.rodrigues(0.03 * size * rng.normal(size=3))
         y0 = model.pack(
-            0.02 * rng.normal(size=3), 0.1 * rng.normal(size=3), q, w, R, 0.3 * rng.normal(size=3)
+            0.02 * rng.normal(size=3), 0.1 * rng.normal(size=3), q, w, R, 0.3 * size * rng.normal(size=3)
         )
-        M = 0.002 * rng.normal(size=3)
+        M = 0.002 * turning * rng.normal(size=3)
         reference = Reference((ZERO,) * 7, EAST)
         slid = 0.001 * rng.normal(size=3)
 
@@ -493,7 +493,7 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
         expected = attitude_moment(
             state.R, state.omega_body, rates, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
         )
-        # 1e-3 of what Omega_c' asks for: the truncation of differences over 2 ms
+        # ten times the truncation of differences over 2 ms
         agree(found.moment, np.array(expected.moment), 2e-4)
         drift = (np.array(memory.integral) - slid) / TICK
         agree(drift, np.array(state.x_load), ROUNDING)
