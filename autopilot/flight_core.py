@@ -33,7 +33,7 @@ from autopilot.observer import Observed, ObserverConstants, nominal, observe
 from autopilot.scheduler import is_due
 from autopilot.supervisor import advance
 
-HEIGHT_GAIN, CLIMB_GAIN = 6.0, 2.75  # N/m, N s/m: k_x and k_v of Table 4-3
+HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 by the mass of Table 4-1
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
 NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, neg(E3), IDENTITY)
 STOPPED = MixerResult((0.0, 0.0, 0.0, 0.0), 0, 0.0, ZERO)
@@ -198,5 +198,11 @@ def track(
 def held_height(setup: Setup, state: State, anchor: Vec3) -> float:
     """Upward force (N) that keeps the load at the anchor's height while an attitude is tracked."""
     vehicle = setup.vehicle
-    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
-    return vertical_force(state.x_load[2] - anchor[2], state.v_load[2], HEIGHT_GAIN, CLIMB_GAIN, weight)
+    mass = vehicle.quad_mass + vehicle.load_mass
+    return vertical_force(
+        state.x_load[2] - anchor[2],
+        state.v_load[2],
+        mass * HEIGHT_GAIN,
+        mass * CLIMB_GAIN,
+        mass * vehicle.gravity,
+    )

@@ -38,6 +38,11 @@ from autopilot.geometry.s2 import unit_derivatives
 
 # of the weight: what the errors may ask for, however great they are
 GREATEST_FEEDBACK = 0.5
+# of the weight: an upward part of A beyond _UPRIGHT is left alone, beneath _FALLING it is the mean of both: a
+# vehicle that falls with its load could not turn, and noise would decide where a short A points
+_UPRIGHT, _FALLING = 0.4, 0.1
+_LEAST_UPWARD = 0.5 * (_UPRIGHT + _FALLING)
+_BETWEEN = _UPRIGHT - _FALLING
 # N; a shorter A has no direction to follow
 _LEAST_FORCE = 1e-3
 
@@ -66,6 +71,25 @@ def saturated(v: Vec3, v_dot: Vec3, v_ddot: Vec3, limit: float) -> tuple[Vec3, V
 
 
 @kernel
+def held_up(A: Vec3, A_dot: Vec3, A_ddot: Vec3, weight: float) -> tuple[Vec3, Vec3, Vec3]:
+    """A force (N) whose upward part is a quarter of the weight (N) at least, with its derivatives: A itself
+    where that is 0.4 of the weight, with three steady derivatives in between."""
+    share = (A[2] - _FALLING * weight) / (_BETWEEN * weight)
+    if share >= 1.0:
+        return A, A_dot, A_ddot
+    t = max(share, 0.0)
+    t3 = t * t * t
+    upward = weight * (_LEAST_UPWARD + _BETWEEN * t3 * t * (2.5 - 3.0 * t + t * t))
+    slope = t3 * (10.0 - 15.0 * t + 6.0 * t * t)
+    bend = 30.0 * t * t * (1.0 - t) * (1.0 - t) / (_BETWEEN * weight)
+    return (
+        (A[0], A[1], upward),
+        (A_dot[0], A_dot[1], slope * A_dot[2]),
+        (A_ddot[0], A_ddot[1], slope * A_ddot[2] + bend * A_dot[2] * A_dot[2]),
+    )
+
+
+@kernel
 def position_jet(
     state: State,
     motion: LoadMotion,
@@ -78,7 +102,7 @@ def position_jet(
 ) -> PositionJet:
     """A, A', A'' along the motion of the model; the gains are diagonals in the world frame.
 
-    With k_i = 0 and small errors it is (3-43).
+    With k_i = 0 and small errors it is (3-43), but where that lets the load fall (`held_up`).
     """
     q, q_dot = state.q_cable, state.q_cable_dot
     at = load_position_force(
@@ -113,13 +137,13 @@ def position_jet(
         GREATEST_FEEDBACK * mass * vehicle.gravity,
     )
     open_loop = add(at.A, add(times(k_x, at.e_x), times(k_v, at.e_v)))
-    return PositionJet(
+    A, A_dot, A_ddot = held_up(
         sub(open_loop, closed),
         sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), closed_dot),
         sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), closed_ddot),
-        at.e_x,
-        at.e_v,
+        mass * vehicle.gravity,
     )
+    return PositionJet(A, A_dot, A_ddot, at.e_x, at.e_v)
 
 
 @kernel

@@ -35,7 +35,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from autopilot.control.direction_jet import PositionJet, direction_jet, position_jet
+from autopilot.control.direction_jet import PositionJet, direction_jet, held_up, position_jet
 from autopilot.control.load_attitude import (
     DirectionCommand,
     DirectionResult,
@@ -210,15 +210,13 @@ def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, veh
 
 @kernel
 def flat_across(q_cable: Vec3, jet: Jet, vehicle: Vehicle) -> Vec3:
-    """What the reference itself exerts across the cable, N: -m_Q L q_d'', at most the weight; zero where it
-    asks for free fall."""
+    """What the reference itself exerts across the cable, N: -m_Q L q_d'', at most the weight."""
     mass = vehicle.quad_mass + vehicle.load_mass
-    lift: Vec3 = (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity)
-    if mass * norm(lift) < _LEAST_FORCE:
-        zero: Vec3 = (0.0, 0.0, 0.0)
-        return zero
     # q_d = -lift / |lift|
-    _, _, u_ddot = unit_derivatives(lift, jet[3], jet[4])
+    lift, jerk, snap = held_up(
+        (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity), jet[3], jet[4], vehicle.gravity
+    )
+    _, _, u_ddot = unit_derivatives(lift, jerk, snap)
     reach = vehicle.quad_mass * vehicle.cable_length
     return gently(scale(reach, tangent(q_cable, u_ddot)), mass * vehicle.gravity)
 

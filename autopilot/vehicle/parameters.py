@@ -9,6 +9,7 @@ from autopilot.wire.parameters import Parameter, ParameterTable
 
 SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
 LAWS = ("thesis", "lqr", "plumbline")  # CTL_LAW is an index into this
+TUNED_FOR_KG = 0.4  # mass of the vehicle for which the QP_ gains are given; they grow with it
 
 
 # what a builder measures on the bench: the autopilot is told of it where the world is
@@ -34,6 +35,7 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
     """The table, with the vehicle's numbers taken from `belief`."""
     j_xx, j_yy, j_zz = belief.inertia_kg_m2
     p = Parameter
+    heavier = belief.quad_mass_kg / TUNED_FOR_KG
     return ParameterTable(
         [
             p(
@@ -117,10 +119,24 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("NGC_WN_Q", 25.0, 1.0, 1000.0, "rad/s", "Command filter of the load attitude, (4-2)"),
             p("NGC_WN_X", 25.0, 1.0, 1000.0, "rad/s", "Command filter of the load position, (4-2)"),
             p("NGC_ZETA", 0.98, 0.1, 2.0, "", "Damping of the command filters, (4-2)"),
-            p("QP_KX", 2.5, 0.0, 1000.0, "N/m", "Vehicle position gain, level, while the cable is slack"),
-            p("QP_KV", 1.8, 0.0, 1000.0, "N s/m", "Vehicle velocity gain, level, while the cable is slack"),
-            p("QP_KZ", 6.4, 0.0, 1000.0, "N/m", "Vehicle height gain while the cable is slack"),
-            p("QP_KVZ", 3.0, 0.0, 1000.0, "N s/m", "Vehicle climb gain while the cable is slack"),
+            p(
+                "QP_KX",
+                2.5 * heavier,
+                0.0,
+                1000.0,
+                "N/m",
+                "Vehicle position gain, level, while the cable is slack",
+            ),
+            p(
+                "QP_KV",
+                1.8 * heavier,
+                0.0,
+                1000.0,
+                "N s/m",
+                "Vehicle velocity gain, level, while the cable is slack",
+            ),
+            p("QP_KZ", 6.4 * heavier, 0.0, 1000.0, "N/m", "Vehicle height gain while the cable is slack"),
+            p("QP_KVZ", 3.0 * heavier, 0.0, 1000.0, "N s/m", "Vehicle climb gain while the cable is slack"),
             p("LQR_Q_POS", 50000.0, 0.001, 1e7, "", "Weight of the vehicle position error, A-2"),
             p("LQR_Q_TILT", 0.001, 1e-6, 1e7, "", "Weight of roll and pitch, A-2"),
             p("LQR_Q_YAW", 1.0, 0.001, 1e7, "", "Weight of the yaw error, A-2"),

@@ -4,7 +4,6 @@ against the flat trajectory, its rotors against rotors, and what it flies.
 
 from __future__ import annotations
 
-import ast
 import importlib.util
 import math
 import sys
@@ -83,6 +82,7 @@ def compiled() -> SimpleNamespace:
         position_jet=direction_jet.position_jet,
         direction_jet=direction_jet.direction_jet,
         saturated=direction_jet.saturated,
+        held_up=direction_jet.held_up,
         start=plumbline.start,
         shifted_jet=plumbline.shifted_jet,
         shifted_state=plumbline.shifted_state,
@@ -278,15 +278,15 @@ def on_the_path_it_asks_for_what_the_path_needs(
 def what_the_path_needs_across_is_not_bounded(
     law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
 ) -> None:
-    """The reference's share is -m_Q L q_d'' across the cable, by differences; a weight at most, where its cable
-    whirls; nothing where it falls freely. On a path that asks for 2.3 N across, nothing is missing."""
+    """The reference's share is -m_Q L q_d'' across the cable, by differences; a weight at most, where its
+    cable whirls, as it does where it falls. On a path that asks for 2.3 N across, nothing is missing."""
     m_Q, m_L, L, J, g = vehicle[:5]
     weight = (m_Q + m_L) * g
     q = (0.0, 0.0, -1.0)
     path = 0.3 * np.random.default_rng(38).normal(size=(7, 3))
 
     def q_d(t: float) -> Any:
-        return -model.unit(np.array(polynomial(path, t)[2]) + [0.0, 0.0, g])
+        return -model.unit(np.add(polynomial(path, t)[2], [0.0, 0.0, g]))
 
     whirl = differences(q_d)[1]
     expected = -m_Q * L * np.array([whirl[0], whirl[1], 0.0])
@@ -294,8 +294,9 @@ def what_the_path_needs_across_is_not_bounded(
     agree(law.flat_across(q, polynomial(path, 0.0), vehicle), expected, SECOND_DIFFERENCE)
     wild = (ZERO, ZERO, ZERO, ZERO, (3e4, -4e4, 0.0), ZERO, ZERO)
     agree(law.flat_across(q, wild, vehicle), weight * np.array([0.6, -0.8, 0.0]), 1e-4)
-    falling = (ZERO, ZERO, (0.0, 0.0, -g), EAST, EAST, EAST, EAST)
-    assert law.flat_across(q, falling, vehicle) == ZERO
+    falling = (ZERO, ZERO, (0.0, 0.0, -2.0 * g), ZERO, (2.0, 0.0, 9.0), EAST, EAST)
+    # of a cable that a quarter of the weight keeps upright
+    agree(law.flat_across(q, falling, vehicle), np.array([m_Q * L * 2.0 / (0.25 * g), 0.0, 0.0]), 1e-4)
 
     path[4] = [80.0, 0.0, 0.0]
     jet = polynomial(path, 0.0)
@@ -377,6 +378,33 @@ def what_errors_ask_for_is_bounded(law: SimpleNamespace, model: SimpleNamespace,
     agree(law.no_longer(v, 0.25), np.array([0.15, 0.0, -0.2]), ROUNDING)
 
 
+def falling_is_bounded(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """`held_up` is the identity from 0.4 of the weight, a quarter upwards at least, smooth in between."""
+    weight = 4.0
+    for upward in (1.6, 2.0, -1.0):
+        A, A_dot, A_ddot = law.held_up((3.0, 4.0, upward), (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), weight)
+        up, rest = (upward, 1.0) if upward > 0.0 else (1.0, 0.0)
+        agree(
+            (A, A_dot, A_ddot),
+            np.array([(3.0, 4.0, up), (1.0, 2.0, 3.0 * rest), (4.0, 5.0, 6.0 * rest)]),
+            0.0,
+        )
+    for upward, expected in ((0.401, 1.0), (1.599, 1.599)):
+        # slopes begin and end with the third power of what is left
+        agree(law.held_up((0.0, 0.0, upward), ZERO, ZERO, weight)[0], np.array([0.0, 0.0, expected]), 1e-8)
+    for upward in (0.6, 1.0, 1.4):
+        path = np.random.default_rng(39).normal(size=(7, 3))
+        path[0, 2] = upward
+
+        def at(t: float, path: Array = path) -> Any:
+            return law.held_up(*polynomial(path, t)[:3], weight)
+
+        first, second = differences(lambda t, at=at: at(t)[0])  # type: ignore[misc]
+        assert at(0.0)[0][2] >= 1.0
+        agree(at(0.0)[1], first, DIFFERENCE)
+        agree(at(0.0)[2], second, SECOND_DIFFERENCE)
+
+
 def the_reference_goes_on(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """Each derivative of a path that has no more derivatives than are used, 0.1 s on."""
     rng = np.random.default_rng(32)
@@ -444,14 +472,15 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
     gains, rate = GAINS._replace(k_i=(20.0, 20.0, 20.0)), 10.0
     rng = np.random.default_rng(34)
     h = 1e-3
-    for _ in range(3):
-        q = model.unit([0.03 * rng.normal(), 0.03 * rng.normal(), -1.0])
-        w = np.cross(q, 0.05 * rng.normal(size=3))
-        R = model.rodrigues(0.03 * rng.normal(size=3))
+    # the last swings and turns so that Omega' counts
+    for size, turning in ((1.0, 1.0), (1.0, 1.0), (6.0, 20.0)):
+        q = model.unit([0.03 * size * rng.normal(), 0.03 * size * rng.normal(), -1.0])
+        w = np.cross(q, 0.05 * size * rng.normal(size=3))
+        R = model.rodrigues(0.03 * size * rng.normal(size=3))
         y0 = model.pack(
-            0.02 * rng.normal(size=3), 0.1 * rng.normal(size=3), q, w, R, 0.3 * rng.normal(size=3)
+            0.02 * rng.normal(size=3), 0.1 * rng.normal(size=3), q, w, R, 0.3 * size * rng.normal(size=3)
         )
-        M = 0.002 * rng.normal(size=3)
+        M = 0.002 * turning * rng.normal(size=3)
         reference = Reference((ZERO,) * 7, EAST)
         slid = 0.001 * rng.normal(size=3)
 
@@ -493,7 +522,7 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
         expected = attitude_moment(
             state.R, state.omega_body, rates, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
         )
-        # 1e-3 of what Omega_c' asks for: the truncation of differences over 2 ms
+        # ten times the truncation of differences over 2 ms
         agree(found.moment, np.array(expected.moment), 2e-4)
         drift = (np.array(memory.integral) - slid) / TICK
         agree(drift, np.array(state.x_load), ROUNDING)
@@ -644,6 +673,7 @@ PROOFS: tuple[Callable[..., None], ...] = (
     what_the_path_needs_across_is_not_bounded,
     wind_is_leaned_against,
     what_errors_ask_for_is_bounded,
+    falling_is_bounded,
     the_reference_goes_on,
     the_state_goes_on,
     forces_are_differentiated,

@@ -28,7 +28,7 @@ def _broken(tmp_path, old, new):
 
 
 def test_shipped_vehicles():
-    assert shipped() == ("bebop", "thesis")
+    assert shipped() == ("bebop", "heavy", "thesis")
 
 
 def test_bebop_is_table_4_1(bebop):
@@ -87,7 +87,9 @@ def test_unknown_key_lists_the_known(tmp_path):
 
 def test_broken_toml_and_missing_files(tmp_path):
     assert _broken(tmp_path, "load_mass_kg = 0.1", "load_mass_kg = ").startswith("not TOML: ")
-    with pytest.raises(TruthFileError, match=r"nosuch: no such vehicle; must be bebop, thesis or the path"):
+    with pytest.raises(
+        TruthFileError, match=r"nosuch: no such vehicle; must be bebop, heavy, thesis or the path"
+    ):
         load_truth("nosuch")
     with pytest.raises(TruthFileError, match="cannot be read"):
         load_truth(tmp_path)
