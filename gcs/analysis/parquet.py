@@ -51,6 +51,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         "control_mode": samples.control_mode,
         "in_mission": samples.in_mission,
         **_spread("load_desired", "m", samples.desired_m),
+        **_spread("load_asked", "m", samples.asked_m),
         **_spread("load_true", "m", samples.actual_m),
         **_spread("load_estimated", "m", samples.estimated_m),
         **_spread("load_error", "m", samples.error_m),

@@ -115,8 +115,10 @@ def samples_of(telemetry: Telemetry) -> Samples:
             hermite(setpoint.time_s, setpoint.velocity_m_s, setpoint.acceleration_m_s2, time_s),
             np.nan,
         ),
-        asked_m=hermite(setpoint.time_s, setpoint.asked_m, setpoint.asked_m_s, time_s),
-        asked_m_s=linear(setpoint.time_s, setpoint.asked_m_s, time_s),
+        asked_m=np.where(
+            tracked, hermite(setpoint.time_s, setpoint.asked_m, setpoint.asked_m_s, time_s), np.nan
+        ),
+        asked_m_s=np.where(tracked, linear(setpoint.time_s, setpoint.asked_m_s, time_s), np.nan),
         estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),
         vehicle_m=truth.position_m - truth.distance_m[:, None] * truth.q_cable,
         quat_wxyz=linear(telemetry.attitude_truth.time_s, telemetry.attitude_truth.quat_wxyz, time_s),

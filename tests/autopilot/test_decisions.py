@@ -67,6 +67,7 @@ REQUESTS: list[Any] = [
     R.Terminate(),
     R.RunPrearmChecks(),
     R.Reboot(False),
+    R.ChangeSigningKey(),
     R.StoreParameters(),
     R.RequestMessage(1, 0.0),
     R.SetMessageInterval(1, 1),

@@ -58,7 +58,7 @@ def test_a_flight_over_udp_leaves_the_log_of_the_same_flight_in_one_process(gcs:
 
 def test_what_four_rotors_lose_is_reported_as_diverged(gcs: Gcs, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    flown = gcs("fly", "case-a", "--sensors", "ideal", "--out", str(out), "--json")
+    flown = gcs("fly", "case-a", "--law", "thesis", "--sensors", "ideal", "--out", str(out), "--json")
     assert flown.returncode == 3, flown.stderr
     assert json.loads(flown.stdout)["outcome"] == "diverged"
     assert (out / "report.html").stat().st_size > 0

@@ -164,7 +164,7 @@ def test_parquet_has_units_phases_and_the_record(built):
     assert {"time_s", "phase", "load_true_x_m", "load_desired_z_m", "rotor_command_4_n", "psi_R"} <= columns
     error = table["load_error_y_m"].to_numpy()
     np.testing.assert_array_equal(
-        error, table["load_true_y_m"].to_numpy() - table["load_desired_y_m"].to_numpy()
+        error, table["load_true_y_m"].to_numpy() - table["load_asked_y_m"].to_numpy()
     )
     inside = table["in_mission"].to_numpy(zero_copy_only=False)
     norm = np.linalg.norm([table[f"load_error_{axis}_m"].to_numpy()[inside] for axis in "xyz"], axis=0)
