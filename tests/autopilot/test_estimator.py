@@ -209,8 +209,8 @@ def test_slack_and_taut_are_told_by_the_distance() -> None:
 def test_a_knock_between_two_samples_of_the_accelerometer_is_followed_at_once() -> None:
     """The vehicle sinks beside its load and stands from one tick to the next; no sample shows the impact.
 
-    Measured: 4 poses refused in a row, load known to 3 mm. Waiting for the new start would take 50 poses, and
-    the load's doubt would grow beyond what may be flown on.
+    Waiting for the new start would take 50 refused poses, and the load's doubt would grow beyond what may be
+    flown on.
     """
     state, history, tuning = blank_state(), new_history(), bebop_tuning()
     refused, doubt = 0.0, 0.0
