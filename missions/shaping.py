@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import cos, inf, nextafter, pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -148,38 +149,60 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
     if end_speed > _REST_M_S:
         return _refused(asked, f"the signals end at {end_speed:.2f} m/s; they must end at rest")
     places = sorted([*_jumps(step, table, body, bounds), *_violations(table, duration, body, bounds)])
-    pieces: list[PieceTable] = []
-    lead = tail = 0.0
-    worst = 0.0
-    for begin, end in _windows(places, WINDOW_S):
-        found: tuple[PieceTable, float] | None = None
-        wider = 0.0
-        for _ in range(_TRIES):
-            b, e = begin - wider, end + wider
-            if e - b > LONGEST_S:
-                break
-            tried = _solve(step, table, b, e, body, bounds)
-            if tried is not None and (found is None or tried[1] < found[1]):
-                found, best = tried, (b, e)
-            if found is not None and found[1] <= _TOLERANCE_N:
-                break
-            wider = (wider + WINDOW_S) * _WIDER - WINDOW_S
-        if found is None:
+    spans = _windows(places, WINDOW_S)
+    windows: list[_Window] = []
+    while len(windows) < len(spans):
+        begin, end = spans[len(windows)]
+        window = _widened(step, table, begin, end, body, bounds)
+        if window is None:
             text = f"from {max(begin, 0.0):.1f} s to {min(end, duration):.1f} s it exceeds what can be flown"
             return _refused(asked, text)
-        pieces.append(found[0])
-        lead, tail = max(lead, -best[0]), max(tail, best[1] - duration)
-        worst = max(worst, found[1])
-    if not pieces:
+        if windows and window.begin < windows[-1].end:
+            # widened into its neighbour: one window for both
+            last = len(windows) - 1
+            spans[last : last + 2] = [(spans[last][0], end)]
+            windows.pop()
+        else:
+            windows.append(window)
+    if not windows:
         return asked
-    rows = np.vstack(pieces)
-    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    rows = np.vstack([window.pieces for window in windows])
+    lead, tail = max(-windows[0].begin, 0.0), max(windows[-1].end - duration, 0.0)
+    worst = max(window.excess_n for window in windows)
     shaped = Shaped(table, rows, duration, lead, tail, 0.0, worst, 1.0, "")
     times = _span(-lead, duration + tail, _FINE_S)
     away = path_jets(shaped, times)[0] - asked_jets(table, duration, times)[0]
     distance = float(np.sqrt(np.max(np.sum(away * away, axis=1))))
     reason = "" if worst <= _TOLERANCE_N else f"a rotor or the cable is asked for {worst:.2f} N too much"
     return Shaped(table, rows, duration, lead, tail, distance, worst, 1.0, reason)
+
+
+class _Window(NamedTuple):
+    """A spline from begin to end in place of the asked path."""
+
+    begin: float
+    end: float
+    pieces: PieceTable
+    excess_n: float
+
+
+def _widened(
+    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
+) -> _Window | None:
+    """The first window about begin and end that keeps the bounds, else the one that exceeds them least."""
+    found: _Window | None = None
+    wider = 0.0
+    for _ in range(_TRIES):
+        b, e = begin - wider, end + wider
+        if e - b > LONGEST_S:
+            break
+        tried = _solve(step, table, b, e, body, bounds)
+        if tried is not None and (found is None or tried.excess_n < found.excess_n):
+            found = tried
+        if found is not None and found.excess_n <= _TOLERANCE_N:
+            break
+        wider = (wider + WINDOW_S) * _WIDER - WINDOW_S
+    return found
 
 
 def _refused(asked: Shaped, reason: str) -> Shaped:
@@ -233,8 +256,8 @@ def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple
 
 def _solve(
     step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
-) -> tuple[PieceTable, float] | None:
-    """The spline from begin to end, and its excess."""
+) -> _Window | None:
+    """The spline from begin to end; None if there is none."""
     intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
     basis = Basis(begin, end, intervals)
     ends = asked_jets(table, step.duration_s, np.array([begin, end]))
@@ -252,7 +275,7 @@ def _solve(
     if not solution.solved:
         return None
     pieces = basis.pieces(solution.coefficients, origin)
-    return pieces, _fine_excess(pieces, begin, end, body, bounds)
+    return _Window(begin, end, pieces, _fine_excess(pieces, begin, end, body, bounds))
 
 
 def _rows(step: Signals, table: SignalTable, begin: float, end: float, origin: Array) -> Rows:
