@@ -21,6 +21,7 @@ from autopilot.services.answers import (
     answer_timesync,
 )
 from autopilot.services.commands import CommandService
+from autopilot.services.guided import GuidedService
 from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT, Identity
 from autopilot.services.links import LinkState, Outgoing
 from autopilot.services.mission_store import StoredMission
@@ -39,6 +40,9 @@ from autopilot.services.records import (
     Verdict,
 )
 from autopilot.services.requests import (
+    FollowAttitude,
+    FollowSetpoint,
+    FollowStick,
     GetMessageInterval,
     RequestCapabilities,
     RequestMessage,
@@ -63,6 +67,7 @@ _ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
+_STREAMED = FollowSetpoint | FollowAttitude | FollowStick  # they change no mode
 SnapshotFactory = Callable[[], Snapshot]
 
 
@@ -76,6 +81,7 @@ class VehicleEndpoint:
         self._missions = MissionService(home, mission or StoredMission())
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
+        self._guided = GuidedService(home, identity.system)
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._table: dict[int, Stream] = dict(STREAMS)
@@ -274,7 +280,7 @@ class VehicleEndpoint:
                 case SetMessageInterval(message_id, interval_us):
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
-            if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
+            if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 self.state_changed()
             return verdict
 
@@ -309,12 +315,17 @@ class VehicleEndpoint:
     def _handler_table(self) -> dict[int, Handler]:
         """What is done about each message; all others are for somebody else."""
         commands, missions, parameters = self._commands, self._missions, self._parameters
+        guided = self._guided
         m = mavlink
         return {
             m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
+            m.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: guided.receive_local,
+            m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,
+            m.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: guided.receive_attitude,
+            m.MAVLINK_MSG_ID_MANUAL_CONTROL: guided.receive_stick,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: parameters.receive_request_list,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: parameters.receive_request_read,
             m.MAVLINK_MSG_ID_PARAM_SET: parameters.receive_set,

@@ -57,6 +57,8 @@ class Snapshot(NamedTuple):
     landed_state: int  # MAV_LANDED_STATE
     system_status: int  # MAV_STATE
 
+    launch: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
+
     # estimate of the vehicle
     x_quad: Vec3 = ZERO
     v_quad: Vec3 = ZERO
