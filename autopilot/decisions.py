@@ -18,9 +18,10 @@ from autopilot.flight import (
     Selected,
     Settings,
     View,
+    forbidden,
 )
 from autopilot.following import Circle, Lean, Wish
-from autopilot.geometry.linear import Vec3, add, norm, scale, sub
+from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
 from autopilot.guidance import Hold, carry_leg
 from autopilot.services import identity
 from autopilot.services.records import Verdict
@@ -60,6 +61,8 @@ LEAST_SPEED_M_S = 0.05
 RAMP_SHARE = 4.0  # a circle is begun with a quarter of the acceleration along it
 STEADY_US = 500_000  # setpoints no further apart are a stream
 LEVEL_HOME_M = 1.0
+CIRCLE_POINTS = 72
+WAY_M, MOST_PIECES = 0.25, 4000  # at which a way between waypoints is looked at
 SLOWEST_M_S, FASTEST_M_S = 0.05, 15.0
 
 
@@ -86,13 +89,16 @@ def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Deci
     return handler(flight, request, view, settings)
 
 
-def arming_complaints(flight: Flight, view: View) -> tuple[str, ...]:
+def arming_complaints(flight: Flight, view: View, settings: Settings) -> tuple[str, ...]:
     """What keeps the vehicle from being armed, in words."""
     found = list(view.complaints)
     if not view.tilt_rad <= TILT_TO_ARM_RAD:
         found.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         found.append(f"moving at {norm(view.v_quad):.1f} m/s")
+    where = forbidden(flight.fence, view.x_load, settings) if settings.fence_action else ""
+    if where:
+        found.append(where)
     return tuple(found)
 
 
@@ -108,7 +114,7 @@ def _arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisi
         return flight, ACCEPTED
     if flight.phase != Phase.DISARMED:
         return flight, _denied("Arming denied: in the air")
-    complaints = arming_complaints(flight, view)
+    complaints = arming_complaints(flight, view, settings)
     if complaints and not request.force:
         return flight, _denied(f"Arming denied: {complaints[0]}")
     after = happen(flight, Event.ARM, view, settings)
@@ -139,6 +145,34 @@ def _takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) -
     return flight, _denied("Take-off denied: in the air")
 
 
+def _leaves_fence(
+    flight: Flight, steps: tuple[model.Step, ...], sequence: tuple[int, ...], settings: Settings
+) -> str:
+    """Which item of a mission leads over the fence, and why; an empty string if none does.
+
+    Places and the straight ways between them are looked at; signals are watched in flight.
+    """
+    if not settings.fence_action:
+        return ""
+    here: Vec3 | None = None
+    for step, seq in zip(steps, sequence, strict=True):
+        match step:
+            case model.Takeoff(altitude_m=height):
+                places: list[Vec3] = [(0.0, 0.0, height)]
+            case model.Waypoint(east_m=east, north_m=north, altitude_m=height):
+                there = (east, north, height)
+                before = there if here is None else here
+                pieces = min(max(1, math.ceil(norm(sub(there, before)) / WAY_M)), MOST_PIECES)
+                places = [axpy((k + 1) / pieces, sub(there, before), before) for k in range(pieces)]
+            case _:
+                continue
+        here = places[-1]
+        why = next(filter(None, (forbidden(flight.fence, place, settings) for place in places)), "")
+        if why:
+            return f"item {seq} leads {why}"
+    return ""
+
+
 def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     """Start the mission at `flight.step`, from the ground or from the air."""
     before, plan = flight, flight.plan
@@ -146,6 +180,9 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         return flight, _denied("Mission denied: there is none")
     if plan.prepared.pending:
         return flight, _later("Mission not ready: its paths are being prepared; try again")
+    beyond = _leaves_fence(flight, plan.steps, plan.sequence, settings)
+    if beyond:
+        return flight, _denied(f"Mission denied: {beyond}")
     if plan.prepared.refusal:
         return flight, _denied(f"Mission denied: {plan.prepared.refusal}")
     if flight.phase == Phase.DISARMED:
@@ -261,6 +298,10 @@ def _set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) 
 def _replace_mission(flight: Flight, request: ReplaceMission, view: View, settings: Settings) -> Decision:
     if flight.on_mission and flight.phase not in ON_GROUND:
         return flight, _denied("Mission denied: the present one is being flown; pause it first")
+    steps = tuple(located.step for located in request.steps)
+    beyond = _leaves_fence(flight, steps, tuple(located.first for located in request.steps), settings)
+    if beyond:
+        return flight, _denied(f"Mission denied: {beyond}")
     return flight, ACCEPTED
 
 
@@ -288,6 +329,9 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
         return flight, _denied("Reposition denied: not a place")
     if there[2] < LEAST_ALTITUDE_M:
         return flight, _denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
+    beyond = forbidden(flight.fence, there, settings) if settings.fence_action else ""
+    if beyond:
+        return flight, _denied(f"Reposition denied: {beyond}")
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
     go = carry_leg(here, there, speed, settings.accel_m_s2, settings.least_move_s)
@@ -339,6 +383,12 @@ def _orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> De
     if inward > settings.accel_m_s2:
         text = f"Orbit denied: {inward:.1f} m/s^2 inwards exceeds MIS_ACCEL {settings.accel_m_s2:g}"
         return flight, _denied(text)
+    for k in range(CIRCLE_POINTS if settings.fence_action else 0):
+        at = 2.0 * math.pi * k / CIRCLE_POINTS
+        there = add(centre, (radius * math.cos(at), radius * math.sin(at), 0.0))
+        beyond = forbidden(flight.fence, there, settings)
+        if beyond:
+            return flight, _denied(f"Orbit denied: {beyond}")
     out = sub(here, centre)
     phase = math.atan2(out[1], out[0]) if math.hypot(out[0], out[1]) > 0.0 else 0.0
     circle = Circle(
@@ -379,7 +429,7 @@ def _terminate(flight: Flight, request: Terminate, view: View, settings: Setting
 
 
 def _run_checks(flight: Flight, request: RunPrearmChecks, view: View, settings: Settings) -> Decision:
-    complaints = arming_complaints(flight, view)
+    complaints = arming_complaints(flight, view, settings)
     return flight, Verdict(mavlink.MAV_RESULT_ACCEPTED, "; ".join(complaints) or "Ready to arm")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from math import cos, inf, nan, radians, sqrt
+from math import cos, hypot, inf, nan, radians, sqrt
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
@@ -13,6 +13,7 @@ from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance import Leg, asked_jet, least_move_s
 from autopilot.vehicle.parameters import LAWS, SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.fence import NO_FENCE, Fence
 from autopilot.wire.parameters import ParameterTable
 from missions.demand import Bounds
 from missions.model import Step
@@ -112,6 +113,11 @@ class Flight:
     manual: Stream = SILENT
     circle: Circle | None = None
     home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
+    rally: tuple[Vec3, ...] = ()  # where it leads as well, if that is nearer
+    fence: Fence = NO_FENCE
+    breach: str = ""  # why load or vehicle may not be where it is, or is about to be
+    breaches: int = 0
+    breach_us: int = 0  # when the last one began
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +145,9 @@ class Settings:
     fastest_m_s: float  # velocity setpoint
     hover_share: float  # thrust of an attitude setpoint that hovers
     weight_n: float  # of vehicle and load
+    fence_action: int  # GF_ACTION
+    fence_radius_m: float  # 0: none
+    fence_height_m: float  # 0: none
     guides_vehicle: bool  # position setpoints are for the vehicle, which is kept a cable length over the load
 
 
@@ -187,6 +196,9 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         fastest_m_s=table["MPC_XY_VEL_MAX"],
         hover_share=table["MPC_THR_HOVER"],
         weight_n=(table["VEH_QUAD_MASS"] + table["VEH_LOAD_MASS"]) * table["VEH_GRAVITY"],
+        fence_action=int(table["GF_ACTION"]),
+        fence_radius_m=table["GF_MAX_HOR_DIST"],
+        fence_height_m=table["GF_MAX_VER_DIST"],
         guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 
@@ -235,6 +247,15 @@ def pace_of(flight: Flight, settings: Settings) -> Pace:
     """How setpoints are followed."""
     rate = SMOOTH_SHARE * sqrt(settings.gravity_m_s2 / settings.cable_length_m)
     return Pace(flight.speed_m_s, settings.fastest_m_s, settings.accel_m_s2, rate)
+
+
+def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
+    """Why load or vehicle may not be there, the vehicle a cable length above; an empty string if they may."""
+    if settings.fence_radius_m > 0.0 and hypot(x_load[0], x_load[1]) > settings.fence_radius_m:
+        return f"more than GF_MAX_HOR_DIST {settings.fence_radius_m:g} m from home"
+    if settings.fence_height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence_height_m:
+        return f"higher than GF_MAX_VER_DIST {settings.fence_height_m:g} m"
+    return fence.complaint(x_load[0], x_load[1])
 
 
 def leg_time_s(flight: Flight, now_us: int) -> float:

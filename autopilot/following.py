@@ -155,6 +155,11 @@ class Follow:
         rows = [(x[n], y[n], z[n]) for n in range(ORDER)]
         return (rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
+    def coasting(self, t: float) -> Follow:
+        """The motion from `t` seconds into this leg on, nothing more being asked of it."""
+        x, v, a = self.point
+        return Follow(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), self.rate)
+
     def onward(self, t: float, asked: Wish | Circle, pace: Pace, now_us: int) -> Follow:
         """The motion from `t` seconds into this leg on, towards what is asked at `now_us`."""
         x, v, a = self.point

@@ -30,6 +30,7 @@ from autopilot.services.heartbeat import heartbeat_message
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
+    AreasChanged,
     Event,
     Link,
     MissionChanged,
@@ -43,7 +44,8 @@ from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import located_steps
+from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.mission_items import WireItem, located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
 from missions.model import Step
@@ -224,6 +226,8 @@ class Onboard:
             match event:
                 case MissionChanged(mission):
                     self._take_plan(mission)
+                case AreasChanged(kind, items):
+                    self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
                 case TimesyncAnswered():
@@ -275,6 +279,16 @@ class Onboard:
         flight, verdict = decide(state.flight, request, view, self._setup.settings)
         self._state = state._replace(flight=flight)
         return verdict
+
+    def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
+        """Another fence, other rally points."""
+        self.endpoint.set_areas(kind, items)
+        flight = self._state.flight
+        if kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            flight = replace(flight, fence=read_fence(items, self._options.home), breach="")
+        else:
+            flight = replace(flight, rally=read_rally(items, self._options.home))
+        self._state = self._state._replace(flight=flight)
 
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None)

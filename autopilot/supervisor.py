@@ -8,7 +8,7 @@ flight, the view and the settings.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import degrees, isfinite
+from math import degrees, dist, isfinite
 
 from autopilot.flight import (
     CARRYING,
@@ -21,12 +21,13 @@ from autopilot.flight import (
     Selected,
     Settings,
     View,
+    forbidden,
     leg_time_s,
     pace_of,
     setpoint,
 )
 from autopilot.following import Asked, Follow, Lean, Posture, Wish, begin_following
-from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, axpy, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance import (
     CALM_SHARE,
@@ -142,6 +143,11 @@ STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load ac
 TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have come taut
 
 
+NO_ACTION, TERMINATE = 0, 4  # GF_ACTION
+STOP_MARGIN = 0.05  # of the way to where the load would stop: while it speeds up, that moves on
+FENCE_EVENTS = {2: E.HOLD, 3: E.RETURN, 5: E.LAND}
+
+
 def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Flight:
     """The flight in `phase`, with the legs with which the phase begins."""
     legs: tuple[Leg, ...]
@@ -203,8 +209,10 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
     if flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
-        t = leg_time_s(flight, view.now_us)
-        slow = slow_leg(flight.legs[0], t, settings.accel_m_s2, settings.least_move_s)
+        t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
+        if isinstance(leg, Follow):
+            leg, t = leg.coasting(t), 0.0
+        slow = slow_leg(leg, t, settings.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
     accel, least_s = settings.accel_m_s2, settings.least_move_s
     if v[2] < -FALLING:  # out of a fall: there is no time to lose
@@ -248,7 +256,8 @@ def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = _raised(flight, view, settings)
-    return (*legs, _carry(here, (flight.home[0], flight.home[1], here[2]), flight.speed_m_s, settings))
+    goal = min((flight.home, *flight.rally), key=lambda place: dist(place[:2], here[:2]))
+    return (*legs, _carry(here, (goal[0], goal[1], here[2]), flight.speed_m_s, settings))
 
 
 def asked_of(flight: Flight) -> Asked | None:
@@ -412,6 +421,11 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         caught = _watch_slack(flight, view, settings)
         if caught is not None:
             return caught
+    if flight.phase in CARRYING:
+        stopped = _watch_fence(flight, view, settings)
+        if isinstance(stopped, tuple):
+            return stopped
+        flight = stopped
     if flight.phase == P.TAUTEN and len(flight.legs) == 1:
         flight = _note_pull(flight, view, settings)
         if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= PULL_US:
@@ -680,6 +694,32 @@ def _watch_slack(flight: Flight, view: View, settings: Settings) -> tuple[Flight
         held = enter(replace(flight, on_mission=False), P.HOLD, view, settings)
         return held, Report(((CRITICAL, "Cable slack again in this mission item: holding"),))
     return enter(flight, flight.phase, view, settings), Report(((INFO, "Load caught"),))
+
+
+def _watch_fence(flight: Flight, view: View, settings: Settings) -> Flight | tuple[Flight, Report]:
+    """What GF_ACTION says where load or vehicle is over the fence, or the load could not stop before it."""
+    limited = flight.fence.zones or settings.fence_radius_m > 0.0 or settings.fence_height_m > 0.0
+    if settings.fence_action == NO_ACTION or not limited or isinstance(flight.legs[0], Catch):
+        return flight
+    over = sub(view.x_quad, (0.0, 0.0, settings.cable_length_m))
+    places = [view.x_load, over]
+    if not _swings(flight.legs[0]):
+        here, end = load_motion(flight, view, settings)[0], stop(flight, view, settings)[1]
+        places += [here, axpy(STOP_MARGIN, sub(end, here), end)]
+    why = next(filter(None, (forbidden(flight.fence, place, settings) for place in places)), "")
+    if bool(why) == bool(flight.breach):
+        return flight
+    if not why:
+        return replace(flight, breach="")
+    noted = replace(flight, breach=why, breaches=flight.breaches + 1, breach_us=view.now_us)
+    event = FENCE_EVENTS.get(settings.fence_action)
+    text = (WARNING, f"Fence: {why}")
+    if settings.fence_action == TERMINATE:
+        return _given_up(noted, f"fence: {why}", view, settings)
+    landing = flight.phase == P.LOWER and event == E.LAND
+    if event is None or landing or (flight.phase, event) not in TRANSITIONS:
+        return noted, Report((text,))
+    return _to(replace(noted, on_mission=False), event, view, settings, text)
 
 
 def _taut_by(flight: Flight, settings: Settings) -> float:

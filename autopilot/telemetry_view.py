@@ -152,7 +152,7 @@ def make_snapshot(
     flight, estimator, command = state.flight, state.estimator, state.command
     control = control_state(estimator)
     view = view_of(estimator, control, setup.settings, now_us)
-    ready = not arming_complaints(flight, view)
+    ready = not arming_complaints(flight, view, setup.settings)
     present, healthy = sensor_bits(tick, state, gps, ready)
 
     leg = flight.legs[0] if flight.legs else None
@@ -177,6 +177,9 @@ def make_snapshot(
         boot_unix_us=options.boot_unix_us,
         home=options.home,
         launch=flight.home,
+        breach=flight.breach,
+        breaches=flight.breaches,
+        breach_us=flight.breach_us,
         armed=flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
         phase=int(flight.phase),
         main_mode=mode_of(flight)[0],

@@ -56,6 +56,7 @@ from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WAT
 from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
 from autopilot.wire.parameters import ParameterTable
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
@@ -96,6 +97,15 @@ class VehicleEndpoint:
     def mission(self) -> StoredMission:
         """The mission in force."""
         return self._missions.mission
+
+    @property
+    def areas(self) -> dict[int, tuple[WireItem, ...]]:
+        """The items of fence and rally points by MAV_MISSION_TYPE."""
+        return dict(self._missions.areas)
+
+    def set_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
+        """Fence or rally points as they were stored."""
+        self._missions.areas[kind] = items
 
     @property
     def links(self) -> tuple[Link, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from autopilot.geometry.linear import Vec3
+from autopilot.wire.mission_items import LocatedStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +70,11 @@ class SetCurrent:
 
 @dataclass(frozen=True, slots=True)
 class ReplaceMission:
-    """May the mission be replaced now (`count` items), or cleared (0)? Asked at the begin and the end."""
+    """May the mission be replaced now (`count` items), or cleared (0)? Asked at the begin and the end; at the
+    end with the steps that would be flown."""
 
     count: int
+    steps: tuple[LocatedStep, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

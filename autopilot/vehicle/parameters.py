@@ -289,6 +289,17 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
                 "Position setpoints are for 0 the load, 1 the vehicle a cable length over it",
                 integer=True,
             ),
+            p(
+                "GF_ACTION",
+                2.0,
+                0.0,
+                5.0,
+                "",
+                "At the fence: 0 nothing, 1 a warning, 2 hold, 3 return, 4 stop the rotors, 5 land",
+                integer=True,
+            ),
+            p("GF_MAX_HOR_DIST", 0.0, 0.0, 10000.0, "m", "Greatest distance from home; 0: no limit"),
+            p("GF_MAX_VER_DIST", 0.0, 0.0, 10000.0, "m", "Greatest height of the vehicle; 0: no limit"),
             p("SIM_LOSS_PCT", 0.0, 0.0, 100.0, "%", "Datagrams lost on the ground link, each way"),
         ]
     )

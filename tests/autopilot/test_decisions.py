@@ -144,7 +144,7 @@ COMPLAINTS: dict[str, tuple[dict[str, Any], str]] = {
 def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> None:
     changes, why = COMPLAINTS[trouble]
     seen = view(**changes)
-    assert arming_complaints(Flight(), seen) == (why,)
+    assert arming_complaints(Flight(), seen, SETTINGS) == (why,)
     after, verdict = decide(Flight(), R.Arm(True, False), seen, SETTINGS)
     assert (after.phase, verdict.result, verdict.text) == (Phase.DISARMED, DENIED, f"Arming denied: {why}")
     _, told = decide(Flight(), R.RunPrearmChecks(), seen, SETTINGS)
@@ -154,7 +154,7 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
 
 
 def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:
-    assert arming_complaints(Flight(), view()) == ()
+    assert arming_complaints(Flight(), view(), SETTINGS) == ()
     assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1].text == "Ready to arm"
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from autopilot.flight import CARRYING, IN_AIR, ON_GROUND, Event, Flight, Phase, Plan
-from autopilot.geometry.linear import norm, sub
 from autopilot.following import Stream, Wish
+from autopilot.geometry.linear import norm, sub
 from autopilot.guidance import LOAD_POSITION, Brake, Calm, Creep, Hold, Run, Swing
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest

@@ -145,7 +145,7 @@ def test_a_refusal_is_said_once_in_a_while(rig):
     for _ in range(2 * COMPLAIN_US // 100_000):
         said += sum(r.get_type() == "STATUSTEXT" for r in rig.replies(local(1, 0xFFF)))
         rig.now_us += 100_000
-    assert said == 3 or said == 2
+    assert said == 3  # in 10.8 s
 
 
 def test_a_stick_for_another_system_is_not_ours(rig):

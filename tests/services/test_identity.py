@@ -56,8 +56,6 @@ def test_capabilities_promise_what_is_served_and_nothing_else():
         assert capabilities & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{name}")
     unserved = [
         "FTP",
-        "MISSION_FENCE",
-        "MISSION_RALLY",
         "PARAM_ENCODE_C_CAST",
         "TERRAIN",
     ]
