@@ -45,7 +45,7 @@ from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.mission_items import WireItem, located_steps
+from autopilot.wire.mission_items import WireItem, located_steps, unflown
 from autopilot.wire.parameters import ParameterTable
 from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
 from missions.model import Step
@@ -55,6 +55,7 @@ GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
+MOST_NAMED = 8  # items in one text
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
 
 
@@ -294,6 +295,10 @@ class Onboard:
         plan = plan_of(mission, self._options.home, None)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
         self._prepare()
+        kept = unflown(mission.items)
+        if kept:
+            numbers = ", ".join(map(str, kept[:MOST_NAMED])) + (" ..." if len(kept) > MOST_NAMED else "")
+            self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
 
     def _prepare(self) -> None:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
