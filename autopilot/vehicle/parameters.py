@@ -300,6 +300,24 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             ),
             p("GF_MAX_HOR_DIST", 0.0, 0.0, 10000.0, "m", "Greatest distance from home; 0: no limit"),
             p("GF_MAX_VER_DIST", 0.0, 0.0, 10000.0, "m", "Greatest height of the vehicle; 0: no limit"),
+            p(
+                "LOG_RATE_HZ",
+                50.0,
+                0.0,
+                1000.0,
+                "Hz",
+                "Records of the flight log in a second, from arming to disarming; 0: no log",
+                integer=True,
+            ),
+            p(
+                "LOG_MAX_MB",
+                512.0,
+                1.0,
+                100_000.0,
+                "MB",
+                "Flight logs kept; the oldest make room",
+                integer=True,
+            ),
             p("SIM_LOSS_PCT", 0.0, 0.0, 100.0, "%", "Datagrams lost on the ground link, each way"),
         ]
     )

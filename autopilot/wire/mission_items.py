@@ -9,13 +9,13 @@ Positions are positions of the load. Where a standard command leaves freedom:
 * NAV_TAKEOFF lifts straight up; its latitude and longitude are ignored.
 * NAV_LAND with a place that is not where the load is left (by the items before it) goes there first.
 * Item 0 of a list that begins with home itself, as MAVProxy and Mission Planner write it, is not flown.
-* NAV_LOITER_TURNS carries the load to the centre, spirals out in one turn, flies its turns and spirals back in
-  one.
+* NAV_LOITER_TURNS carries the load to the centre, spirals out in one turn, flies its turns and spirals
+  back in one.
 * NAV_LOITER_UNLIM holds for LONGEST_S: a day. NAV_SPLINE_WAYPOINT and NAV_LOITER_TO_ALT are waypoints.
 * DO_JUMP is flown by flying its items again; one without end is refused.
 * Commands that point or trigger something (camera, gimbal, region of interest ...) and those above
-  MAV_CMD_NAV_LAST that are not known are kept and not flown. Commands whose effect somebody relies on and that
-  this vehicle has not (gripper, winch, parachute, termination, change of mode or home) are refused.
+  MAV_CMD_NAV_LAST that are not known are kept and not flown. Commands whose effect somebody relies on and
+  that this vehicle has not (gripper, winch, parachute, termination, change of mode or home) are refused.
 """
 
 from __future__ import annotations
@@ -245,11 +245,7 @@ def located_steps(items: Sequence[WireItem], home: Home) -> tuple[LocatedStep, .
 
 def unflown(items: Sequence[WireItem]) -> tuple[int, ...]:
     """Numbers of the items that are kept and not flown."""
-    return tuple(
-        seq
-        for seq, item in enumerate(items)
-        if item.command not in _STANDARD and item.command not in _OWN and item.command not in _FLOW
-    )
+    return tuple(seq for seq, item in enumerate(items) if item.command not in FLOWN_COMMANDS)
 
 
 class _Reader:
@@ -329,7 +325,7 @@ class _Reader:
             self._attitude_run(seq, item)
 
     def _turns(self, seq: int, item: WireItem) -> None:
-        """Half a spiral out, turns, half a spiral in: an amplitude that rises and falls, times sine and cosine."""
+        """A spiral out, turns, a spiral in: an amplitude that rises and falls, times sine and cosine."""
         turns = _check(seq, 1, "turns", item.param1, "", 0.0, MOST_TURNS)
         radius = _check(seq, 3, "radius", item.param3, "m", -MOST_RADIUS_M, MOST_RADIUS_M)
         east, north = self._place(seq, item)
@@ -517,15 +513,14 @@ _RELIED_ON = frozenset(
         mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
     }
 )
-_OWN = frozenset(
-    {
-        mavlink.PLUMBLINE_LOAD_SIGNAL_TERM,
-        mavlink.PLUMBLINE_LOAD_SIGNAL_FACTOR,
-        mavlink.PLUMBLINE_LOAD_SIGNAL_RUN,
-        mavlink.PLUMBLINE_ATTITUDE_RUN,
-    }
-)
-_FLOW = frozenset({mavlink.MAV_CMD_DO_JUMP})
+# all that is flown; other commands above MAV_CMD_NAV_LAST are kept and passed over, the rest is refused
+FLOWN_COMMANDS = _STANDARD | {
+    mavlink.PLUMBLINE_LOAD_SIGNAL_TERM,
+    mavlink.PLUMBLINE_LOAD_SIGNAL_FACTOR,
+    mavlink.PLUMBLINE_LOAD_SIGNAL_RUN,
+    mavlink.PLUMBLINE_ATTITUDE_RUN,
+    mavlink.MAV_CMD_DO_JUMP,
+}
 
 
 def _check(seq: int, param: int, name: str, value: float, unit: str, low: float, high: float) -> float:

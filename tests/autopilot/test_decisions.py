@@ -87,6 +87,7 @@ REQUESTS: list[Any] = [
     R.SetMessageInterval(1, 1),
     R.GetMessageInterval(1),
     R.RequestCapabilities(),
+    R.ChangeSigningKey(),
 ]
 
 
