@@ -284,6 +284,14 @@ def _request_capabilities(call: Call, context: Context) -> Request | Verdict:
     return RequestCapabilities()
 
 
+def _gripper(call: Call, context: Context) -> Request | Verdict:
+    return Verdict(UNSUPPORTED, "Gripper: the load is tied to its cable and cannot be released")
+
+
+def _winch(call: Call, context: Context) -> Request | Verdict:
+    return Verdict(UNSUPPORTED, "Winch: the length of the cable cannot be changed")
+
+
 def _plain(request: Request) -> Parser:
     return lambda call, context: request
 
@@ -299,6 +307,8 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
+    mavlink.MAV_CMD_DO_GRIPPER: _gripper,
+    mavlink.MAV_CMD_DO_WINCH: _winch,
     mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
     mavlink.MAV_CMD_NAV_LOITER_UNLIM: _loiter,

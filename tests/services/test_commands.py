@@ -117,6 +117,7 @@ LONG = [
     (510, (30,), None, OK),
     (510, (1e9,), None, UNSUPPORTED),
     (211, (1, 1), None, UNSUPPORTED),
+    (42600, (1, 1), None, UNSUPPORTED),
     (65535, (), None, UNSUPPORTED),
 ]
 
