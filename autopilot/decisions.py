@@ -20,7 +20,7 @@ from autopilot.flight import (
     View,
     forbidden,
 )
-from autopilot.following import Circle, Lean, Wish
+from autopilot.following import Circle, Lean, Stream, Wish
 from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
 from autopilot.guidance import Hold, carry_leg
 from autopilot.services import identity
@@ -59,7 +59,7 @@ FARTHEST_M = 100_000.0
 LEAST_RADIUS_M = 0.2
 LEAST_SPEED_M_S = 0.05
 RAMP_SHARE = 4.0  # a circle is begun with a quarter of the acceleration along it
-STEADY_US = 500_000  # setpoints no further apart are a stream
+STREAM_US = 500_000  # a stream is there where its last setpoint is no older: two a second
 LEVEL_HOME_M = 1.0
 CIRCLE_POINTS = 72
 WAY_M, MOST_PIECES = 0.25, 4000  # at which a way between waypoints is looked at
@@ -254,7 +254,7 @@ def _mode_mission(flight: Flight, request: Any, view: View, settings: Settings) 
 def _offboard(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     if flight.phase == Phase.GUIDED and flight.guide == Guide.OFFBOARD:
         return flight, ACCEPTED
-    if not flight.offboard.steady(view.now_us, STEADY_US):
+    if not flight.offboard.alive(view.now_us, STREAM_US):
         return flight, _later("OFFBOARD denied: send setpoints first, more than two a second")
     if flight.phase in ON_GROUND:
         return replace(flight, selected=Selected.OFFBOARD, on_mission=False), ACCEPTED
@@ -347,18 +347,18 @@ def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settin
     if any(abs(value) > FARTHEST_M for value in position):
         return flight, _denied(f"Setpoint refused: more than {FARTHEST_M:g} m away")
     asked = Wish(position, request.velocity, request.accel, view.now_us)
-    return replace(flight, offboard=flight.offboard.heard(asked, view.now_us)), ACCEPTED
+    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
 
 
 def _follow_attitude(flight: Flight, request: FollowAttitude, view: View, settings: Settings) -> Decision:
     thrust = None if request.thrust is None else request.thrust / settings.hover_share * settings.weight_n
     asked = Lean(request.upward, thrust)
-    return replace(flight, offboard=flight.offboard.heard(asked, view.now_us)), ACCEPTED
+    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
 
 
 def _follow_stick(flight: Flight, request: FollowStick, view: View, settings: Settings) -> Decision:
     asked = Wish(velocity=scale(settings.stick_speed_m_s, request.share), since_us=view.now_us)
-    return replace(flight, manual=flight.manual.heard(asked, view.now_us)), ACCEPTED
+    return replace(flight, manual=Stream(asked, view.now_us)), ACCEPTED
 
 
 def _orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Decision:

@@ -25,7 +25,7 @@ on from the jet of the one before.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import atan, comb, cos, exp, inf, isnan, nan, sin, sqrt
 
 from autopilot.control.records import Jet
@@ -234,26 +234,14 @@ class Posture:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What was heard last of one source, when, and when the one before."""
+    """What was heard last of one source, and when."""
 
     asked: Asked | None = None
     at_us: int = -1
-    before_us: int = -1
-
-    def heard(self, asked: Asked, now_us: int) -> Stream:
-        """The stream after one more."""
-        if now_us == self.at_us:
-            return replace(self, asked=asked)
-        return Stream(asked, now_us, self.at_us)
 
     def alive(self, now_us: int, within_us: int) -> bool:
         """Whether something was heard in that time."""
         return self.at_us >= 0 and now_us - self.at_us <= within_us
-
-    def steady(self, now_us: int, within_us: int) -> bool:
-        """Whether it comes at that pace: the last two were no further apart than that."""
-        paced = self.before_us >= 0 and self.at_us - self.before_us <= within_us
-        return paced and self.alive(now_us, within_us)
 
 
 SILENT = Stream()

@@ -360,7 +360,7 @@ def under_way(phase: Phase) -> Flight:
         step=1,
         takeoff_altitude_m=4.0,
         speed_m_s=1.0,
-        offboard=Stream(Wish(HERE), 0, 0),
+        offboard=Stream(Wish(HERE), 0),
     )
     return enter(held, phase, hanging(x=HERE), SETTINGS)
 
