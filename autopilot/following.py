@@ -168,7 +168,7 @@ class Follow:
 
 
 def begin_following(jet: Jet, rate: float) -> Follow:
-    """A motion that goes on from `jet` and comes to rest unless something is asked."""
+    """A motion that goes on from `jet` at its velocity until something is asked."""
     return Follow(jet, (axpy(ORDER / rate, jet[1], jet[0]), jet[1], ZERO), rate)
 
 

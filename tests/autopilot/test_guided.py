@@ -352,3 +352,30 @@ def test_steps_of_an_offboard_stream_in_the_simulator() -> None:
     assert norm(sub(craft.truth.x_load, (0.0, -1.0, 2.0))) < 0.02
     craft.wait(1.5)
     assert craft.flight.phase == Phase.HOLD
+
+
+# ---- whatever is asked, in any order
+
+number = st.floats(-30.0, 30.0) | st.just(math.nan)
+triple = st.tuples(number, number, number)
+some_request = (
+    st.builds(FollowSetpoint, triple, triple, triple, st.booleans())
+    | st.builds(FollowStick, st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+    | st.builds(Orbit, number, number, st.none() | number, st.none() | number, st.none() | number)
+    | st.sampled_from([OFFBOARD, POSCTL, Pause(), ReturnHome(), Land(), SetHome(None)])
+    | st.just(FollowAttitude((0.0, 0.0, 1.0), None))
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(some_request, max_size=12))
+def test_any_requests_in_any_order_leave_something_to_fly(requests: list[Any]) -> None:
+    sky = Sky().airborne()
+    for request in requests:
+        sky.ask(request)
+        for _ in range(5):
+            sky.tick()
+            assert sky.flight.phase != Phase.FAILSAFE, sky.texts
+            for leg in sky.flight.legs[:1]:
+                t = (sky.now_us - sky.flight.leg_start_us) * 1e-6
+                assert all(math.isfinite(value) for row in leg.jet(t) for value in row)
