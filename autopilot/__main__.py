@@ -6,7 +6,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -20,6 +20,7 @@ from autopilot.onboard import Onboard, Work
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
+    AreasChanged,
     Event,
     Link,
     MissionChanged,
@@ -34,6 +35,7 @@ from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
 from autopilot.wire.parameters import ParameterError
 from autopilot.wire.shell import (
     Address,
@@ -244,6 +246,11 @@ class Program:
         self.onboard = build(mission)
         self._ground.join(self.onboard)
 
+    def take_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
+        """Fence and rally points that are already there."""
+        for kind, items in areas.items():
+            self.onboard.take_areas(kind, items)
+
     def run(self, stop: StopRequest) -> None:
         """Tick for ever."""
         set_timeout(self._socket, _GREETING_S)
@@ -290,8 +297,10 @@ class Program:
                 heard = time.monotonic()
             elif self.onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
+                areas = self.onboard.endpoint.areas
                 self._end_log()
                 self.onboard = self._build(self.onboard.endpoint.mission)
+                self.take_areas(areas)
                 self._ground.join(self.onboard)
 
     def _answer(self, answer: bytes, stop: StopRequest, new: bool) -> None:
@@ -319,6 +328,8 @@ class Program:
                 match event:
                     case MissionChanged(mission):
                         self._storage.keep_mission(mission)
+                    case AreasChanged(kind, items):
+                        self._storage.keep_areas(kind, items)
                     case ParameterChanged(name, value):
                         self._storage.keep_parameter(name, value)
                     case SigningChanged(key, timestamp):
@@ -465,6 +476,10 @@ def main(
         stations = [address for address in (*gcs, api) if address is not None]
         ground = GroundInStep(ground_lockstep) if ground_lockstep else GroundStations(tuple(stations))
         program = Program(build, mission, kept, sim, ground, say)
+        areas, troubles = kept.load_areas(place)
+        for trouble in troubles:
+            print(f"autopilot: {trouble}", file=sys.stderr)
+        program.take_areas(areas)
         program.onboard.rehearse()
         be_punctual()
         with StopRequest() as stop:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from math import cos, inf, nan, radians
+from math import cos, hypot, inf, nan, radians, sqrt
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import Vec3
+from autopilot.following import SILENT, SMOOTH_SHARE, Circle, Pace, Stream
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance import Leg, asked_jet, least_move_s
 from autopilot.vehicle.parameters import LAWS, SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.fence import NO_FENCE, Fence
 from autopilot.wire.parameters import ParameterTable
 from missions.demand import Bounds
 from missions.model import Step
@@ -32,10 +34,11 @@ class Phase(IntEnum):
     LOWER = mavlink.PLUMBLINE_PHASE_LOWER
     SET_DOWN = mavlink.PLUMBLINE_PHASE_SET_DOWN
     FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
+    GUIDED = mavlink.PLUMBLINE_PHASE_GUIDED
 
 
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
-CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER})
+CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
 
 
@@ -49,6 +52,7 @@ class Event(Enum):
     DONE = "legs done"
     HOLD = "hold"
     MISSION = "fly the mission"
+    GUIDE = "follow setpoints"
     RETURN = "return"
     LAND = "land"
     LOAD_DOWN = "load on the ground"
@@ -62,6 +66,15 @@ class Selected(Enum):
     NOTHING = "hold"
     TAKEOFF = "take-off"
     MISSION = "mission"
+    OFFBOARD = "offboard"
+
+
+class Guide(Enum):
+    """Whose word is followed in the phase GUIDED."""
+
+    OFFBOARD = "setpoints"
+    MANUAL = "the stick"
+    ORBIT = "a circle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +108,16 @@ class Flight:
     slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
     slack_step: int = -1  # mission step in which it last went slack
     taut_length_m: float = 0.0  # from load to vehicle when lifting began: of the cable as it is
+    guide: Guide = Guide.OFFBOARD
+    offboard: Stream = SILENT
+    manual: Stream = SILENT
+    circle: Circle | None = None
+    home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
+    rally: tuple[Vec3, ...] = ()  # where it leads as well, if that is nearer
+    fence: Fence = NO_FENCE
+    breach: str = ""  # why load or vehicle may not be where it is, or is about to be
+    breaches: int = 0
+    breach_us: int = 0  # when the last one began
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +139,16 @@ class Settings:
     ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
     load_weight_n: float
     snap_speed_m_s: float  # greatest closing speed at which a slack cable is made taut
+    offboard_loss_us: int  # silence after which setpoints count as lost
+    manual_loss_us: int
+    stick_speed_m_s: float  # of the load, for a stick pushed home
+    fastest_m_s: float  # velocity setpoint
+    hover_share: float  # thrust of an attitude setpoint that hovers
+    weight_n: float  # of vehicle and load
+    fence_action: int  # GF_ACTION
+    fence_radius_m: float  # 0: none
+    fence_height_m: float  # 0: none
+    guides_vehicle: bool  # position setpoints are for the vehicle, which is kept a cable length over the load
 
 
 class View(NamedTuple):
@@ -157,6 +190,16 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         ramp_lag_s=ramp_lag_s,
         load_weight_n=table["VEH_LOAD_MASS"] * table["VEH_GRAVITY"],
         snap_speed_m_s=table["MIS_SNAP_SPEED"],
+        offboard_loss_us=round(1e6 * table["COM_OF_LOSS_T"]),
+        manual_loss_us=round(1e6 * table["COM_RC_LOSS_T"]),
+        stick_speed_m_s=table["MPC_VEL_MANUAL"],
+        fastest_m_s=table["MPC_XY_VEL_MAX"],
+        hover_share=table["MPC_THR_HOVER"],
+        weight_n=(table["VEH_QUAD_MASS"] + table["VEH_LOAD_MASS"]) * table["VEH_GRAVITY"],
+        fence_action=int(table["GF_ACTION"]),
+        fence_radius_m=table["GF_MAX_HOR_DIST"],
+        fence_height_m=table["GF_MAX_VER_DIST"],
+        guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 
 
@@ -198,6 +241,21 @@ def limits_from(table: ParameterTable) -> Limits:
         table["MIS_ACCEL"],
         table["MIS_TIME_OPT"] != 0.0,
     )
+
+
+def pace_of(flight: Flight, settings: Settings) -> Pace:
+    """How setpoints are followed."""
+    rate = SMOOTH_SHARE * sqrt(settings.gravity_m_s2 / settings.cable_length_m)
+    return Pace(flight.speed_m_s, settings.fastest_m_s, settings.accel_m_s2, rate)
+
+
+def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
+    """Why load or vehicle may not be there, the vehicle a cable length above; an empty string if they may."""
+    if settings.fence_radius_m > 0.0 and hypot(x_load[0], x_load[1]) > settings.fence_radius_m:
+        return f"more than GF_MAX_HOR_DIST {settings.fence_radius_m:g} m from home"
+    if settings.fence_height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence_height_m:
+        return f"higher than GF_MAX_VER_DIST {settings.fence_height_m:g} m"
+    return fence.complaint(x_load[0], x_load[1])
 
 
 def leg_time_s(flight: Flight, now_us: int) -> float:

@@ -32,6 +32,7 @@ from autopilot.services.heartbeat import heartbeat_message
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
+    AreasChanged,
     Event,
     Link,
     MissionChanged,
@@ -46,7 +47,8 @@ from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import located_steps
+from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.mission_items import WireItem, located_steps, unflown
 from autopilot.wire.parameters import ParameterTable
 from autopilot.wire.signing import Signing
 from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
@@ -57,6 +59,7 @@ GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
+MOST_NAMED = 8  # items in one text
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
 
 
@@ -276,6 +279,8 @@ class Onboard:
             match event:
                 case MissionChanged(mission):
                     self._take_plan(mission)
+                case AreasChanged(kind, items):
+                    self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
                 case TimesyncAnswered() | SigningChanged():
@@ -332,10 +337,24 @@ class Onboard:
         self._state = state._replace(flight=flight)
         return verdict
 
+    def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
+        """Another fence, other rally points."""
+        self.endpoint.set_areas(kind, items)
+        flight = self._state.flight
+        if kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            flight = replace(flight, fence=read_fence(items, self._options.home), breach="")
+        else:
+            flight = replace(flight, rally=read_rally(items, self._options.home))
+        self._state = self._state._replace(flight=flight)
+
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
         self._prepare()
+        kept = unflown(mission.items)
+        if kept:
+            numbers = ", ".join(map(str, kept[:MOST_NAMED])) + (" ..." if len(kept) > MOST_NAMED else "")
+            self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
 
     def _prepare(self) -> None:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""

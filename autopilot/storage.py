@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -11,12 +12,26 @@ from autopilot.card import DirectoryCard
 from autopilot.flight_log import LogChunk
 from autopilot.services import files
 from autopilot.services.files import LOG_ENDING, LOG_FOLDER
-from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
+from autopilot.services.mission_store import (
+    CorruptMission,
+    StoredMission,
+    deserialise,
+    deserialise_items,
+    serialise,
+)
 from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.mission_items import MissionItemError, WireItem
 from autopilot.wire.parameters import ParameterError, ParameterTable, parse_text
 from autopilot.wire.signing import Signing
 
 MISSION_FILE = "mission.bin"
+AREA_FILES = {mavlink.MAV_MISSION_TYPE_FENCE: "fence.bin", mavlink.MAV_MISSION_TYPE_RALLY: "rally.bin"}
+_READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
+    mavlink.MAV_MISSION_TYPE_FENCE: read_fence,
+    mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
+}
 PARAMETER_FILE = "parameters.txt"
 SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
 CARD_DIRECTORY = "card"  # what clients reach by FILE_TRANSFER_PROTOCOL
@@ -73,6 +88,33 @@ class Storage:
                 return None, f"{path}: {mission.reason}; {error.strerror}, starting without a mission"
             return None, f"{path}: {mission.reason}; moved to {aside.name}, starting without a mission"
         return mission, ""
+
+    def load_areas(self, home: Home) -> tuple[dict[int, tuple[WireItem, ...]], list[str]]:
+        """The stored fence and rally points by MAV_MISSION_TYPE, and a line for each that is none."""
+        found: dict[int, tuple[WireItem, ...]] = {}
+        troubles = []
+        for kind, name in AREA_FILES.items():
+            path = self._directory / name
+            try:
+                items = deserialise_items(path.read_bytes())
+                if isinstance(items, CorruptMission):
+                    troubles.append(f"{path}: {items.reason}; starting without it")
+                    continue
+                _READERS[kind](items, home)
+                found[kind] = items
+            except FileNotFoundError:
+                continue
+            except (OSError, MissionItemError) as error:
+                troubles.append(f"{path}: {error}; starting without it")
+        return found, troubles
+
+    def keep_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
+        """Store fence or rally points; none are stored as none."""
+        path = self._directory / AREA_FILES[kind]
+        if items:
+            self._write(path, serialise(items))
+        else:
+            path.unlink(missing_ok=True)
 
     def load_parameters(self, table: ParameterTable) -> list[str]:
         """Set what is stored; returns a line for each stored value that no longer fits."""

@@ -18,6 +18,7 @@ from autopilot.services.commands import CommandService
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
 from autopilot.services.ftp import FtpService
+from autopilot.services.guided import GuidedService
 from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT, Identity
 from autopilot.services.links import LinkState, Outgoing
 from autopilot.services.logs import LogService
@@ -38,6 +39,9 @@ from autopilot.services.records import (
     Verdict,
 )
 from autopilot.services.requests import (
+    FollowAttitude,
+    FollowSetpoint,
+    FollowStick,
     GetMessageInterval,
     RequestCapabilities,
     RequestMessage,
@@ -52,6 +56,7 @@ from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WAT
 from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
 from autopilot.wire.parameters import ParameterTable
 from autopilot.wire.signing import Signing
 
@@ -64,6 +69,7 @@ _ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
+_STREAMED = FollowSetpoint | FollowAttitude | FollowStick  # they change no mode
 _METADATA = {
     mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: metadata_message,
     mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: information_message,
@@ -90,6 +96,7 @@ class VehicleEndpoint:
         self._missions = MissionService(home, mission or StoredMission())
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
+        self._guided = GuidedService(home, identity.system)
         made = made_files(identity, parameters, lambda: self._missions.mission)
         self.files = FileTree(MemoryCard() if card is None else card, made)
         self._ftp = FtpService(self.files)
@@ -111,6 +118,15 @@ class VehicleEndpoint:
     def mission(self) -> StoredMission:
         """The mission in force."""
         return self._missions.mission
+
+    @property
+    def areas(self) -> dict[int, tuple[WireItem, ...]]:
+        """The items of fence and rally points by MAV_MISSION_TYPE."""
+        return dict(self._missions.areas)
+
+    def set_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
+        """Fence or rally points as they were stored."""
+        self._missions.areas[kind] = items
 
     @property
     def links(self) -> tuple[Link, ...]:
@@ -317,7 +333,7 @@ class VehicleEndpoint:
                 case SetMessageInterval(message_id, interval_us):
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
-            if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
+            if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 self.state_changed()
             return verdict
 
@@ -358,12 +374,17 @@ class VehicleEndpoint:
     def _handler_table(self) -> dict[int, Handler]:
         """What is done about each message; all others are for somebody else."""
         commands, missions, parameters = self._commands, self._missions, self._parameters
+        guided = self._guided
         m = mavlink
         return {
             m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
+            m.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: guided.receive_local,
+            m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,
+            m.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: guided.receive_attitude,
+            m.MAVLINK_MSG_ID_MANUAL_CONTROL: guided.receive_stick,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: parameters.receive_request_list,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: parameters.receive_request_read,
             m.MAVLINK_MSG_ID_PARAM_SET: parameters.receive_set,

@@ -63,6 +63,17 @@ def serialise(items: tuple[WireItem, ...]) -> bytes:
 
 def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
     """The mission in `data`; anything but what `serialise` wrote is `CorruptMission`."""
+    items = deserialise_items(data)
+    if isinstance(items, CorruptMission):
+        return items
+    try:
+        return StoredMission(items, located_steps(items, home))
+    except MissionItemError as error:
+        return CorruptMission(str(error))
+
+
+def deserialise_items(data: bytes) -> tuple[WireItem, ...] | CorruptMission:
+    """The items in `data`, of any kind."""
     if len(data) < _HEAD.size + _CHECK.size or not data.startswith(_MAGIC):
         return CorruptMission(f"{len(data)} bytes that do not begin as a mission file")
     _, version, count = _HEAD.unpack_from(data)
@@ -73,8 +84,4 @@ def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
     body, (check,) = data[: -_CHECK.size], _CHECK.unpack(data[-_CHECK.size :])
     if zlib.crc32(body) != check:
         return CorruptMission("its checksum is wrong")
-    items = tuple(WireItem(*record) for record in _RECORD.iter_unpack(body[_HEAD.size :]))
-    try:
-        return StoredMission(items, located_steps(items, home))
-    except MissionItemError as error:
-        return CorruptMission(str(error))
+    return tuple(WireItem(*record) for record in _RECORD.iter_unpack(body[_HEAD.size :]))

@@ -12,22 +12,24 @@ Upload, seen from here (one at a time; the old mission stays in force until the 
                ACK from the peer    it has given up                       -> idle
                silence              ask again; after MAX_ASKS: ACK OPERATION_CANCELLED -> idle
 
-Fences and rally points are not served: their lists are empty, their upload is UNSUPPORTED.
+Fence and rally points are transferred in the same way, one transfer at a time of any kind.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 from autopilot.services.mission_store import MAX_ITEMS, StoredMission
-from autopilot.services.records import Announce, Decide, MissionChanged, Output, Peer, Say, Send
+from autopilot.services.records import Announce, AreasChanged, Decide, MissionChanged, Output, Peer, Say, Send
 from autopilot.services.requests import ReplaceMission
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import MissionItemError, WireItem, located_steps
+from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.mission_items import LocatedStep, MissionItemError, WireItem, located_steps
 
 ASK_US = 500_000  # an item that was asked for is asked for again after this silence
 MAX_ASKS = 6  # times that one item is asked for: once, and five times more
@@ -38,8 +40,12 @@ LATE_US = 5_000_000  # a last item repeated within this time after the end means
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _ALL = mavlink.MAV_MISSION_TYPE_ALL
-_UNSERVED = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
+_AREAS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 _ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
+_READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
+    mavlink.MAV_MISSION_TYPE_FENCE: read_fence,
+    mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
+}
 
 _NO_INT = 2**31 - 1
 _LOCAL_FRAMES = (
@@ -57,6 +63,7 @@ class _Upload:
     peer: Peer
     count: int
     ask_again_us: int
+    kind: int = _MISSION
     asks: int = 1  # times that the next item was asked for
     as_float: bool = False  # the client speaks MISSION_ITEM
     items: list[WireItem] = field(default_factory=list)
@@ -70,6 +77,7 @@ class _Ended:
     count: int
     result: int
     at_us: int
+    kind: int
 
 
 class MissionService:
@@ -78,6 +86,7 @@ class MissionService:
     def __init__(self, home: Home, mission: StoredMission) -> None:
         self.home = home
         self.mission = mission
+        self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
         self._ended: _Ended | None = None
 
@@ -86,21 +95,21 @@ class MissionService:
     def receive_count(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_COUNT: a client wants to upload."""
         kind, count = message.mission_type, message.count
-        if kind != _MISSION:
-            empty = kind in _UNSERVED and count == 0
-            return [_ack(peer, _ACCEPTED if empty else mavlink.MAV_MISSION_UNSUPPORTED, kind)]
+        if kind != _MISSION and kind not in _AREAS:
+            return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
         if self._upload and self._upload.peer != peer:
-            return [_ack(peer, mavlink.MAV_MISSION_DENIED)]
+            return [_ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
         self._upload = None
         if count > MAX_ITEMS:
             why = f"Mission of {count} items; at most {MAX_ITEMS} are kept"
-            return [Say(mavlink.MAV_SEVERITY_WARNING, why), _ack(peer, mavlink.MAV_MISSION_NO_SPACE)]
-        refused = self._refusal(count, peer, decide)
+            return [Say(mavlink.MAV_SEVERITY_WARNING, why), _ack(peer, mavlink.MAV_MISSION_NO_SPACE, kind)]
+        refused = [] if kind in _AREAS else self._refusal((), count, peer, decide)
         if refused:
             return refused
         if count == 0:
-            return [*self._replaced(StoredMission()), _ack(peer, _ACCEPTED)]
-        self._upload = _Upload(peer, count, now_us + ASK_US)
+            done = self._area_replaced(kind, ()) if kind in _AREAS else self._replaced(StoredMission())
+            return [*done, _ack(peer, _ACCEPTED, kind)]
+        self._upload = _Upload(peer, count, now_us + ASK_US, kind)
         return [self._ask()]
 
     def receive_item_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
@@ -113,7 +122,7 @@ class MissionService:
 
     def receive_ack(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_ACK: the end of a download, or the client gives up its upload."""
-        if self._upload and self._upload.peer == peer and message.mission_type == _MISSION:
+        if self._upload and self._upload.peer == peer and message.mission_type == self._upload.kind:
             self._upload = None
         return []
 
@@ -129,7 +138,7 @@ class MissionService:
         if upload.asks == MAX_ASKS:
             self._end(mavlink.MAV_MISSION_OPERATION_CANCELLED, now_us)
             why = f"Mission upload given up: item {len(upload.items)} of {upload.count} did not come"
-            cancelled = _ack(upload.peer, mavlink.MAV_MISSION_OPERATION_CANCELLED)
+            cancelled = _ack(upload.peer, mavlink.MAV_MISSION_OPERATION_CANCELLED, upload.kind)
             return [Say(mavlink.MAV_SEVERITY_WARNING, why), cancelled]
         if not upload.items and upload.asks >= INT_ASKS:
             upload.as_float = True
@@ -146,9 +155,9 @@ class MissionService:
         now_us: int,
         decide: Decide,
     ) -> list[Output]:
-        if message.mission_type != _MISSION:
-            return []
         upload = self._upload
+        if upload is not None and upload.peer == peer and message.mission_type != upload.kind:
+            return []
         if upload is None or upload.peer != peer:
             return self._late_item(message, peer, now_us)
         expected = len(upload.items)
@@ -161,7 +170,7 @@ class MissionService:
             why = f"Mission item {expected}: x or y is no coordinate"
             return [
                 Say(mavlink.MAV_SEVERITY_WARNING, why),
-                _ack(peer, mavlink.MAV_MISSION_INVALID_PARAM5_X),
+                _ack(peer, mavlink.MAV_MISSION_INVALID_PARAM5_X, upload.kind),
             ]
         upload.items.append(item)
         upload.asks, upload.ask_again_us, upload.as_float = 1, now_us + ASK_US, as_float
@@ -171,13 +180,17 @@ class MissionService:
 
     def _complete(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
         """All items are here: check them as a whole, and only then replace the mission."""
-        items = tuple(upload.items)
+        items, kind = tuple(upload.items), upload.kind
         try:
+            if kind in _AREAS:
+                _READERS[kind](items, self.home)
+                self._end(_ACCEPTED, now_us)
+                return [*self._area_replaced(kind, items), _ack(upload.peer, _ACCEPTED, kind)]
             steps = located_steps(items, self.home)
         except MissionItemError as error:
             self._end(error.result, now_us)
-            return [Say(mavlink.MAV_SEVERITY_WARNING, str(error)), _ack(upload.peer, error.result)]
-        refused = self._refusal(upload.count, upload.peer, decide)
+            return [Say(mavlink.MAV_SEVERITY_WARNING, str(error)), _ack(upload.peer, error.result, kind)]
+        refused = self._refusal(steps, upload.count, upload.peer, decide)
         if refused:
             self._end(mavlink.MAV_MISSION_DENIED, now_us)
             return refused
@@ -190,14 +203,15 @@ class MissionService:
             ended
             and ended.peer == peer
             and message.seq == ended.count - 1
+            and message.mission_type == ended.kind
             and now_us - ended.at_us <= LATE_US
         ):
-            return [_ack(peer, ended.result)]
+            return [_ack(peer, ended.result, ended.kind)]
         return []
 
     def _end(self, result: int, now_us: int) -> None:
         if self._upload:
-            self._ended = _Ended(self._upload.peer, self._upload.count, result, now_us)
+            self._ended = _Ended(self._upload.peer, self._upload.count, result, now_us, self._upload.kind)
         self._upload = None
 
     def _ask(self) -> Output:
@@ -209,32 +223,50 @@ class MissionService:
             else mavlink.MAVLink_mission_request_int_message
         )
         peer = upload.peer
-        return Send(peer.link, request(peer.system, peer.component, len(upload.items), _MISSION))
+        return Send(peer.link, request(peer.system, peer.component, len(upload.items), upload.kind))
 
     # ---- replace and clear
 
     def receive_clear_all(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_CLEAR_ALL."""
         kind = message.mission_type
-        if kind in _UNSERVED:
-            return [_ack(peer, _ACCEPTED, kind)]
-        if kind not in (_MISSION, _ALL):
+        if kind not in (_MISSION, _ALL, *_AREAS):
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
         if self._upload and self._upload.peer != peer:
             return [_ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
-        refused = self._refusal(0, peer, decide, kind)
+        refused = [] if kind in _AREAS else self._refusal((), 0, peer, decide, kind)
         if refused:
             return refused
-        self._upload = None
-        return [*self._replaced(StoredMission()), _ack(peer, _ACCEPTED, kind)]
+        if self._upload and kind in (self._upload.kind, _ALL):
+            self._upload = None
+        done: list[Output] = []
+        for area in _AREAS:
+            if kind in (area, _ALL):
+                done += self._area_replaced(area, ())
+        if kind not in _AREAS:
+            done += self._replaced(StoredMission())
+        return [*done, _ack(peer, _ACCEPTED, kind)]
 
-    def _refusal(self, count: int, peer: Peer, decide: Decide, kind: int = _MISSION) -> list[Output]:
+    def _refusal(
+        self,
+        steps: tuple[LocatedStep, ...],
+        count: int,
+        peer: Peer,
+        decide: Decide,
+        kind: int = _MISSION,
+    ) -> list[Output]:
         """Why the mission may not be replaced now; empty if it may."""
-        verdict = decide(ReplaceMission(count))
+        verdict = decide(ReplaceMission(count, steps))
         if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
             return []
         said: list[Output] = [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
         return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
+
+    def _area_replaced(self, kind: int, items: tuple[WireItem, ...]) -> list[Output]:
+        if self.areas[kind] == items:
+            return []
+        self.areas[kind] = items
+        return [AreasChanged(kind, items)]
 
     def _replaced(self, mission: StoredMission) -> list[Output]:
         self.mission = mission
@@ -245,11 +277,15 @@ class MissionService:
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_REQUEST_LIST: how many items there are, told to the asker alone."""
         kind = message.mission_type
-        if kind != _MISSION and kind not in _UNSERVED:
+        if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
-        count = len(self.mission.items) if kind == _MISSION else 0
+        count = len(self._items_of(kind))
         answer = mavlink.MAVLink_mission_count_message(peer.system, peer.component, count, kind)
         return [Send(peer.link, answer)]
+
+    def _items_of(self, kind: int) -> tuple[WireItem, ...]:
+        """All items of a kind; none of a kind that does not exist."""
+        return self.mission.items if kind == _MISSION else self.areas.get(kind, ())
 
     def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_REQUEST_INT: any item in any order, as often as asked."""
@@ -261,9 +297,10 @@ class MissionService:
 
     def _download(self, message: Any, peer: Peer, answer: Any, coordinates: Any) -> list[Output]:
         kind, seq = message.mission_type, message.seq
-        if kind != _MISSION or seq >= len(self.mission.items):
+        items = self._items_of(kind)
+        if seq >= len(items):
             return [_ack(peer, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
-        item = self.mission.items[seq]
+        item = items[seq]
         x, y = coordinates(item)
         return [
             Send(

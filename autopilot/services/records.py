@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from autopilot.services.mission_store import StoredMission
+from autopilot.wire.mission_items import WireItem
 
 Link = Hashable  # opaque name of a way to a client, chosen by the shell
 
@@ -64,6 +65,14 @@ class MissionChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class AreasChanged:
+    """The fence or the rally points (`kind`: MAV_MISSION_TYPE) were replaced, or cleared (no items)."""
+
+    kind: int
+    items: tuple[WireItem, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class TimesyncAnswered:
     """A peer answered our TIMESYNC: both stamps as they stand in its message, ns."""
 
@@ -80,7 +89,7 @@ class SigningChanged:
     timestamp: int
 
 
-Event = ParameterChanged | MissionChanged | TimesyncAnswered | SigningChanged
+Event = ParameterChanged | MissionChanged | AreasChanged | TimesyncAnswered | SigningChanged
 Output = Send | Say | Announce | Event
 
 

@@ -57,6 +57,12 @@ class Snapshot(NamedTuple):
     landed_state: int  # MAV_LANDED_STATE
     system_status: int  # MAV_STATE
 
+    launch: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
+
+    breach: str = ""  # of the fence; empty: none
+    breaches: int = 0
+    breach_us: int = 0
+
     # estimate of the vehicle
     x_quad: Vec3 = ZERO
     v_quad: Vec3 = ZERO

@@ -68,7 +68,7 @@ def _heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     # There is no fence, so none is breached: some tools read a missing health bit as a breach
-    health = s.sensors_healthy | mavlink.MAV_SYS_STATUS_GEOFENCE
+    health = s.sensors_healthy | (0 if s.breach else mavlink.MAV_SYS_STATUS_GEOFENCE)
     present = s.sensors_present | PREARM
     return (
         mavlink.MAVLink_sys_status_message(
@@ -139,7 +139,7 @@ def _gps_global_origin(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _home_position(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (home_position_message(s.now_us, s.home),)
+    return (home_position_message(s.now_us, s.launch, s.home),)
 
 
 def _local_position_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -161,6 +161,20 @@ def _altitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 def _vfr_hud(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     throttle = _force_fraction(0.25 * sum(s.forces), s)
     return (vfr_hud_message(s.v_quad, s.quat_wxyz, s.x_quad[2], throttle, s.home),)
+
+
+def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    kind = mavlink.FENCE_BREACH_BOUNDARY
+    if s.breach.startswith("higher"):
+        kind = mavlink.FENCE_BREACH_MAXALT
+    return (
+        mavlink.MAVLink_fence_status_message(
+            breach_status=1 if s.breach else 0,
+            breach_count=min(s.breaches, 65535),
+            breach_type=kind if s.breach else mavlink.FENCE_BREACH_NONE,
+            breach_time=(s.breach_us // 1000) % 2**32,
+        ),
+    )
 
 
 def _mission_current(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -290,6 +304,7 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(_AUTOPILOT, _rate(5), _gps_raw_int),
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: Stream(_AUTOPILOT, _rate(1), _home_position),
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(_AUTOPILOT, _rate(1), _mission_current),
+    mavlink.MAVLINK_MSG_ID_FENCE_STATUS: Stream(_AUTOPILOT, _rate(1), _fence_status),
     mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(_AUTOPILOT, _rate(1), _estimator_status),
     mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(_AUTOPILOT, _rate(25), _attitude),
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(_AUTOPILOT, _rate(25), _attitude_quaternion),
@@ -328,5 +343,6 @@ WATCHED: dict[int, Callable[[Snapshot], tuple[Any, ...]]] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: lambda s: (s.armed, s.main_mode, s.sub_mode, s.system_status),
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda s: (s.landed_state,),
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda s: (s.mission_current, s.mission_total, s.mission_state),
-    mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home,),
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home, s.launch),
+    mavlink.MAVLINK_MSG_ID_FENCE_STATUS: lambda s: (s.breach, s.breaches),
 }

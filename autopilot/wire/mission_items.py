@@ -9,7 +9,13 @@ Positions are positions of the load. Where a standard command leaves freedom:
 * NAV_TAKEOFF lifts straight up; its latitude and longitude are ignored.
 * NAV_LAND with a place that is not where the load is left (by the items before it) goes there first.
 * Item 0 of a list that begins with home itself, as MAVProxy and Mission Planner write it, is not flown.
-* Commands above MAV_CMD_NAV_LAST that are not known (camera, gimbal ...) are kept and not flown.
+* NAV_LOITER_TURNS carries the load to the centre, spirals out in one turn, flies its turns and spirals
+  back in one.
+* NAV_LOITER_UNLIM holds for LONGEST_S: a day. NAV_SPLINE_WAYPOINT and NAV_LOITER_TO_ALT are waypoints.
+* DO_JUMP is flown by flying its items again; one without end is refused.
+* Commands that point or trigger something (camera, gimbal, region of interest ...) and those above
+  MAV_CMD_NAV_LAST that are not known are kept and not flown. Commands whose effect somebody relies on and
+  that this vehicle has not (gripper, winch, parachute, termination, change of mode or home) are refused.
 """
 
 from __future__ import annotations
@@ -48,6 +54,11 @@ SHORTEST_PERIOD_S = 0.1
 LONGEST_S = 86400.0
 FARTHEST_M = 100_000.0  # of home, as far as the earth may be taken as flat
 FASTEST_M_S = 100.0
+MOST_JUMPS = 1000  # repetitions of one jump
+MOST_FLOWN = 4000  # items, those that jumps repeat counted again
+MOST_TURNS, MOST_RADIUS_M = 1000.0, 1000.0
+TURN_SPEED_M_S = 1.5  # of NAV_LOITER_TURNS where no speed was set before
+TURN_ACCEL_M_S2 = 1.0  # inwards
 _HOME_ROW_M = 1.0  # how near to home item 0 is home
 
 _MISSION = mavlink.MAV_FRAME_MISSION
@@ -210,10 +221,31 @@ def decode_items(items: Sequence[WireItem], home: Home) -> tuple[Step, ...]:
 def located_steps(items: Sequence[WireItem], home: Home) -> tuple[LocatedStep, ...]:
     """As `decode_items`, each step with the items that MISSION_CURRENT and MISSION_ITEM_REACHED name."""
     reader = _Reader(home)
-    for seq, item in enumerate(items):
-        reader.read(seq, item)
+    jumps: dict[int, int] = {}
+    flown = seq = 0
+    while seq < len(items):
+        item = items[seq]
+        if item.command == mavlink.MAV_CMD_DO_JUMP:
+            reader.expect_no_terms(seq - 1)
+            last = len(items) - 1
+            target = _choice(seq, 1, "item to jump to", item.param1, range(last + 1), f"0 ... {last}")
+            times = _choice(seq, 2, "repetitions", item.param2, range(MOST_JUMPS + 1), f"0 ... {MOST_JUMPS}")
+            jumps[seq] = jumps.get(seq, 0) + 1
+            seq = target if jumps[seq] <= times else seq + 1
+        else:
+            reader.read(seq, item)
+            seq += 1
+        flown += 1
+        if flown > MOST_FLOWN:
+            text = f"with its jumps the mission has more than {MOST_FLOWN} items"
+            raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
     reader.expect_no_terms(len(items) - 1)
     return tuple(reader.steps)
+
+
+def unflown(items: Sequence[WireItem]) -> tuple[int, ...]:
+    """Numbers of the items that are kept and not flown."""
+    return tuple(seq for seq, item in enumerate(items) if item.command not in FLOWN_COMMANDS)
 
 
 class _Reader:
@@ -224,6 +256,7 @@ class _Reader:
         self._home = home
         self._terms: list[Term] = []
         self._first_term = 0
+        self._speed = TURN_SPEED_M_S
         self._left_at: Vec3 | None = None  # where the load hangs after the steps so far, if that is known
 
     def read(self, seq: int, item: WireItem) -> None:
@@ -237,7 +270,10 @@ class _Reader:
         elif command in _STANDARD or command == mavlink.PLUMBLINE_ATTITUDE_RUN:
             self.expect_no_terms(seq - 1)
             self._step(seq, item)
-        elif command <= mavlink.MAV_CMD_NAV_LAST:
+        elif command in _RELIED_ON:
+            text = f"command {command} cannot be done by this vehicle"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
+        elif command <= mavlink.MAV_CMD_NAV_LAST and command != mavlink.MAV_CMD_NAV_ROI:
             flown = ", ".join(map(str, sorted(_STANDARD)))
             text = f"command {command}; must be one of {flown} or 31010 ... 31013"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
@@ -257,9 +293,15 @@ class _Reader:
             height = self._height(seq, item)
             self._left_at = (0.0, 0.0, height)
             self._add(seq, Takeoff(height))
-        elif command in (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LOITER_TIME):
+        elif command == mavlink.MAV_CMD_NAV_LOITER_TURNS:
+            self._turns(seq, item)
+        elif command in _PLACES:
             if not self._is_home_row(seq, item):
-                hold = _check(seq, 1, "hold", item.param1, "s", 0.0, LONGEST_S)
+                hold = 0.0
+                if command == mavlink.MAV_CMD_NAV_LOITER_UNLIM:
+                    hold = LONGEST_S
+                elif command != mavlink.MAV_CMD_NAV_LOITER_TO_ALT:
+                    hold = _check(seq, 1, "hold", item.param1, "s", 0.0, LONGEST_S)
                 east, north = self._place(seq, item)
                 height = self._height(seq, item)
                 self._left_at = (east, north, height)
@@ -267,7 +309,10 @@ class _Reader:
         elif command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
             kind = _choice(seq, 1, "speed type", item.param1, (0, 1, 2, 3))
             if kind in (0, 1) and item.param2 != -1.0:  # -1: no change; 2, 3: climb and descent
-                self._add(seq, Speed(_check(seq, 2, "speed", item.param2, "m/s", 0.01, FASTEST_M_S)))
+                self._speed = _check(seq, 2, "speed", item.param2, "m/s", 0.01, FASTEST_M_S)
+                self._add(seq, Speed(self._speed))
+        elif command == mavlink.MAV_CMD_DO_CHANGE_ALTITUDE:
+            self._change_altitude(seq, item)
         elif command in (mavlink.MAV_CMD_NAV_DELAY, mavlink.MAV_CMD_CONDITION_DELAY):
             self._add(seq, Delay(_check(seq, 1, "delay", item.param1, "s", 0.0, LONGEST_S)))
         elif command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
@@ -278,6 +323,37 @@ class _Reader:
             self._land(seq, item)
         else:
             self._attitude_run(seq, item)
+
+    def _turns(self, seq: int, item: WireItem) -> None:
+        """A spiral out, turns, a spiral in: an amplitude that rises and falls, times sine and cosine."""
+        turns = _check(seq, 1, "turns", item.param1, "", 0.0, MOST_TURNS)
+        radius = _check(seq, 3, "radius", item.param3, "m", -MOST_RADIUS_M, MOST_RADIUS_M)
+        east, north = self._place(seq, item)
+        height = self._height(seq, item)
+        self._left_at = (east, north, height)
+        self._add(seq, Waypoint(east, north, height))
+        if radius == 0.0 or turns == 0.0:
+            return
+        speed = min(self._speed, math.sqrt(TURN_ACCEL_M_S2 * abs(radius)))
+        period = max(2.0 * math.pi * abs(radius) / speed, SHORTEST_PERIOD_S)
+        quarter = 0.5 * math.pi
+        # clockwise seen from above for a positive radius: east as the sine, north as the cosine
+        phases: tuple[tuple[Axis, float], ...] = (("x", 0.0 if radius > 0.0 else math.pi), ("y", quarter))
+        terms = tuple(
+            Term(axis, abs(radius), 0.0, period, turns * period, period, (Sine(period, phase),))
+            for axis, phase in phases
+        )
+        self._add(seq, Signals((turns + 2.0) * period, terms))
+
+    def _change_altitude(self, seq: int, item: WireItem) -> None:
+        frame = _choice(seq, 2, "frame", item.param2, _GLOBAL_FRAMES)
+        height = item.param1 - (self._home.altitude_m if frame in _ABSOLUTE_FRAMES else 0.0)
+        height = _check(seq, 1, "height above home", height, "m", 0.01, FARTHEST_M)
+        if self._left_at is None:
+            text = "nothing before it says where the load hangs"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+        self._left_at = (self._left_at[0], self._left_at[1], height)
+        self._add(seq, Waypoint(*self._left_at))
 
     def _land(self, seq: int, item: WireItem) -> None:
         if item.frame in _PLACE_FRAMES and (item.x, item.y) != (0, 0) and self._left_at is not None:
@@ -407,6 +483,34 @@ _STANDARD = frozenset(
         mavlink.MAV_CMD_NAV_DELAY,
         mavlink.MAV_CMD_CONDITION_DELAY,
         mavlink.MAV_CMD_DO_CHANGE_SPEED,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TURNS,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+        mavlink.MAV_CMD_DO_CHANGE_ALTITUDE,
+    }
+)
+_PLACES = frozenset(
+    {
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+    }
+)
+_RELIED_ON = frozenset(
+    {
+        mavlink.MAV_CMD_DO_SET_MODE,
+        mavlink.MAV_CMD_DO_SET_HOME,
+        mavlink.MAV_CMD_DO_FLIGHTTERMINATION,
+        mavlink.MAV_CMD_DO_PARACHUTE,
+        mavlink.MAV_CMD_DO_GRIPPER,
+        mavlink.MAV_CMD_DO_WINCH,
+        mavlink.MAV_CMD_DO_REPOSITION,
+        mavlink.MAV_CMD_DO_ORBIT,
+        mavlink.MAV_CMD_DO_PAUSE_CONTINUE,
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
     }
 )
 # all that is flown; other commands above MAV_CMD_NAV_LAST are kept and passed over, the rest is refused
@@ -415,6 +519,7 @@ FLOWN_COMMANDS = _STANDARD | {
     mavlink.PLUMBLINE_LOAD_SIGNAL_FACTOR,
     mavlink.PLUMBLINE_LOAD_SIGNAL_RUN,
     mavlink.PLUMBLINE_ATTITUDE_RUN,
+    mavlink.MAV_CMD_DO_JUMP,
 }
 
 
@@ -427,10 +532,13 @@ def _check(seq: int, param: int, name: str, value: float, unit: str, low: float,
     raise MissionItemError(seq, text, _PARAM_RESULT[param - 1])
 
 
-def _choice(seq: int, param: int, name: str, value: float, allowed: tuple[int, ...]) -> int:
+def _choice(
+    seq: int, param: int, name: str, value: float, allowed: Sequence[int], shown: str | None = None
+) -> int:
     if value in allowed:
         return int(value)
-    text = f"{name} = {value:.7g}; must be one of {', '.join(map(str, sorted(allowed)))}"
+    wanted = shown or f"one of {', '.join(map(str, sorted(allowed)))}"
+    text = f"{name} = {value:.7g}; must be {wanted}"
     raise MissionItemError(seq, text, _PARAM_RESULT[param - 1])
 
 

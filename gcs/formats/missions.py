@@ -124,10 +124,6 @@ def _advice(item: WireItem, text: str) -> str:
 
 
 _INSTEAD = {
-    mavlink.MAV_CMD_NAV_LOITER_UNLIM: "a mission that ends holds the load: take it out",
-    mavlink.MAV_CMD_NAV_LOITER_TURNS: "use waypoints on the circle, or NAV_LOITER_TIME to hold",
-    mavlink.MAV_CMD_NAV_LOITER_TO_ALT: "use a waypoint at that height",
-    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "use NAV_WAYPOINT: legs are smooth anyway",
     mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "use NAV_TAKEOFF",
     mavlink.MAV_CMD_NAV_VTOL_LAND: "use NAV_LAND",
     mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: "use NAV_LAND: landing sets the load down first",

@@ -282,7 +282,7 @@ class _Flight:
         flight = self.state.flight
         if now_us == self.arm_us and flight.phase == Phase.DISARMED:
             view = self._view(now_us)
-            complaints = arming_complaints(flight, view)
+            complaints = arming_complaints(flight, view, self.setup.settings)
             if complaints and now_us < READY_LIMIT_US:
                 self.arm_us += GROUND_WINDOW_US
                 self.start_us += GROUND_WINDOW_US

@@ -59,6 +59,21 @@ REQUESTS: list[Any] = [
     R.Reposition(1.0, 2.0, 3.0, False),
     R.Reposition(math.nan, 0.0, 2.0, True),
     R.Reposition(0.0, 0.0, -2.0, True),
+    *(R.SetMode(main, 0) for main in (identity.OFFBOARD, identity.POSCTL)),
+    R.FollowSetpoint((1.0, 2.0, 3.0), (math.nan,) * 3, (math.nan,) * 3, False),
+    R.FollowSetpoint((math.nan,) * 3, (1.0, 0.0, 0.0), (math.nan,) * 3, True),
+    R.FollowSetpoint((1e9, 0.0, 0.0), (math.nan,) * 3, (math.nan,) * 3, False),
+    R.FollowAttitude((0.0, 0.0, 1.0), 0.5),
+    R.FollowAttitude((0.0, 0.0, 1.0), None),
+    R.SetMode(identity.OFFBOARD, 0),
+    R.FollowStick((0.0, 0.0, 0.0)),
+    R.SetMode(identity.POSCTL, 0),
+    R.Orbit(2.0, 1.0, 0.0, 0.0, 3.0),
+    R.Orbit(-2.0, None, None, None, None),
+    R.Orbit(0.0, 1.0, None, None, None),
+    R.ChangeAltitude(3.0),
+    R.ChangeAltitude(math.nan),
+    R.SetHome((0.0, 0.0, 50.0)),
     R.ChangeSpeed(2.0),
     R.ChangeSpeed(math.nan),
     R.ChangeSpeed(-1.0),
@@ -73,6 +88,7 @@ REQUESTS: list[Any] = [
     R.SetMessageInterval(1, 1),
     R.GetMessageInterval(1),
     R.RequestCapabilities(),
+    R.ChangeSigningKey(),
 ]
 
 
@@ -130,7 +146,7 @@ COMPLAINTS: dict[str, tuple[dict[str, Any], str]] = {
 def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> None:
     changes, why = COMPLAINTS[trouble]
     seen = view(**changes)
-    assert arming_complaints(Flight(), seen) == (why,)
+    assert arming_complaints(Flight(), seen, SETTINGS) == (why,)
     after, verdict = decide(Flight(), R.Arm(True, False), seen, SETTINGS)
     assert (after.phase, verdict.result, verdict.text) == (Phase.DISARMED, DENIED, f"Arming denied: {why}")
     _, told = decide(Flight(), R.RunPrearmChecks(), seen, SETTINGS)
@@ -140,7 +156,7 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
 
 
 def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:
-    assert arming_complaints(Flight(), view()) == ()
+    assert arming_complaints(Flight(), view(), SETTINGS) == ()
     assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1].text == "Ready to arm"
 
 

@@ -351,14 +351,14 @@ def test_what_of_a_plan_is_not_flown_is_told_and_skipped_only_if_asked(live, tmp
     vehicle, port = live
     file = tmp_path / "in.plan"
     take_off = (22, [0, 0, 0, None, 47.397742, 8.545594, 2.5])
-    plan = plan_of(take_off, (18, [2, 0, 0, 0, 47.397745, 8.5455941, 3]), (2000, [0] * 7))
+    plan = plan_of(take_off, (84, [2, 0, 0, 0, 47.397745, 8.5455941, 3]), (2000, [0] * 7))
     plan["geoFence"]["circles"] = [{}]
     file.write_text(json.dumps(plan))
     result = run("upload", str(file), "--connect", port)
     assert result.exit_code == EXIT_ERROR
     lines = result.stderr.splitlines()
     assert len(lines) == 4
-    assert "NAV_LOITER_TURNS (18)" in lines[0]
+    assert "NAV_VTOL_TAKEOFF (84)" in lines[0]
     assert "IMAGE_START_CAPTURE (2000)" in lines[1]
     assert "geoFence.circles: 1" in lines[2]
     assert "--skip" in lines[3]

@@ -94,17 +94,17 @@ def test_what_is_no_item_is_told() -> None:
 
 def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
     text = plan_text(
-        TAKEOFF, simple(18), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31004), simple(177, 2)
+        TAKEOFF, simple(84), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31004), simple(201, 2)
     )
     judged = judge(read_plan(text), HOME)
     lines = judged.unflown
     assert [line.partition(" (")[0] for line in lines] == ["item 1", "item 2", "item 4", "item 5", "item 6"]
-    assert "NAV_LOITER_TURNS (18)" in lines[0]
-    assert "use waypoints" in lines[0]
+    assert "NAV_VTOL_TAKEOFF (84)" in lines[0]
+    assert "use NAV_TAKEOFF" in lines[0]
     assert "DO_SET_CAM_TRIGG_DIST (206): kept on the vehicle but not done" in lines[1]
     assert "frame 10" in lines[2]
-    assert "DO_JUMP (177)" in lines[4]
-    assert [item.command for item in judged.items] == [22, 206, 16, 31004, 177]
+    assert "DO_SET_ROI (201)" in lines[4]
+    assert [item.command for item in judged.items] == [22, 206, 16, 31004, 201]
 
 
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:

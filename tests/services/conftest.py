@@ -135,6 +135,7 @@ STREAMED = [
     "CASCADE_ERRORS",
     "ROTOR_STATE",
     "MISSION_CURRENT",
+    "FENCE_STATUS",
 ]
 
 

@@ -55,9 +55,6 @@ def test_capabilities_promise_what_is_served_and_nothing_else():
     for name in ("MISSION_INT", "COMMAND_INT", "MAVLINK2", "PARAM_ENCODE_BYTEWISE", "FTP"):
         assert capabilities & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{name}")
     unserved = [
-        "MISSION_FENCE",
-        "MISSION_RALLY",
-        "SET_ATTITUDE_TARGET",
         "PARAM_ENCODE_C_CAST",
         "TERRAIN",
     ]

@@ -65,5 +65,5 @@ def test_reasons_can_be_read(items):
 
     assert "version 9" in reason(whole[:4] + b"\x09\x00" + whole[6:-4])
     assert "length" in reason(whole[:6] + b"\x03\x00" + whole[8:-4])
-    unflyable = serialise((CAMERA._replace(command=82),))
-    assert "82" in reason(unflyable[:-4])
+    unflyable = serialise((CAMERA._replace(command=84),))
+    assert "84" in reason(unflyable[:-4])

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.frames import ned_from_enu
+from autopilot.geometry.linear import norm
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import EARTH_RADIUS_M, Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
@@ -26,6 +27,7 @@ from autopilot.wire.mission_items import (
     encode_mission,
     encode_steps,
     located_steps,
+    unflown,
 )
 from missions.fileformat import load_mission, shipped
 from missions.model import (
@@ -41,6 +43,7 @@ from missions.model import (
     Term,
     Waypoint,
 )
+from missions.signals import evaluate, signal_table
 
 HOME = Home(47.397742, 8.545594, 488.0)
 FLOAT32 = 2.0**-24  # half a step of float32, relative
@@ -83,6 +86,10 @@ missions = st.lists(steps, max_size=8)
 def item(command: int, *params: float, frame: int = 2, x: int = 0, y: int = 0, z: float = 0.0) -> WireItem:
     p1, p2, p3, p4 = (*params, 0.0, 0.0, 0.0, 0.0)[:4]
     return WireItem(frame, command, 0, 1, p1, p2, p3, p4, x, y, z)
+
+
+def _jet(signals: Signals, t: float) -> Any:
+    return evaluate(signal_table(signals.terms), t)
 
 
 TERM = item(31010, 0.0, 1.0, 0.5, 0.5, y=-1)
@@ -169,8 +176,14 @@ def test_each_step_knows_its_items() -> None:
 
 REFUSALS = [
     # items, item that is refused, MAV_MISSION_RESULT, what the text speaks of
-    ([item(17, frame=6)], 0, "UNSUPPORTED", "command 17"),
-    ([item(82, frame=6)], 0, "UNSUPPORTED", "command 82"),
+    ([item(17, frame=2)], 0, "UNSUPPORTED_FRAME", "frame 2"),
+    ([item(84, frame=6)], 0, "UNSUPPORTED", "command 84"),
+    ([item(211, 1.0, 0.0)], 0, "UNSUPPORTED", "command 211"),
+    ([item(42600, 1.0, 1.0)], 0, "UNSUPPORTED", "command 42600"),
+    ([item(177, 3.0, 1.0)], 0, "INVALID_PARAM1", "item to jump to = 3; must be 0 ... 0"),
+    ([item(93, 1.0), item(177, 0.0, -1.0)], 1, "INVALID_PARAM2", "repetitions = -1; must be 0 ... 1000"),
+    ([item(186, 3.0, 3.0)], 0, "INVALID", "nothing before it says"),
+    ([item(18, math.nan, frame=6, z=2.0)], 0, "INVALID_PARAM1", "turns = nan"),
     ([item(16, frame=10, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 10"),
     ([item(16, frame=2, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 2"),
     ([item(22, frame=8, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 8"),
@@ -241,7 +254,7 @@ def test_a_step_that_would_be_refused_is_not_sent(step: Step) -> None:
         encode_steps([Takeoff(1.0), step], HOME)
 
 
-KNOWN = [16, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
+KNOWN = [16, 17, 18, 31, 82, 177, 186, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
 integers = st.integers(-(2**31), 2**31 - 1)
 floats32 = st.floats(width=32)
 
@@ -306,7 +319,59 @@ def test_a_landing_elsewhere_is_a_transfer_first() -> None:
 
 
 def test_commands_for_other_things_are_kept_and_not_flown() -> None:
-    assert decode_items([item(command) for command in (1000, 203, 177, 31000, 31014, 43000)], HOME) == ()
+    assert (
+        decode_items(
+            [item(command) for command in (1000, 203, 195, 201, 80, 206, 115, 189, 31000, 31014, 43000)], HOME
+        )
+        == ()
+    )
+
+
+def test_what_is_not_flown_is_known() -> None:
+    assert unflown([item(93, 1.0), item(201), item(177, 0.0, 1.0), item(206), TERM, RUN]) == (1, 3)
+
+
+def test_jumps_fly_their_items_again() -> None:
+    items = [item(93, 1.0), item(93, 2.0), item(177, 0.0, 2.0), item(93, 3.0)]
+    located = located_steps(items, HOME)
+    assert [one.step.duration_s for one in located] == [1.0, 2.0] * 3 + [3.0]  # type: ignore[union-attr]
+    assert [one.first for one in located] == [0, 1] * 3 + [3]
+
+
+def test_a_mission_of_jumps_in_jumps_is_refused_before_it_is_long() -> None:
+    items = [item(93, 1.0), *(item(177, 0.0, 1000.0) for _ in range(50))]
+    with pytest.raises(MissionItemError, match="more than 4000 items"):
+        located_steps(items, HOME)
+
+
+def test_loitering() -> None:
+    place = (12.0, -7.0, 5.0)
+    latitude, longitude, _ = geodetic_from_enu(place, HOME)
+    there = {"frame": 6, "x": latitude, "y": longitude, "z": 5.0}
+    for command, p1, hold in ((17, 0.0, 86400.0), (19, 8.0, 8.0), (31, 0.0, 0.0), (82, 2.0, 2.0)):
+        (step,) = decode_items([item(command, p1, **there)], HOME)
+        assert isinstance(step, Waypoint)
+        assert step.hold_s == hold
+        assert (step.east_m, step.north_m, step.altitude_m) == pytest.approx(place, abs=PLACE_M)
+    up, higher = decode_items([item(22, frame=6, z=3.0), item(186, 6.0, 3.0)], HOME)
+    assert (up, higher) == (Takeoff(3.0), Waypoint(0.0, 0.0, 6.0))
+
+
+@pytest.mark.parametrize("radius", [2.0, -2.0])
+def test_turns_are_flown_round_their_centre(radius: float) -> None:
+    latitude, longitude, _ = geodetic_from_enu((12.0, -7.0, 0.0), HOME)
+    turns = WireItem(6, 18, 0, 1, 2.0, 0.0, radius, 0.0, latitude, longitude, 5.0)
+    centre, circle = decode_items([item(178, 1.0, 1.0), turns], HOME)[1:]
+    assert isinstance(centre, Waypoint)
+    assert isinstance(circle, Signals)
+    period = 2.0 * math.pi * 2.0 / 1.0
+    for share in (1.2, 1.9, 2.7):
+        jet = _jet(circle, share * period)
+        assert math.hypot(jet[0][0], jet[0][1]) == pytest.approx(2.0, abs=1e-6)
+        assert norm(jet[1]) == pytest.approx(1.0, abs=1e-6)
+        turning = jet[0][0] * jet[1][1] - jet[0][1] * jet[1][0]
+        assert (turning < 0.0) == (radius > 0.0)  # positive: clockwise seen from above
+    assert norm(_jet(circle, circle.duration_s)[0]) < 1e-9
 
 
 def test_speeds_that_change_nothing_here() -> None:

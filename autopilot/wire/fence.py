@@ -1,0 +1,147 @@
+"""The fence: where load and vehicle may be, and rally points: where a return may lead.
+
+As PX4 has it: inside at least one of the inclusion zones where there are any, outside all exclusion zones,
+within a distance and a height of home. Zones are level areas of any height, ENU from home.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+
+from autopilot.geometry.linear import Vec3
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import MissionItemError, WireItem
+
+Spot = tuple[float, float]  # east, north, m
+
+_INSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+_OUTSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+_INSIDE_CIRCLE = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
+_OUTSIDE_CIRCLE = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
+_POLYGONS = (_INSIDE_POLYGON, _OUTSIDE_POLYGON)
+_CIRCLES = (_INSIDE_CIRCLE, _OUTSIDE_CIRCLE)
+_RETURN = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
+_FRAMES = (
+    mavlink.MAV_FRAME_GLOBAL,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_FRAME_GLOBAL_INT,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Polygon:
+    """An area with straight sides; `inclusion`: stay in it, else out of it."""
+
+    inclusion: bool
+    corners: tuple[Spot, ...]
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether the point is inside: a ray from it to the east crosses an odd number of sides."""
+        inside = False
+        x1, y1 = self.corners[-1]
+        for x2, y2 in self.corners:
+            if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+                inside = not inside
+            x1, y1 = x2, y2
+        return inside
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A round area."""
+
+    inclusion: bool
+    centre: Spot
+    radius: float
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether the point is inside."""
+        return hypot(x - self.centre[0], y - self.centre[1]) <= self.radius
+
+
+Zone = Polygon | Disc
+
+
+@dataclass(frozen=True, slots=True)
+class Fence:
+    """All zones."""
+
+    zones: tuple[Zone, ...] = ()
+
+    def complaint(self, x: float, y: float) -> str:
+        """Why the point may not be flown over, or an empty string."""
+        wanted = [zone for zone in self.zones if zone.inclusion]
+        if wanted and not any(zone.holds(x, y) for zone in wanted):
+            return "outside the fence"
+        if any(zone.holds(x, y) for zone in self.zones if not zone.inclusion):
+            return "in an exclusion zone of the fence"
+        return ""
+
+
+NO_FENCE = Fence()
+
+
+def _spot(seq: int, item: WireItem, home: Home) -> Spot:
+    if item.frame not in _FRAMES:
+        text = f"frame {item.frame}; must be one of 0, 3, 5, 6"
+        raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+    if abs(item.x) > 900_000_000:
+        raise MissionItemError(seq, "no latitude", mavlink.MAV_MISSION_INVALID_PARAM5_X)
+    if abs(item.y) > 1_800_000_000:
+        raise MissionItemError(seq, "no longitude", mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+    east, north, _ = enu_from_geodetic(item.x, item.y, 0, home)
+    return east, north
+
+
+def read_fence(items: Sequence[WireItem], home: Home) -> Fence:
+    """The fence that the items describe, or MissionItemError for the first that is no part of one."""
+    zones: list[Zone] = []
+    corners: list[Spot] = []
+    expected, kind = 0, 0
+    for seq, item in enumerate(items):
+        if corners and item.command != kind:
+            text = f"a corner was expected: the polygon before it has {expected} and {len(corners)} came"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+        if item.command in _POLYGONS:
+            if not item.param1 >= 3.0 or not float(item.param1).is_integer():
+                text = f"a polygon of {item.param1:g} corners; must be 3 or more"
+                raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+            if corners and item.param1 != expected:
+                text = f"a polygon of {expected} corners, and one of its corners says {item.param1:g}"
+                raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+            kind, expected = item.command, int(item.param1)
+            corners.append(_spot(seq, item, home))
+            if len(corners) == expected:
+                zones.append(Polygon(kind == _INSIDE_POLYGON, tuple(corners)))
+                corners = []
+        elif item.command in _CIRCLES:
+            if not 0.0 < item.param1 < 1e6:
+                text = f"radius = {item.param1:g} m; must be > 0"
+                raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM1)
+            zones.append(Disc(item.command == _INSIDE_CIRCLE, _spot(seq, item, home), item.param1))
+        elif item.command == _RETURN:
+            _spot(seq, item, home)
+        else:
+            raise MissionItemError(
+                seq, f"command {item.command} is no part of a fence", mavlink.MAV_MISSION_UNSUPPORTED
+            )
+    if corners:
+        text = f"the last polygon has {expected} corners, and {len(corners)} came"
+        raise MissionItemError(len(items) - 1, text, mavlink.MAV_MISSION_INVALID)
+    return Fence(tuple(zones))
+
+
+def read_rally(items: Sequence[WireItem], home: Home) -> tuple[Vec3, ...]:
+    """The places that the items name, at the height of the ground, or MissionItemError."""
+    places: list[Vec3] = []
+    for seq, item in enumerate(items):
+        if item.command != mavlink.MAV_CMD_NAV_RALLY_POINT:
+            text = f"command {item.command} is no rally point"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED)
+        east, north = _spot(seq, item, home)
+        places.append((east, north, 0.0))
+    return tuple(places)

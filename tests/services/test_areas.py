@@ -1,0 +1,140 @@
+"""Fence and rally points over the mission protocol: in, out, cleared, refused."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from autopilot.services.mission_store import deserialise_items, serialise
+from autopilot.services.records import AreasChanged, MissionChanged
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.fence import Disc, Polygon, read_fence, read_rally
+from autopilot.wire.mission_items import MissionItemError, WireItem
+
+HOME = Home()
+LAT, LON = round(HOME.latitude_deg * 1e7), round(HOME.longitude_deg * 1e7)
+FENCE, RALLY = m.MAV_MISSION_TYPE_FENCE, m.MAV_MISSION_TYPE_RALLY
+IN_POLYGON, OUT_POLYGON, IN_CIRCLE, OUT_CIRCLE, RETURN = 5001, 5002, 5003, 5004, 5000
+STEP = 900  # 1e-7 deg: 10 m of latitude
+
+
+def item(command, p1=0.0, north=0, east=0, frame=3):
+    return WireItem(frame, command, 0, 1, p1, 0.0, 0.0, 0.0, LAT + north * STEP, LON + east * STEP, 0.0)
+
+
+SQUARE = tuple(item(IN_POLYGON, 4.0, n, e) for n, e in ((-1, -1), (-1, 1), (1, 1), (1, -1)))
+GOOD = (*SQUARE, item(OUT_CIRCLE, 2.0), item(RETURN))
+POINTS = (item(5100, north=1), item(5100, north=-2))
+
+
+def upload(rig, kind, items, as_message):
+    replies = rig.replies(m.MAVLink_mission_count_message(1, 1, len(items), kind))
+    for _ in range(2 * len(items)):
+        requests = [r for r in replies if r.get_type() == "MISSION_REQUEST_INT"]
+        if not requests:
+            break
+        assert requests[-1].mission_type == kind
+        replies = rig.replies(as_message(requests[-1].seq, items[requests[-1].seq], kind))
+    (ack,) = [r for r in replies if r.get_type() == "MISSION_ACK"]
+    assert ack.mission_type == kind
+    return ack.type
+
+
+def download(rig, kind, as_item):
+    (count,) = rig.replies(m.MAVLink_mission_request_list_message(1, 1, kind))
+    assert count.mission_type == kind
+    found = []
+    for seq in range(count.count):
+        (answer,) = rig.replies(m.MAVLink_mission_request_int_message(1, 1, seq, kind))
+        assert answer.mission_type == kind
+        found.append(as_item(answer))
+    return tuple(found)
+
+
+def test_all_three_kinds_live_side_by_side(rig_with, items, as_message, as_item):
+    rig = rig_with(items(3))
+    assert upload(rig, FENCE, GOOD, as_message) == m.MAV_MISSION_ACCEPTED
+    assert upload(rig, RALLY, POINTS, as_message) == m.MAV_MISSION_ACCEPTED
+    assert download(rig, FENCE, as_item) == GOOD
+    assert download(rig, RALLY, as_item) == POINTS
+    assert download(rig, 0, as_item) == items(3)
+    assert [(e.kind, e.items) for e in rig.events if isinstance(e, AreasChanged)] == [
+        (FENCE, GOOD),
+        (RALLY, POINTS),
+    ]
+    assert not any(isinstance(e, MissionChanged) for e in rig.events)
+    rig.replies(m.MAVLink_mission_clear_all_message(1, 1, FENCE))
+    assert (download(rig, FENCE, as_item), download(rig, RALLY, as_item)) == ((), POINTS)
+    rig.replies(m.MAVLink_mission_clear_all_message(1, 1, m.MAV_MISSION_TYPE_ALL))
+    assert download(rig, RALLY, as_item) == download(rig, 0, as_item) == ()
+
+
+BAD = {
+    "too few corners": (SQUARE[:3], m.MAV_MISSION_INVALID),
+    "two corners": ((item(IN_POLYGON, 2.0),) * 2, m.MAV_MISSION_INVALID_PARAM1),
+    "another count": ((*SQUARE[:3], item(IN_POLYGON, 5.0)), m.MAV_MISSION_INVALID_PARAM1),
+    "mixed": ((*SQUARE[:3], item(OUT_POLYGON, 4.0)), m.MAV_MISSION_INVALID),
+    "no radius": ((item(IN_CIRCLE, 0.0),), m.MAV_MISSION_INVALID_PARAM1),
+    "a waypoint": ((item(16),), m.MAV_MISSION_UNSUPPORTED),
+    "frame": ((item(IN_CIRCLE, 5.0, frame=1),), m.MAV_MISSION_UNSUPPORTED_FRAME),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_no_fence_is_refused_and_the_old_one_stays(rig, as_message, as_item, name):
+    assert upload(rig, FENCE, GOOD, as_message) == m.MAV_MISSION_ACCEPTED
+    wrong, result = BAD[name]
+    assert upload(rig, FENCE, wrong, as_message) == result
+    assert download(rig, FENCE, as_item) == GOOD
+
+
+def test_items_of_another_kind_do_not_slip_in(rig, as_message):
+    rig.replies(m.MAVLink_mission_count_message(1, 1, 1, FENCE))
+    assert rig.replies(as_message(0, POINTS[0], RALLY)) == []
+    (ack,) = rig.replies(as_message(0, item(IN_CIRCLE, 5.0), FENCE))
+    assert ack.type == m.MAV_MISSION_ACCEPTED
+
+
+def test_zones():
+    fence = read_fence(GOOD, HOME)
+    square, disc = fence.zones
+    assert isinstance(square, Polygon) and isinstance(disc, Disc)
+    assert square.inclusion and not disc.inclusion
+    assert fence.complaint(5.0, 5.0) == ""
+    assert fence.complaint(0.5, 0.5) == "in an exclusion zone of the fence"
+    assert fence.complaint(30.0, 0.0) == "outside the fence"
+    # a second inclusion zone allows what the first does not
+    wider = read_fence((*GOOD, item(IN_CIRCLE, 100.0)), HOME)
+    assert wider.complaint(30.0, 0.0) == ""
+    assert read_rally(POINTS, HOME)[0][1] == pytest.approx(10.0, abs=0.1)
+
+
+def test_areas_are_stored_bit_by_bit():
+    assert deserialise_items(serialise(GOOD)) == GOOD
+
+
+wild = st.builds(
+    WireItem,
+    st.integers(0, 25),
+    st.sampled_from([IN_POLYGON, OUT_POLYGON, IN_CIRCLE, OUT_CIRCLE, RETURN, 5100, 16]),
+    st.just(0),
+    st.just(1),
+    st.sampled_from([3.0, 4.0]) | st.floats(width=32),
+    st.just(0.0),
+    st.just(0.0),
+    st.just(0.0),
+    st.integers(-(2**31), 2**31 - 1),
+    st.integers(-(2**31), 2**31 - 1),
+    st.floats(width=32),
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(wild, max_size=8), st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
+def test_no_items_raise_anything_else(items, x, y):
+    try:
+        read_fence(items, HOME).complaint(x, y)
+    except MissionItemError as error:
+        assert error.text
