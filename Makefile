@@ -14,7 +14,7 @@ install: $(STAMP) ## make .venv and install Plumbline in it
 $(STAMP): pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Plumbline needs Python 3.11 or newer; try make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,clients]'
 	@touch $@
 
 fly: $(STAMP) ## fly Case B through three real processes and show the report

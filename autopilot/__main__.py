@@ -19,7 +19,14 @@ from platformdirs import user_state_path
 from autopilot.onboard import Onboard, Work
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
-from autopilot.services.records import Event, Link, MissionChanged, ParameterChanged, TimesyncAnswered
+from autopilot.services.records import (
+    Event,
+    Link,
+    MissionChanged,
+    ParameterChanged,
+    SigningChanged,
+    TimesyncAnswered,
+)
 from autopilot.storage import Storage, StorageError
 from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import BeliefError, load_belief
@@ -41,6 +48,7 @@ from autopilot.wire.shell import (
     set_timeout,
     setting_option,
     shown,
+    signing_key_option,
 )
 from missions.planning import Prepared
 
@@ -53,6 +61,7 @@ _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a f
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
+_LOG_BYTES = 8192  # of the flight log that are stored at once
 
 
 class AutopilotError(Exception):
@@ -281,6 +290,7 @@ class Program:
                 heard = time.monotonic()
             elif self.onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
+                self._end_log()
                 self.onboard = self._build(self.onboard.endpoint.mission)
                 self._ground.join(self.onboard)
 
@@ -292,7 +302,10 @@ class Program:
             self._socket.sendto(answer, self._simulator)
         else:
             self._socket.sendto(answer, self._simulator)
+            self.onboard.endpoint.tell_time(time.time_ns() // 1000)
             self._ground.exchange(self.onboard, self._keep, stop)
+        self._keep(self.onboard.endpoint.take_events())
+        self._keep_log(_LOG_BYTES)
         if new and self.onboard.fault and self.onboard.tick == 1:
             raise AutopilotError(self.onboard.fault)
 
@@ -308,15 +321,41 @@ class Program:
                         self._storage.keep_mission(mission)
                     case ParameterChanged(name, value):
                         self._storage.keep_parameter(name, value)
+                    case SigningChanged(key, timestamp):
+                        self._storage.keep_signing(key, timestamp)
             except OSError as error:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
 
+    def _keep_log(self, least_bytes: int) -> None:
+        chunk = self.onboard.take_log(least_bytes)
+        if chunk is None:
+            return
+        try:
+            self._storage.keep_log(chunk, self.onboard.parameters["LOG_MAX_MB"])
+        except OSError as error:
+            self.onboard.give_up_log(error.strerror or str(error))
+            self._say(f"cannot store the flight log: {error}")
+
+    def _end_log(self) -> None:
+        self.onboard.end_log()
+        self._keep_log(1)
+
     def close(self) -> None:
-        """Close all sockets."""
+        """Store what is left of the flight log, close all sockets."""
+        self._end_log()
         self._socket.close()
         self._ground.close()
         self._aside.close()
+
+
+def _begin_signing(kept: Storage, key: bytes) -> None:
+    """Store the key, with the time of its last use if it was stored already."""
+    known = kept.load_signing()
+    try:
+        kept.keep_signing(key, known.timestamp if known and known.key == key else 0)
+    except OSError as error:
+        raise AutopilotError(f"the signing key cannot be stored: {reason(error)}") from None
 
 
 def _address_or_none(text: str) -> Address | None:
@@ -374,6 +413,12 @@ def _address_or_none(text: str) -> Address | None:
     metavar="DIR",
     help="Where mission and parameters outlive the program.  [default: the user's state directory]",
 )
+@click.option(
+    "--signing-key",
+    type=signing_key_option,
+    metavar="FILE",
+    help="Hear only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
+)
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 @click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
 def main(
@@ -385,6 +430,7 @@ def main(
     settings: tuple[tuple[str, float], ...],
     home: Home | None,
     storage: Path | None,
+    signing_key: bytes | None,
     quiet: bool,
 ) -> None:
     """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
@@ -408,11 +454,13 @@ def main(
         mission, trouble = kept.load_mission(place)
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
+        if signing_key is not None:
+            _begin_signing(kept, signing_key)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
-        options = Options(place, boot, clock_waits=in_step)
+        options = Options(place, boot, clock_waits=in_step, log=True)
 
         def build(stored: StoredMission | None) -> Onboard:
-            return Onboard(table, Identity(), options, stored)
+            return Onboard(table, Identity(), options, stored, kept.card, kept.load_signing())
 
         stations = [address for address in (*gcs, api) if address is not None]
         ground = GroundInStep(ground_lockstep) if ground_lockstep else GroundStations(tuple(stations))

@@ -14,6 +14,7 @@ from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
 from autopilot.flight import ON_GROUND, Phase, Plan, settings_from
 from autopilot.flight_core import Setup, initial_state, step, view_of
+from autopilot.flight_log import FlightLog, LogChunk, Sample
 from autopilot.laws import (
     believed_actuation,
     believed_drag,
@@ -26,6 +27,7 @@ from autopilot.rehearsal import rehearse
 from autopilot.scheduler import RateError, divider
 from autopilot.sensor_link import Tick, read_tick
 from autopilot.services.endpoint import VehicleEndpoint
+from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.heartbeat import heartbeat_message
 from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
 from autopilot.services.mission_store import StoredMission
@@ -34,10 +36,11 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    SigningChanged,
     TimesyncAnswered,
     Verdict,
 )
-from autopilot.services.requests import Reboot
+from autopilot.services.requests import ChangeSigningKey, Reboot
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
@@ -45,6 +48,7 @@ from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.signing import Signing
 from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
 from missions.model import Step
 from missions.planning import PENDING, Limits, Prepared, prepare
@@ -96,10 +100,18 @@ class Onboard:
     """One autopilot. `receive_sensors` moves its clock; nothing else does."""
 
     def __init__(
-        self, parameters: ParameterTable, identity: Identity, options: Options, mission: StoredMission | None
+        self,
+        parameters: ParameterTable,
+        identity: Identity,
+        options: Options,
+        mission: StoredMission | None,
+        card: Card | None = None,
+        signing: Signing | None = None,
     ) -> None:
         self.parameters = parameters
-        self.endpoint = VehicleEndpoint(identity, options.home, parameters, mission)
+        self.endpoint = VehicleEndpoint(
+            identity, options.home, parameters, mission, card, signing, options.boot_unix_us
+        )
         self.now_us = 0
         self.tick = -1
         self.fault = ""  # why the vehicle cannot be flown at all
@@ -121,6 +133,11 @@ class Onboard:
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self._setup.settings.limits
         self._take_plan(self.endpoint.mission)
+        self._log: FlightLog | None = None
+        if options.log:
+            release = ".".join(map(str, identity.version))
+            self._log = FlightLog(parameters, release, options.boot_unix_us)
+            self.endpoint.on_text = self._log_text
 
     # ---- simulator link
 
@@ -183,6 +200,10 @@ class Onboard:
             self.endpoint.say(severity, text)
         for seq in report.reached:
             self.endpoint.item_reached(seq)
+        if self._log is not None:
+            rate_hz = self.parameters["LOG_RATE_HZ"]
+            self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self._log_sample)
+            self.endpoint.files.protected = self._log.path
 
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -191,6 +212,37 @@ class Onboard:
         name = self._world.receive(message)
         if name is not None:
             self.endpoint.parameter_changed(name)
+
+    # ---- flight log
+
+    def take_log(self, least_bytes: int = 1) -> LogChunk | None:
+        """What is to be stored of the flight log, once it is so much or the log has ended."""
+        return None if self._log is None else self._log.take(least_bytes)
+
+    def end_log(self) -> None:
+        """The program ends: the last of the log can be taken."""
+        if self._log is not None:
+            self._log.end()
+
+    def give_up_log(self, why: str) -> None:
+        """The shell could not store the log."""
+        if self._log is not None:
+            self._log.give_up()
+        self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Flight log lost: {why}")
+
+    def _log_names(self) -> set[str]:
+        try:
+            return {entry.name for entry in self.endpoint.files.card.entries(LOG_FOLDER)}
+        except FileError:
+            return set()
+
+    def _log_sample(self) -> Sample:
+        imu = self._last.readings.imu if self._last else None
+        return Sample(self._snapshot(), imu, self._state.estimator)
+
+    def _log_text(self, severity: int, text: str) -> None:
+        if self._log is not None:
+            self._log.say(self.now_us, severity, text)
 
     # ---- parameters
 
@@ -226,8 +278,8 @@ class Onboard:
                     self._take_plan(mission)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered():
-                    pass  # the shell waits for it
+                case TimesyncAnswered() | SigningChanged():
+                    pass  # the shell waits for the one and stores the other
         return [event for event in events if not self._world.owns(event)]
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
@@ -262,6 +314,10 @@ class Onboard:
         rehearse(self._setup)
 
     def _decide(self, request: object) -> Verdict:
+        if isinstance(request, ChangeSigningKey):
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if isinstance(request, Reboot) and not request.shutdown:
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "Reboot denied: armed")

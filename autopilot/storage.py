@@ -7,12 +7,19 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from autopilot.card import DirectoryCard
+from autopilot.flight_log import LogChunk
+from autopilot.services import files
+from autopilot.services.files import LOG_ENDING, LOG_FOLDER
 from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
 from autopilot.wire.convert import Home
 from autopilot.wire.parameters import ParameterError, ParameterTable, parse_text
+from autopilot.wire.signing import Signing
 
 MISSION_FILE = "mission.bin"
 PARAMETER_FILE = "parameters.txt"
+SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
+CARD_DIRECTORY = "card"  # what clients reach by FILE_TRANSFER_PROTOCOL
 LOCK_FILE = "lock"
 
 
@@ -26,9 +33,11 @@ class Storage:
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._parameters: dict[str, float] = {}
+        self._logs: set[files.Path] = set()  # begun by this process
         self._lock = FileLock(directory / LOCK_FILE)
         try:
             directory.mkdir(parents=True, exist_ok=True)
+            self.card = DirectoryCard(directory / CARD_DIRECTORY)
         except OSError as error:
             raise StorageError(
                 f"--storage {directory}: {error.strerror}; name a directory that can be made"
@@ -96,9 +105,39 @@ class Storage:
         lines = [f"{name} {value!r}\n" for name, value in sorted(self._parameters.items())]
         self._write(self._directory / PARAMETER_FILE, "".join(lines).encode())
 
-    def _write(self, path: Path, data: bytes) -> None:
+    def load_signing(self) -> Signing | None:
+        """The stored key with a time later than any that was used; StorageError if it is none."""
+        path = self._directory / SIGNING_FILE
+        try:
+            key, timestamp = path.read_text(encoding="ascii").split()
+            return Signing(bytes.fromhex(key), int(timestamp), floor=int(timestamp))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as error:
+            raise StorageError(
+                f"{path}: {error}; mend or remove it: without it unsigned commands are obeyed"
+            ) from None
+
+    def keep_signing(self, key: bytes | None, timestamp: int) -> None:
+        """Store the key, for nobody else to read, or take it away."""
+        path = self._directory / SIGNING_FILE
+        if key is None:
+            path.unlink(missing_ok=True)
+        else:
+            self._write(path, f"{key.hex()} {timestamp}\n".encode(), private=True)
+
+    def keep_log(self, chunk: LogChunk, most_mb: float) -> None:
+        """Store a part of a flight log; a new log takes the place of the oldest where they are too many."""
+        if chunk.path not in self._logs:
+            self._logs.add(chunk.path)
+            self.card.make_room(LOG_FOLDER, LOG_ENDING, round(most_mb * 1e6))
+        self.card.append(chunk.path, chunk.data)
+
+    def _write(self, path: Path, data: bytes, private: bool = False) -> None:
         new = path.with_suffix(".new")
-        with new.open("wb") as file:
+        new.unlink(missing_ok=True)  # it may be readable by others
+        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666)
+        with os.fdopen(handle, "wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

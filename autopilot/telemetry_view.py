@@ -66,6 +66,7 @@ class Options:
     boot_unix_us: int
     lockstep: bool = True
     clock_waits: bool = True  # for the autopilot, however long it works
+    log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` gives
 
 
 def sub_mode(flight: Flight) -> int:

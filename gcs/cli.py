@@ -94,9 +94,23 @@ def _usage(error: click.UsageError) -> str:
     return f"{text}; see {path} --help"
 
 
+def _signing_key(text: str) -> bytes:
+    from autopilot.wire.shell import signing_key_option
+
+    return signing_key_option(text)
+
+
 @click.group(cls=Gcs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.option(
+    "--signing-key",
+    metavar="FILE",
+    type=_signing_key,
+    is_eager=True,
+    envvar="PLUMBLINE_SIGNING_KEY",
+    help="Sign what is said to a running vehicle: a file with 64 hexadecimal digits, or a pass phrase.",
+)
 @click.version_option(package_name="plumbline", prog_name="gcs")
-def gcs() -> None:
+def gcs(signing_key: bytes | None) -> None:
     """Plumbline's ground station: fly missions in which the load on the cable is what is commanded.
 
     gcs fly case-b flies a shipped mission with a simulator and an autopilot of its own and ends in a report.

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -13,6 +16,7 @@ from pathlib import Path
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.signing import Signing, timestamp_of
 from autopilot.wire.tlog import TlogWriter
 from gcs.analysis.record import FlightMeta, Record
 from gcs.clients import command
@@ -39,6 +43,7 @@ from missions.legs import expected_duration_s
 from missions.model import Mission
 
 LAWS = {"thesis": 0, "lqr": 1, "plumbline": 2}  # the value of CTL_LAW
+ONBOARD_LOG = "flight.ulg"
 WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 _EXIT = {
     "completed": EXIT_DONE,
@@ -128,7 +133,12 @@ def _fly_own(
     client = _client(mission, options, Home())
     display = FlightDisplay(mission.name, options.quiet)
     vehicle, truth = UdpSocket(), UdpSocket()
-    with tempfile.TemporaryDirectory(prefix="plumbline-") as storage, Processes() as processes, display:
+    with (
+        tempfile.TemporaryDirectory(prefix="plumbline-") as storage,
+        _log_kept(Path(storage), out),
+        Processes() as processes,
+        display,
+    ):
         ended = processes.ended
 
         def begun() -> None:
@@ -149,6 +159,16 @@ def _fly_own(
             vehicle.close()
             truth.close()
     return client
+
+
+@contextmanager
+def _log_kept(storage: Path, out: Path) -> Iterator[None]:
+    """Afterwards the autopilot's own log of the flight is in `out`, if it has made one."""
+    try:
+        yield
+    finally:
+        for log in sorted((storage / "card" / "log").glob("*.ulg"))[-1:]:
+            shutil.copyfile(log, out / ONBOARD_LOG)
 
 
 def _start(
@@ -189,6 +209,8 @@ def _fly_running(
     with Session(address) as session:
         session.find()
         client = _client(mission, options, vehicle_home(session))
+    if address.signing_key is not None:
+        client.connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
     truth = _truth_of_a_running_world()
     vehicle = open_address(address)
     try:
@@ -292,7 +314,7 @@ class _Stopwatch:
 class _Folder:
     """The output directory; if the flight came to nothing, what we put there is taken away again."""
 
-    _OURS = ("flight.tlog", "sitl.log", "autopilot.log")
+    _OURS = ("flight.tlog", ONBOARD_LOG, "sitl.log", "autopilot.log")
 
     def __init__(self, path: Path, overwrite: bool) -> None:
         self._path = path

@@ -6,7 +6,7 @@ import errno
 import select
 import socket
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gcs.errors import GcsError
 
@@ -28,6 +28,7 @@ class Address:
     host: str
     port: int
     listen: bool = True
+    signing_key: bytes | None = field(default=None, repr=False)  # messages are signed with it
 
     def __str__(self) -> str:
         return f"{'' if self.listen else 'udpout:'}{self.host}:{self.port}"

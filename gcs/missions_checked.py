@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from autopilot.wire.convert import Home
+from autopilot.wire.mission_items import WireItem, decode_items
 from gcs.errors import GcsError
 from gcs.vehicle_limits import load_limits
 from missions.feasibility import PathReport, Violation, check, paths
@@ -32,8 +36,18 @@ def load_checked(name_or_path: str, vehicle: str, force: bool, shaped: bool = Tr
     mission = load(name_or_path)
     if force:
         return mission
+    _refuse(mission, vehicle, shaped)
+    return mission
+
+
+def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
+    """GcsError unless the vehicle can fly what the items stand for."""
+    steps = decode_items(items, home)
+    _refuse(Mission(name, name, "", (), steps), vehicle, True)
+
+
+def _refuse(mission: Mission, vehicle: str, shaped: bool) -> None:
     found = violations(mission, vehicle, shaped)
     if found:
         listed = "; ".join(map(str, found))
         raise GcsError(f"{mission.name} cannot be flown by vehicle {vehicle}: {listed}; --force tries")
-    return mission

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients import command
 from gcs.clients.connection import Connection
 from gcs.clients.datagrams import messages
@@ -14,7 +15,16 @@ from gcs.clients.operation import Operation, Result, Status, Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.display import StepDisplay
 from gcs.errors import GcsError, NoVehicleError, RefusedError
-from gcs.link import LOOPBACK, TRUTH_PORT, Address, UdpSocket, monotonic_us, open_address, wait
+from gcs.link import (
+    LOOPBACK,
+    TRUTH_PORT,
+    Address,
+    UdpSocket,
+    monotonic_us,
+    open_address,
+    unix_us,
+    wait,
+)
 
 FIND_S = 5.0
 REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may come a little later
@@ -35,6 +45,8 @@ class Session:
         self._truth: UdpSocket | None = None
         self._find_s = FIND_S if find_s is None else find_s
         self._connection = Connection()
+        if address.signing_key is not None:
+            self._connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
         self._socket = open_address(address)
 
     @property

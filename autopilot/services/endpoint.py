@@ -13,16 +13,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from autopilot.services.answers import (
-    answer_ftp,
-    answer_log_data,
-    answer_log_list,
-    answer_ping,
-    answer_timesync,
-)
+from autopilot.services.answers import answer_ping, answer_timesync
 from autopilot.services.commands import CommandService
+from autopilot.services.file_tree import FileTree
+from autopilot.services.files import Card, MemoryCard
+from autopilot.services.ftp import FtpService
 from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT, Identity
 from autopilot.services.links import LinkState, Outgoing
+from autopilot.services.logs import LogService
+from autopilot.services.made_files import information_message, made_files, metadata_message
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.missions import MissionService
 from autopilot.services.parameters import ParameterService
@@ -45,6 +44,7 @@ from autopilot.services.requests import (
     SetMessageInterval,
     StoreParameters,
 )
+from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
 from autopilot.services.streams import OFF
@@ -53,6 +53,7 @@ from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
@@ -63,6 +64,11 @@ _ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
+_METADATA = {
+    mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: metadata_message,
+    mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: information_message,
+}
+
 SnapshotFactory = Callable[[], Snapshot]
 
 
@@ -70,12 +76,25 @@ class VehicleEndpoint:
     """All services of one vehicle joined over all its links."""
 
     def __init__(
-        self, identity: Identity, home: Home, parameters: ParameterTable, mission: StoredMission | None = None
+        self,
+        identity: Identity,
+        home: Home,
+        parameters: ParameterTable,
+        mission: StoredMission | None = None,
+        card: Card | None = None,
+        signing: Signing | None = None,
+        boot_unix_us: int = 0,
     ) -> None:
         self.identity = identity
+        self._signing = SigningService(signing, boot_unix_us)
         self._missions = MissionService(home, mission or StoredMission())
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
+        made = made_files(identity, parameters, lambda: self._missions.mission)
+        self.files = FileTree(MemoryCard() if card is None else card, made)
+        self._ftp = FtpService(self.files)
+        self._logs = LogService(self.files)
+        self._timed = (self._signing, self._missions, self._parameters, self._ftp, self._logs)
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._table: dict[int, Stream] = dict(STREAMS)
@@ -84,6 +103,8 @@ class VehicleEndpoint:
         self._defaults = {key: stream.interval_us for key, stream in self._table.items()}
         self._watched: dict[int, Any] = {}
         self._work = False  # something waits in a queue
+        self._events: list[Event] = []  # of `poll`, until they are taken
+        self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
         self._handlers = self._handler_table()
 
     @property
@@ -100,22 +121,31 @@ class VehicleEndpoint:
 
     def add_link(self, link: Link, now_us: int = 0) -> None:
         """A link that always gets telemetry, whether or not somebody is heard on it."""
-        self._links[link] = LinkState(True, self._defaults, now_us)
+        self._links[link] = self._new_link(True, now_us)
         self._work = True
 
     def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
         """Handle what came over `link`; answers leave with the next `poll`. No bytes raise anything."""
         events: list[Event] = []
         for received in decode(datagram)[0]:
-            if self._is_own(received):
+            message_id = received.message.get_msgId()  # some messages have a field called id
+            if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
             state = self._heard(link, now_us)
-            message_id = received.message.get_msgId()  # some messages have a field called id
             handler = self._handlers.get(message_id)
             if handler and self._is_for_us(message_id, received.message):
                 peer = Peer(link, received.system, received.component)
                 wrapped = self._decider(state, peer, now_us, decide)
                 self._do(handler(received.message, peer, now_us, wrapped), events)
+        return events
+
+    def tell_time(self, unix_us: int) -> None:
+        """The wall clock, by which messages are signed where the vehicle's clock is not in step with it."""
+        self._signing.tell_time(unix_us)
+
+    def take_events(self) -> list[Event]:
+        """What came up without a message: to be handled as the events of `receive`."""
+        events, self._events = self._events, []
         return events
 
     def say(self, severity: int, text: str) -> None:
@@ -143,8 +173,7 @@ class VehicleEndpoint:
         return (
             self._work
             or any(state.streams.next_us <= now_us for state in self._links.values())
-            or self._missions.next_timer() <= now_us
-            or self._parameters.next_timer() <= now_us
+            or any(service.next_timer() <= now_us for service in self._timed)
         )
 
     def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:
@@ -152,8 +181,8 @@ class VehicleEndpoint:
         if not self.due(now_us):
             return []
         self._forget_silent(now_us)
-        self._do(self._missions.poll(now_us), [])
-        self._do(self._parameters.poll(now_us), [])
+        for service in self._timed:
+            self._do(service.poll(now_us), self._events)
         self._work = False
         taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
         if any(taken.values()) or any(state.announced for state in self._links.values()):
@@ -207,6 +236,8 @@ class VehicleEndpoint:
                     for state in self._states(link):
                         state.queue.append(message)
                 case Say(severity, text):
+                    if self.on_text is not None:
+                        self.on_text(severity, text)
                     for message in self._texts.messages(severity, text):
                         for state in self._links.values():
                             state.queue.append(message)
@@ -219,11 +250,16 @@ class VehicleEndpoint:
 
     # ---- links
 
+    def _new_link(self, configured: bool, now_us: int) -> LinkState:
+        taken = {state.number for state in self._links.values()}
+        number = next(number for number in range(len(taken) + 1) if number not in taken)
+        return LinkState(configured, self._defaults, now_us, number & 0xFF, self._signing.signer)
+
     def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)
         if state is None:
             self._make_room()
-            state = self._links[link] = LinkState(False, self._defaults, now_us)
+            state = self._links[link] = self._new_link(False, now_us)
             self._work = True
         state.heard_us = now_us
         return state
@@ -240,7 +276,8 @@ class VehicleEndpoint:
 
     def _forget(self, link: Link) -> None:
         del self._links[link]
-        self._parameters.forget(link)
+        for service in (self._parameters, self._ftp, self._logs):
+            service.forget(link)
 
     # ---- receiving
 
@@ -266,9 +303,11 @@ class VehicleEndpoint:
                 case StoreParameters():
                     return _ACCEPTED
                 case RequestCapabilities():
-                    return self._request_message(state, peer, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0)
+                    return self._request_message(
+                        state, peer, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0, now_us
+                    )
                 case RequestMessage(message_id, argument):
-                    return self._request_message(state, peer, message_id, argument)
+                    return self._request_message(state, peer, message_id, argument, now_us)
                 case GetMessageInterval(message_id):
                     return self._request_interval(state, message_id)
                 case SetMessageInterval(message_id, interval_us):
@@ -280,9 +319,15 @@ class VehicleEndpoint:
 
         return decided
 
-    def _request_message(self, state: LinkState, peer: Peer, message_id: int, argument: float) -> Verdict:
+    def _request_message(
+        self, state: LinkState, peer: Peer, message_id: int, argument: float, now_us: int
+    ) -> Verdict:
         if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._request_interval(state, int(argument) if 0.0 <= argument <= _UINT16 else -1)
+        where = _METADATA.get(message_id)
+        if where is not None:
+            state.queue.append(where(self.identity, self._parameters.table, now_us))
+            return _ACCEPTED
         if message_id not in STREAMS:
             return _UNSUPPORTED
         self._do([Announce(peer.link, (message_id,))], [])
@@ -328,9 +373,12 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_MISSION_REQUEST: missions.receive_request,
             m.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: missions.receive_partial,
             m.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST: missions.receive_partial,
+            m.MAVLINK_MSG_ID_SETUP_SIGNING: self._signing.receive_setup,
             m.MAVLINK_MSG_ID_TIMESYNC: answer_timesync,
             m.MAVLINK_MSG_ID_PING: answer_ping,
-            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: answer_ftp,
-            m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: answer_log_list,
-            m.MAVLINK_MSG_ID_LOG_REQUEST_DATA: answer_log_data,
+            m.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._ftp.receive,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_LIST: self._logs.receive_list,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_DATA: self._logs.receive_data,
+            m.MAVLINK_MSG_ID_LOG_REQUEST_END: self._logs.receive_end,
+            m.MAVLINK_MSG_ID_LOG_ERASE: self._logs.receive_erase,
         }

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from autopilot.services.streams import Streams
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import Sign
 
 DATAGRAM_BYTES = 1400  # below the MTU of any common network, with headers
+
+SignerOf = Callable[[int], Sign | None]  # what signs the frames of a link, by its number
 
 # (system, component) that speaks, and what it says
 Outgoing = tuple[tuple[int, int], Any]
@@ -18,10 +21,14 @@ Outgoing = tuple[tuple[int, int], Any]
 class LinkState:
     """What the endpoint keeps for a link; a new one begins with a HEARTBEAT."""
 
-    __slots__ = ("announced", "configured", "heard_us", "queue", "streams", "writers")
+    __slots__ = ("announced", "configured", "heard_us", "number", "queue", "signer", "streams", "writers")
 
-    def __init__(self, configured: bool, defaults: Mapping[int, int], now_us: int) -> None:
+    def __init__(
+        self, configured: bool, defaults: Mapping[int, int], now_us: int, number: int, signer: SignerOf
+    ) -> None:
         self.configured = configured  # never forgotten
+        self.number = number  # that signatures bear
+        self.signer = signer
         self.heard_us = now_us
         self.streams = Streams(defaults, now_us)
         self.writers: dict[tuple[int, int], FrameWriter] = {}
@@ -35,7 +42,7 @@ class LinkState:
         writer = self.writers.get(source)
         if writer is None:
             writer = self.writers[source] = FrameWriter(*source)
-        return writer.frame(message)
+        return writer.frame(message, self.signer(self.number))
 
     def datagrams(self, outgoing: Iterable[Outgoing]) -> list[bytes]:
         """Frames in their order, as many in a datagram as go in."""

@@ -8,7 +8,7 @@ shell, named as facts.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from autopilot.services.mission_store import StoredMission
@@ -72,7 +72,15 @@ class TimesyncAnswered:
     ts1: int
 
 
-Event = ParameterChanged | MissionChanged | TimesyncAnswered
+@dataclass(frozen=True, slots=True)
+class SigningChanged:
+    """To be stored before more is sent: the key (None: no more), and a time later than any in use."""
+
+    key: bytes | None = field(repr=False)
+    timestamp: int
+
+
+Event = ParameterChanged | MissionChanged | TimesyncAnswered | SigningChanged
 Output = Send | Say | Announce | Event
 
 

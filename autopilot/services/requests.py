@@ -148,6 +148,11 @@ class RequestCapabilities:
     """Send AUTOPILOT_VERSION."""
 
 
+@dataclass(frozen=True, slots=True)
+class ChangeSigningKey:
+    """Another key for signed messages, or none; which, only the service knows."""
+
+
 Decided = (
     Arm
     | Takeoff
@@ -165,6 +170,7 @@ Decided = (
     | Terminate
     | RunPrearmChecks
     | Reboot
+    | ChangeSigningKey
 )
 Answered = StoreParameters | RequestMessage | SetMessageInterval | GetMessageInterval | RequestCapabilities
 Request = Decided | Answered

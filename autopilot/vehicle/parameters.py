@@ -268,6 +268,24 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
                 "s",
                 "Age of the last pose or load reading at which it is given up",
             ),
+            p(
+                "LOG_RATE_HZ",
+                50.0,
+                0.0,
+                1000.0,
+                "Hz",
+                "Records of the flight log in a second, from arming to disarming; 0: no log",
+                integer=True,
+            ),
+            p(
+                "LOG_MAX_MB",
+                512.0,
+                1.0,
+                100_000.0,
+                "MB",
+                "Flight logs kept; the oldest make room",
+                integer=True,
+            ),
             p("SIM_LOSS_PCT", 0.0, 0.0, 100.0, "%", "Datagrams lost on the ground link, each way"),
         ]
     )

@@ -142,8 +142,8 @@ class FrameWriter:
         self.component = component
         self.sequence = 0
 
-    def frame(self, message: Any) -> bytes:
-        """The frame of a message of our dialect, trailing zeros of its payload cut.
+    def frame(self, message: Any, sign: Callable[[bytes], bytes] | None = None) -> bytes:
+        """The frame of a message of our dialect, trailing zeros of its payload cut; signed by `sign`.
 
         A float beyond float32 is sent as infinite. An integer outside its field raises struct.error, as in
         pymavlink; the builders of `convert` and `telemetry` saturate.
@@ -155,7 +155,7 @@ class FrameWriter:
             _HEADER2.pack(
                 _MAGIC_V2,
                 len(payload),
-                0,
+                0 if sign is None else _SIGNED,
                 0,
                 sequence,
                 self.system,
@@ -166,7 +166,8 @@ class FrameWriter:
             + payload
         )
         self.sequence = (sequence + 1) & 0xFF
-        return frame + _CHECKSUM.pack(mcrf4xx(frame[1:] + layout.crc_extra))
+        frame += _CHECKSUM.pack(mcrf4xx(frame[1:] + layout.crc_extra))
+        return frame if sign is None else sign(frame)
 
 
 def announced_length(data: bytes, start: int) -> int:

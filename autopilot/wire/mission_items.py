@@ -409,6 +409,13 @@ _STANDARD = frozenset(
         mavlink.MAV_CMD_DO_CHANGE_SPEED,
     }
 )
+# all that is flown; other commands above MAV_CMD_NAV_LAST are kept and passed over, the rest is refused
+FLOWN_COMMANDS = _STANDARD | {
+    mavlink.PLUMBLINE_LOAD_SIGNAL_TERM,
+    mavlink.PLUMBLINE_LOAD_SIGNAL_FACTOR,
+    mavlink.PLUMBLINE_LOAD_SIGNAL_RUN,
+    mavlink.PLUMBLINE_ATTITUDE_RUN,
+}
 
 
 def _check(seq: int, param: int, name: str, value: float, unit: str, low: float, high: float) -> float:

@@ -8,10 +8,12 @@ import signal
 import socket
 import struct
 from contextlib import suppress
+from pathlib import Path
 
 import click
 
 from autopilot.wire.convert import Home, home_from_text
+from autopilot.wire.signing import NoKeyError, key_of_text
 
 Address = tuple[str, int]
 
@@ -103,6 +105,20 @@ def home_option(text: str) -> Home:
         return home_from_text(text)
     except ValueError as error:
         raise click.BadParameter(str(error)) from None
+
+
+def signing_key_option(text: str) -> bytes:
+    """FILE with a signing key that nobody else may read."""
+    path = Path(text)
+    try:
+        if path.stat().st_mode & 0o077:
+            raise click.BadParameter(f"{text!r} can be read by others; chmod 600 {text}")
+        return key_of_text(path.read_text(encoding="utf-8"))
+    except NoKeyError as error:
+        raise click.BadParameter(f"{text!r} {error}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        why = reason(error) if isinstance(error, OSError) else "not a text file"
+        raise click.BadParameter(f"{text!r}: {why}") from None
 
 
 def setting_option(text: str) -> tuple[str, float]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from autopilot.wire.codec import FrameWriter, Received
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import Sign, Signing
 from gcs.clients.datagrams import messages
 from gcs.clients.operation import GROUND, Target
 
@@ -18,6 +19,8 @@ class Connection:
     """Learns the vehicle from its first heartbeat and hears no other system from then on."""
 
     def __init__(self, link_timeout_us: int = LINK_TIMEOUT_US) -> None:
+        self._signing: Signing | None = None
+        self._sign: Sign | None = None
         self.target: Target | None = None
         self.junk_bytes = 0
         self._link_timeout_us = link_timeout_us
@@ -25,12 +28,19 @@ class Connection:
         self._next_heartbeat_us: int | None = None
         self._heard_us: int | None = None
 
+    def sign_with(self, signing: Signing) -> None:
+        """From now on our frames are signed, and of the vehicle only signed ones are heard."""
+        self._signing = signing
+        self._sign = signing.signer(0)
+
     def receive(self, datagram: bytes, now_us: int) -> list[Received]:
         """The vehicle's messages in `datagram`; whatever else it holds is dropped."""
         received, junk = messages(datagram)
         self.junk_bytes += junk
         ours = []
         for one in received:
+            if not self._hears(one):
+                continue
             if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT and _is_vehicle(one.message):
                 if self.target is None:
                     self.target = Target(one.system, one.component)
@@ -57,7 +67,12 @@ class Connection:
 
     def frame(self, message: Any) -> bytes:
         """`message` as one datagram of ours."""
-        return self._writer.frame(message)
+        return self._writer.frame(message, self._sign)
+
+    def _hears(self, one: Received) -> bool:
+        if self._signing is None:
+            return True
+        return self._signing.accepts(one.frame, one.message.get_msgId(), one.system, one.component)
 
     def lost(self, now_us: int) -> bool:
         """True when the vehicle was there and has been silent for longer than the link may be."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import click
@@ -23,7 +24,8 @@ class AddressType(click.ParamType):  # type: ignore[type-arg]
         if isinstance(value, Address):
             return value
         try:
-            return parse_address(value)
+            key = ctx.find_root().params.get("signing_key") if ctx else None
+            return replace(parse_address(value), signing_key=key)
         except AddressError as error:
             self.fail(str(error), param, ctx)
 

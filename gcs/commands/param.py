@@ -9,10 +9,12 @@ from pathlib import Path
 import click
 
 from autopilot.wire.parameters import ParameterError, parse_text
+from gcs.clients.operation import Target
 from gcs.clients.parameters import ParameterGet, ParameterList, ParameterSet
 from gcs.commands.options import connect_option, json_option, print_json, print_table
 from gcs.display import StepDisplay, say
 from gcs.errors import GcsError, RefusedError
+from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
 from gcs.link import Address
 from gcs.session import Session
 
@@ -82,10 +84,14 @@ def set_command(name: str, value: float, address: Address) -> None:
 def save_command(file: Path, address: Address) -> None:
     """Save all parameters to FILE.
 
-    One `NAME value` line each, as MAVProxy and Mission Planner read them.
+    QGroundControl's columns if FILE ends in .params, else one `NAME value` line each, as MAVProxy and Mission
+    Planner read them.
     """
-    values = _all(address)
-    text = "".join(f"{name:<16} {value:.9g}\n" for name, value in values.items())
+    with Session(address) as session:
+        target = session.find()
+        values = _listed(session, target)
+    is_qgc = file.suffix.lower() == QGC_ENDING
+    text = qgc_of(values, target) if is_qgc else lines_of(values)
     partial = file.with_name(file.name + ".part")
     try:
         partial.write_text(text, encoding="utf-8")
@@ -128,6 +134,10 @@ def load_command(file: Path, address: Address) -> None:
 
 def _all(address: Address) -> dict[str, float]:
     with Session(address) as session:
-        operation = ParameterList(session.find())
-        session.run(operation, "parameters")
-        return operation.values
+        return _listed(session, session.find())
+
+
+def _listed(session: Session, target: Target) -> dict[str, float]:
+    operation = ParameterList(target)
+    session.run(operation, "parameters")
+    return operation.values

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import click
 
-from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.convert import Home
 from autopilot.wire.mission_items import WireItem, encode_mission
 from gcs.clients.missions import MissionClear, MissionDownload, MissionUpload
 from gcs.commands.options import connect_option, json_option, print_json, print_table
+from gcs.display import say
+from gcs.errors import GcsError
 from gcs.flying import vehicle_home
+from gcs.formats.items import command_name
+from gcs.formats.missions import Judged, is_foreign, judge, read_foreign, write_foreign
 from gcs.link import Address
-from gcs.missions_checked import load_checked
+from gcs.missions_checked import check_items, load_checked
 from gcs.session import Session
 
 
@@ -21,13 +26,26 @@ from gcs.session import Session
 @click.argument("mission")
 @click.option("--vehicle", default="bebop", show_default=True, help="Vehicle against which it is checked.")
 @click.option("--force", is_flag=True, help="Upload even what the vehicle cannot do.")
+@click.option(
+    "--skip", is_flag=True, help="Upload a .plan or .waypoints file without what is not flown of it."
+)
 @connect_option
-def upload_command(mission: str, vehicle: str, force: bool, address: Address) -> None:
+def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address: Address) -> None:
     """Put a mission on the vehicle.
 
-    MISSION is a shipped name or the path of a mission file. The old mission stays in force until the new one
-    is there whole.
+    MISSION is a shipped name, the path of a mission file, or a .plan or .waypoints file of another ground
+    station. The old mission stays in force until the new one is there whole.
     """
+    path = Path(mission)
+    if is_foreign(path):
+        plan = read_foreign(path)
+        with Session(address) as session:
+            target = session.find()
+            items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
+            if not force:
+                check_items(path.name, items, home, vehicle)
+            click.echo(session.run(MissionUpload(target, items), "upload").text)
+        return
     loaded = load_checked(mission, vehicle, force)
     with Session(address) as session:
         target = session.find()
@@ -35,18 +53,42 @@ def upload_command(mission: str, vehicle: str, force: bool, address: Address) ->
         click.echo(session.run(MissionUpload(target, items), "upload").text)
 
 
+def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
+    """The items to upload; what is not flown is told, and is an error unless it may be skipped."""
+    for line in judged.unflown:
+        say(f"{path}: {line}")
+    if judged.unflown and not skip:
+        count = len(judged.unflown)
+        raise GcsError(
+            f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip goes on"
+        )
+    if not judged.items:
+        raise GcsError(f"{path}: nothing that can be flown; gcs clear takes the mission off the vehicle")
+    return judged.items
+
+
 @click.command("download")
+@click.argument("file", required=False, type=click.Path(dir_okay=False, path_type=Path))
 @json_option
 @connect_option
-def download_command(as_json: bool, address: Address) -> None:
+def download_command(file: Path | None, as_json: bool, address: Address) -> None:
     """Fetch the mission from the vehicle.
 
-    Each line is one mission item as it travels; null and - stand for values that are not given.
+    Each line is one mission item as it travels; null and - stand for values that are not given. With FILE,
+    which ends in .plan or .waypoints, it is written for other ground stations.
     """
+    if file is not None and not is_foreign(file):
+        raise click.BadParameter(f"{file}; must end in .plan or .waypoints", param_hint="FILE")
     with Session(address) as session:
         operation = MissionDownload(session.find())
         session.run(operation, "download")
         items = operation.items
+        home = vehicle_home(session) if file is not None else Home()
+    if file is not None:
+        write_foreign(file, items, home)
+        if not as_json:
+            click.echo(f"{len(items)} items written to {file}")
+            return
     if as_json:
         print_json([{"seq": seq, **_record(item)} for seq, item in enumerate(items)])
         return
@@ -63,25 +105,17 @@ def clear_command(address: Address) -> None:
 
 
 def _record(item: WireItem) -> dict[str, Any]:
-    return {**item._asdict(), "name": _command_name(item.command)}
+    return {**item._asdict(), "name": command_name(item.command)}
 
 
 def _row(seq: int, item: WireItem) -> tuple[str, ...]:
     numbers = (item.param1, item.param2, item.param3, item.param4)
     return (
         str(seq),
-        _command_name(item.command),
+        command_name(item.command),
         str(item.frame),
         *("-" if math.isnan(number) else f"{number:g}" for number in numbers),
         str(item.x),
         str(item.y),
         f"{item.z:g}",
     )
-
-
-def _command_name(command: int) -> str:
-    for enum in ("PLUMBLINE_COMMAND", "MAV_CMD"):
-        entry = mavlink.enums[enum].get(command)
-        if entry is not None:
-            return str(entry.name).removeprefix("MAV_CMD_").removeprefix("PLUMBLINE_")
-    return str(command)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from autopilot.services.mission_store import StoredMission
-from autopilot.storage import MISSION_FILE, PARAMETER_FILE, Storage, StorageError
+from autopilot.storage import MISSION_FILE, PARAMETER_FILE, SIGNING_FILE, Storage, StorageError
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
@@ -31,7 +31,7 @@ def stored(name: str) -> StoredMission:
 def test_a_mission_comes_back_as_it_was(tmp_path: Path, name: str) -> None:
     Storage(tmp_path).keep_mission(stored(name))
     assert Storage(tmp_path).load_mission(HOME) == (stored(name), "")
-    assert [p.name for p in tmp_path.iterdir()] == [MISSION_FILE], "nothing half written stays"
+    assert [p.name for p in tmp_path.iterdir() if p.is_file()] == [MISSION_FILE], "nothing half written stays"
 
 
 def test_no_mission_and_an_empty_one_are_the_same(tmp_path: Path) -> None:
@@ -73,6 +73,26 @@ def test_a_corrupt_mission_that_cannot_be_set_aside_is_said_too(tmp_path: Path) 
     assert "starting without a mission" in trouble
 
 
+def test_a_signing_key_is_kept_for_nobody_else_to_read(tmp_path: Path) -> None:
+    storage, key = Storage(tmp_path), bytes(range(32))
+    assert storage.load_signing() is None
+    for timestamp in (5, 7):
+        storage.keep_signing(key, timestamp)
+        assert (tmp_path / SIGNING_FILE).stat().st_mode & 0o777 == 0o600
+    again = Storage(tmp_path).load_signing()
+    assert again is not None
+    assert (again.key, again.timestamp) == (key, 7)
+    storage.keep_signing(None, 0)
+    assert Storage(tmp_path).load_signing() is None
+
+
+@pytest.mark.parametrize("text", ["", "00", "zz" * 32 + " 5", "00" * 31 + " 5", "00" * 32 + " x", "\xff"])
+def test_a_key_that_cannot_be_read_is_no_reason_to_fly_without(tmp_path: Path, text: str) -> None:
+    (tmp_path / SIGNING_FILE).write_text(text, encoding="latin-1")
+    with pytest.raises(StorageError, match="remove it"):
+        Storage(tmp_path).load_signing()
+
+
 def test_parameters_come_back_and_only_those_that_were_set(tmp_path: Path) -> None:
     storage = Storage(tmp_path)
     storage.keep_parameter("NGC_KX", 5.123456789012345)
@@ -81,7 +101,7 @@ def test_parameters_come_back_and_only_those_that_were_set(tmp_path: Path) -> No
     again = table()
     assert Storage(tmp_path).load_parameters(again) == []
     assert again.changed() == {"NGC_KX": 5.25, "MIS_SPEED": 0.7}
-    assert [p.name for p in tmp_path.iterdir()] == [PARAMETER_FILE]
+    assert [p.name for p in tmp_path.iterdir() if p.is_file()] == [PARAMETER_FILE]
 
 
 def test_a_parameter_is_stored_beside_those_of_earlier_runs(tmp_path: Path) -> None:

@@ -12,14 +12,18 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import encode_steps
 from autopilot.wire.tlog import read_tlog
 from gcs import session as session_module
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
 from gcs.commands import status as status_module
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
+from gcs.formats.missions import write_foreign
 from gcs.link import UdpSocket, free_port
+from missions.model import Land, Signals, Sine, Takeoff, Term
 
 ROOT = Path(__file__).resolve().parents[2]
 HELP_LIMIT_S = 0.3  # of `gcs --help`, on an idle machine; the test takes the best of several
@@ -307,6 +311,82 @@ def test_a_mission_goes_up_comes_down_and_is_cleared(live):
     assert vehicle.mission == []
 
 
+def plan_of(*items):
+    entries = [
+        {
+            "type": "SimpleItem",
+            "autoContinue": True,
+            "command": command,
+            "doJumpId": i,
+            "frame": 3,
+            "params": params,
+        }
+        for i, (command, params) in enumerate(items, start=1)
+    ]
+    fence = {"version": 2, "circles": [], "polygons": []}
+    return {"fileType": "Plan", "version": 1, "mission": {"version": 2, "items": entries}, "geoFence": fence}
+
+
+@pytest.mark.parametrize("ending", [".plan", ".waypoints"])
+def test_a_plan_goes_up_and_comes_down_equal(live, tmp_path, ending):
+    vehicle, port = live
+    file, back = tmp_path / "in.plan", tmp_path / f"out{ending}"
+    place = [0.1, 0, 0, None, 47.397745, 8.5455941, 3.25]
+    plan = plan_of(
+        (22, [0, 0, 0, None, 47.397742, 8.545594, 2.5]), (16, place), (21, [0, 0, 0, None, 0, 0, 0])
+    )
+    file.write_text(json.dumps(plan))
+    result = run("upload", str(file), "--connect", port)
+    assert result.exit_code == EXIT_DONE, result.output
+    assert "3 items accepted" in result.stdout
+    first = list(vehicle.mission)
+    assert "3 items written" in run("download", str(back), "--connect", port).stdout
+    if ending == ".plan":
+        assert json.loads(back.read_text())["mission"]["items"] == plan["mission"]["items"]
+    assert run("upload", str(back), "--connect", port).exit_code == EXIT_DONE
+    assert repr(vehicle.mission) == repr(first)
+
+
+def test_what_of_a_plan_is_not_flown_is_told_and_skipped_only_if_asked(live, tmp_path):
+    vehicle, port = live
+    file = tmp_path / "in.plan"
+    take_off = (22, [0, 0, 0, None, 47.397742, 8.545594, 2.5])
+    plan = plan_of(take_off, (18, [2, 0, 0, 0, 47.397745, 8.5455941, 3]), (2000, [0] * 7))
+    plan["geoFence"]["circles"] = [{}]
+    file.write_text(json.dumps(plan))
+    result = run("upload", str(file), "--connect", port)
+    assert result.exit_code == EXIT_ERROR
+    lines = result.stderr.splitlines()
+    assert len(lines) == 4
+    assert "NAV_LOITER_TURNS (18)" in lines[0]
+    assert "IMAGE_START_CAPTURE (2000)" in lines[1]
+    assert "geoFence.circles: 1" in lines[2]
+    assert "--skip" in lines[3]
+    assert vehicle.mission == []
+    assert run("upload", str(file), "--skip", "--connect", port).exit_code == EXIT_DONE
+    assert [item.command for item in vehicle.mission] == [22, 2000]
+
+
+def test_a_plan_beyond_the_vehicle_is_refused_unless_forced(live, tmp_path):
+    _, port = live
+    file = tmp_path / "in.plan"
+    fast = Term("z", 2.0, 0.0, 1.0, None, 0.0, (Sine(0.5),))  # falls faster than gravity
+    items = encode_steps((Takeoff(3.0), Signals(5.0, (fast,)), Land()), Home())
+    write_foreign(file, items, Home())
+    assert "cannot be flown" in one_line(run("upload", str(file), "--connect", port), EXIT_ERROR)
+    assert run("upload", str(file), "--force", "--connect", port).exit_code == EXIT_DONE
+
+
+def test_bad_files_of_others_are_one_line(tmp_path):
+    file = tmp_path / "in.plan"
+    assert "No such file" in one_line(run("upload", str(file)), EXIT_ERROR)
+    file.write_bytes(b"\xff\xfe")
+    assert "not a text file" in one_line(run("upload", str(file)), EXIT_ERROR)
+    file.write_text("{}")
+    assert "fileType" in one_line(run("upload", str(file)), EXIT_ERROR)
+    assert "must end in .plan" in one_line(run("download", str(tmp_path / "x.csv")), EXIT_USAGE)
+
+
 def test_parameters(live, tmp_path):
     vehicle, port = live
     assert run("param", "set", "p001", "0.1", "--connect", port).stdout == "P001 = 0.1\n"
@@ -321,6 +401,9 @@ def test_parameters(live, tmp_path):
 
     file = tmp_path / "all.params"
     assert run("param", "save", str(file), "--connect", port).exit_code == EXIT_DONE
+    assert "1\t1\tP001\t0.1\t9\n" in file.read_text()
+    assert run("param", "save", str(tmp_path / "all.parm"), "--connect", port).exit_code == EXIT_DONE
+    assert "P001             0.1\n" in (tmp_path / "all.parm").read_text()
     before = dict(vehicle.parameters)
     vehicle.parameters.update(P001=5.0, P100=7.0)
     assert run("param", "load", str(file), "--connect", port).stdout.startswith("120 of 120 parameters set")

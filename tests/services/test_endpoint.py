@@ -253,9 +253,9 @@ def test_ping_comes_back_once(rig):
 
 @pytest.mark.parametrize(
     ("opcode", "answer", "code"),
-    [(4, 129, 10), (3, 129, 10), (15, 129, 7), (6, 129, 7), (1, 128, 0), (2, 128, 0)],
+    [(4, 129, 10), (3, 128, ord("D")), (15, 129, 4), (6, 129, 9), (1, 129, 4), (2, 128, 0), (77, 129, 7)],
 )
-def test_ftp_is_refused_at_once(rig, opcode, answer, code):
+def test_ftp_is_answered_at_once(rig, opcode, answer, code):
     payload = bytearray(251)
     payload[0:2] = b"\xff\xff"
     payload[2], payload[3] = 5, opcode

@@ -52,10 +52,9 @@ def test_the_load_has_no_autopilot(snap):
 
 def test_capabilities_promise_what_is_served_and_nothing_else():
     capabilities = autopilot_version_message(Identity()).capabilities
-    for name in ("MISSION_INT", "COMMAND_INT", "MAVLINK2", "PARAM_ENCODE_BYTEWISE"):
+    for name in ("MISSION_INT", "COMMAND_INT", "MAVLINK2", "PARAM_ENCODE_BYTEWISE", "FTP"):
         assert capabilities & getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_{name}")
     unserved = [
-        "FTP",
         "MISSION_FENCE",
         "MISSION_RALLY",
         "SET_ATTITUDE_TARGET",

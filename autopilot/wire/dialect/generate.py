@@ -18,6 +18,7 @@ from pathlib import Path
 from pymavlink.generator import mavgen
 
 DIALECT = Path(__file__).with_name("plumbline.xml")
+MISSING = Path(__file__).with_name("missing.xml")  # what pymavlink's common.xml lacks
 MODULE = Path(__file__).with_name("plumbline.py")
 _INCLUDED = ("common.xml", "standard.xml", "minimal.xml")
 _STAMP = "# Generated with pymavlink "
@@ -27,8 +28,12 @@ def generated() -> bytes:
     """The module that the installed pymavlink makes of plumbline.xml."""
     definitions = Path(str(files("pymavlink") / "dialects" / "v20"))
     with tempfile.TemporaryDirectory() as folder:
-        for source in (DIALECT, *(definitions / name for name in _INCLUDED)):
+        for source in (MISSING, *(definitions / name for name in _INCLUDED)):
             shutil.copy(source, folder)
+        include = "<include>{}</include>".format
+        both = include("common.xml") + include(MISSING.name)
+        text = DIALECT.read_text(encoding="utf-8").replace(include("common.xml"), both)
+        (Path(folder) / DIALECT.name).write_text(text, encoding="utf-8")
         output = Path(folder) / "out" / "plumbline.py"
         output.parent.mkdir()
         options = mavgen.Opts(str(output), wire_protocol="2.0", language="Python3", validate=False)

@@ -1,0 +1,207 @@
+"""Files as the services see them: paths that cannot leave their root, and a card that holds bytes.
+
+The card itself belongs to the shell (`autopilot.card` keeps one in a directory); `MemoryCard` is one without
+a disk, for tests and for flights inside one process.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple, Protocol
+
+Path = tuple[str, ...]  # names from the root downwards; () is the root itself
+
+LONGEST_NAME = 255  # bytes of one name, as on any common disk
+LOG_FOLDER: Path = ("log",)  # of the card
+LOG_ENDING = ".ulg"
+
+
+class Trouble(IntEnum):
+    """Why a file operation failed: the error codes of FILE_TRANSFER_PROTOCOL."""
+
+    FAIL = 1
+    FAIL_ERRNO = 2
+    INVALID_DATA_SIZE = 3
+    INVALID_SESSION = 4
+    NO_SESSIONS = 5
+    END_OF_FILE = 6
+    UNKNOWN_COMMAND = 7
+    EXISTS = 8
+    PROTECTED = 9
+    NOT_FOUND = 10
+
+
+class FileError(Exception):
+    """An operation that was not done; `errno` (POSIX) goes with FAIL_ERRNO."""
+
+    def __init__(self, trouble: Trouble, errno: int = 0) -> None:
+        super().__init__(f"{trouble.name} {errno}" if errno else trouble.name)
+        self.trouble = trouble
+        self.errno = errno
+
+
+class Entry(NamedTuple):
+    """One name in a folder; `modified_s` counts from 1970."""
+
+    name: str
+    size: int
+    is_folder: bool
+    modified_s: int = 0
+
+
+class Card(Protocol):
+    """A tree of files. Every method raises FileError where it cannot do what it says."""
+
+    def entries(self, path: Path) -> list[Entry]:
+        """What is in a folder, by name."""
+
+    def size(self, path: Path) -> int:
+        """Bytes in a file."""
+
+    def read(self, path: Path, offset: int, size: int) -> bytes:
+        """At most `size` bytes; fewer at the end, none behind it."""
+
+    def create(self, path: Path) -> None:
+        """An empty file, in place of one that is there."""
+
+    def write(self, path: Path, offset: int, data: bytes) -> None:
+        """Put `data` into a file that exists; a hole before it reads as zeros."""
+
+    def truncate(self, path: Path, size: int) -> None:
+        """Cut a file, or fill it up with zeros."""
+
+    def remove(self, path: Path) -> None:
+        """Take a file away."""
+
+    def rename(self, old: Path, new: Path) -> None:
+        """Move a file or folder to a name that is free."""
+
+    def make_folder(self, path: Path) -> None:
+        """An empty folder in a folder that exists."""
+
+    def remove_folder(self, path: Path) -> None:
+        """Take an empty folder away."""
+
+
+def path_of(text: bytes) -> Path:
+    """The path that a client wrote, '/' between its names; FileError if it is none.
+
+    `.` and empty names say nothing; `..` is refused, as are control characters and what is not UTF-8.
+    """
+    try:
+        decoded = text.split(b"\0", 1)[0].decode("utf-8")
+    except UnicodeDecodeError:
+        raise FileError(Trouble.NOT_FOUND) from None
+    names = tuple(name for name in decoded.split("/") if name not in ("", "."))
+    for name in names:
+        if name == ".." or len(name.encode()) > LONGEST_NAME or not name.isprintable() or "\\" in name:
+            raise FileError(Trouble.NOT_FOUND)
+    return names
+
+
+@dataclass(slots=True)
+class Limits:
+    """What a card takes from outside: bytes in one file, bytes in all, files and folders."""
+
+    file_bytes: int = 64 * 2**20
+    total_bytes: int = 1024 * 2**20
+    files: int = 4096
+
+
+class MemoryCard:
+    """A card in memory. Folders are names of their own, so that an empty one exists."""
+
+    def __init__(self, limits: Limits | None = None) -> None:
+        self._limits = limits or Limits()
+        self._files: dict[Path, bytearray] = {}
+        self._folders: set[Path] = {()}
+
+    def entries(self, path: Path) -> list[Entry]:
+        if path not in self._folders:
+            raise FileError(Trouble.NOT_FOUND)
+        found = [Entry(file[-1], len(data), False) for file, data in self._files.items() if file[:-1] == path]
+        found += [Entry(folder[-1], 0, True) for folder in self._folders if folder and folder[:-1] == path]
+        return sorted(found)
+
+    def size(self, path: Path) -> int:
+        return len(self._file(path))
+
+    def read(self, path: Path, offset: int, size: int) -> bytes:
+        return bytes(self._file(path)[offset : offset + size])
+
+    def create(self, path: Path) -> None:
+        if path in self._folders:
+            raise FileError(Trouble.FAIL)
+        self._parent(path)
+        self._one_more()
+        self._files[path] = bytearray()
+
+    def write(self, path: Path, offset: int, data: bytes) -> None:
+        file = self._file(path)
+        end = offset + len(data)
+        self._room(file, end)
+        file.extend(bytes(max(0, end - len(file))))
+        file[offset:end] = data
+
+    def truncate(self, path: Path, size: int) -> None:
+        file = self._file(path)
+        self._room(file, size)
+        file.extend(bytes(max(0, size - len(file))))
+        del file[size:]
+
+    def remove(self, path: Path) -> None:
+        self._file(path)
+        del self._files[path]
+
+    def rename(self, old: Path, new: Path) -> None:
+        if new in self._files or new in self._folders:
+            raise FileError(Trouble.EXISTS)
+        self._parent(new)
+        if old in self._files:
+            self._files[new] = self._files.pop(old)
+            return
+        if not old or old not in self._folders:
+            raise FileError(Trouble.NOT_FOUND)
+        if new[: len(old)] == old:
+            raise FileError(Trouble.FAIL)
+        length = len(old)
+        self._files = {_moved(path, old, new, length): data for path, data in self._files.items()}
+        self._folders = {_moved(path, old, new, length) for path in self._folders}
+
+    def make_folder(self, path: Path) -> None:
+        if path in self._folders or path in self._files:
+            raise FileError(Trouble.EXISTS)
+        self._parent(path)
+        self._one_more()
+        self._folders.add(path)
+
+    def remove_folder(self, path: Path) -> None:
+        if not path or path not in self._folders:
+            raise FileError(Trouble.NOT_FOUND)
+        if self.entries(path):
+            raise FileError(Trouble.FAIL)
+        self._folders.remove(path)
+
+    def _file(self, path: Path) -> bytearray:
+        if path not in self._files:
+            raise FileError(Trouble.NOT_FOUND)
+        return self._files[path]
+
+    def _parent(self, path: Path) -> None:
+        if path[:-1] not in self._folders:
+            raise FileError(Trouble.NOT_FOUND)
+
+    def _one_more(self) -> None:
+        if len(self._files) + len(self._folders) > self._limits.files:
+            raise FileError(Trouble.FAIL)
+
+    def _room(self, file: bytearray, size: int) -> None:
+        grown = size - len(file)
+        total = sum(map(len, self._files.values()))
+        if grown > 0 and (size > self._limits.file_bytes or total + grown > self._limits.total_bytes):
+            raise FileError(Trouble.FAIL)
+
+
+def _moved(path: Path, old: Path, new: Path, length: int) -> Path:
+    return new + path[length:] if path[:length] == old else path

@@ -1,0 +1,333 @@
+"""FILE_TRANSFER_PROTOCOL: a file server for any number of clients, each with sessions of its own.
+
+A session bears the number that its client proposes in the request that opens it (MAVProxy counts them up,
+MAVSDK and QGroundControl say 0); opening with a number that is open puts the new file in the old one's place.
+Sessions that are not used for `IDLE_US` are closed.
+
+A request that comes twice (same client, same sequence number, same bytes) is not done twice: its reply is
+sent again. Bursts go out at a steady pace, `BURST_PACKETS` at a time, the last of them marked.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+from autopilot.services.file_tree import FileTree, OpenFile
+from autopilot.services.files import Entry, FileError, Trouble
+from autopilot.services.records import Decide, Link, Output, Peer, Send
+from autopilot.services.streams import NEVER_US
+from autopilot.wire.dialect import plumbline as mavlink
+
+IDLE_US = 60_000_000
+REPEAT_US = 10_000_000  # so long a reply is kept for a request that comes again
+MOST_SESSIONS = 64  # of all clients together
+MOST_REPLIES = 32  # kept for each client
+MOST_CLIENTS = 32  # whose replies are kept
+BURST_PACKETS = 128
+BURST_PACE_US = 500  # between two packets of a burst: 478 kB/s
+BURST_AT_ONCE = 16  # of them in one tick
+
+LENGTH = 251  # FILE_TRANSFER_PROTOCOL.payload
+_HEADER = struct.Struct("<HBBBBBxI")  # seq, session, opcode, size, asked, burst complete, offset
+DATA_BYTES = LENGTH - _HEADER.size  # 239
+_UINT32 = struct.Struct("<I")
+
+
+class Op(IntEnum):
+    """The opcodes."""
+
+    NONE = 0
+    TERMINATE = 1
+    RESET = 2
+    LIST = 3
+    OPEN_RO = 4
+    READ = 5
+    CREATE = 6
+    WRITE = 7
+    REMOVE = 8
+    MAKE_FOLDER = 9
+    REMOVE_FOLDER = 10
+    OPEN_WO = 11
+    TRUNCATE = 12
+    RENAME = 13
+    CHECKSUM = 14
+    BURST = 15
+    ACK = 128
+    NAK = 129
+
+
+class Packet(NamedTuple):
+    """The payload of FILE_TRANSFER_PROTOCOL."""
+
+    seq: int
+    session: int
+    opcode: int
+    size: int
+    asked: int = 0  # opcode that a reply answers
+    last: int = 0  # of a burst
+    offset: int = 0
+    data: bytes = b""
+
+
+def packet_of(payload: bytes) -> Packet:
+    """Read a payload; `data` is what `size` covers of it."""
+    seq, session, opcode, size, asked, last, offset = _HEADER.unpack_from(payload)
+    return Packet(
+        seq, session, opcode, size, asked, last, offset, payload[_HEADER.size : _HEADER.size + size]
+    )
+
+
+def payload_of(packet: Packet) -> bytes:
+    """A whole payload, padded with zeros."""
+    head = _HEADER.pack(
+        packet.seq & 0xFFFF,
+        packet.session,
+        packet.opcode,
+        packet.size,
+        packet.asked,
+        packet.last,
+        packet.offset,
+    )
+    return (head + packet.data).ljust(LENGTH, b"\0")
+
+
+@dataclass(slots=True)
+class _Session:
+    file: OpenFile
+    used_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Burst:
+    """Packets that are still to be sent."""
+
+    seq: int
+    offset: int
+    size: int
+    left: int
+    due_us: int
+
+
+_Key = tuple[Peer, int]  # a client and one of its sessions
+# what is done afresh whenever it is asked: nothing changes by it
+_REPEATABLE = frozenset((Op.NONE, Op.LIST, Op.READ, Op.BURST, Op.CHECKSUM))
+
+
+class FtpService:
+    """Serves one tree to any number of clients."""
+
+    def __init__(self, tree: FileTree) -> None:
+        self._tree = tree
+        self._sessions: dict[_Key, _Session] = {}
+        self._bursts: dict[_Key, _Burst] = {}
+        # the last replies by client: request to reply and when it was made
+        self._replies: OrderedDict[Peer, OrderedDict[bytes, tuple[Packet, int]]] = OrderedDict()
+
+    @property
+    def open_sessions(self) -> int:
+        """How many sessions are open, of all clients."""
+        return len(self._sessions)
+
+    def receive(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """Do what a client asks, and answer it."""
+        payload = bytes(message.payload)
+        asked = packet_of(payload)
+        if asked.opcode in (Op.ACK, Op.NAK):
+            return []
+        if asked.opcode not in _REPEATABLE:
+            known = self._replies.get(peer)
+            kept = known.get(payload) if known else None
+            if kept is not None and now_us - kept[1] <= REPEAT_US:
+                return [_message(kept[0], peer)]
+        try:
+            reply = self._do(asked, peer, now_us)
+        except FileError as error:
+            reply = _refusal(asked, error)
+        if reply is None:
+            return []
+        if asked.opcode not in _REPEATABLE:
+            self._keep(peer, payload, reply, now_us)
+        return [_message(reply, peer)]
+
+    def next_timer(self) -> int:
+        """When `poll` has something to do, in us."""
+        bursts = min((burst.due_us for burst in self._bursts.values()), default=NEVER_US)
+        idle = min((session.used_us for session in self._sessions.values()), default=NEVER_US - IDLE_US)
+        return min(bursts, idle + IDLE_US)
+
+    def poll(self, now_us: int) -> list[Output]:
+        """The packets of bursts whose time has come; forgets idle sessions."""
+        outputs: list[Output] = []
+        for key, burst in list(self._bursts.items()):
+            outputs += self._go_on(key, burst, now_us)
+        for key, session in list(self._sessions.items()):
+            if now_us - session.used_us >= IDLE_US:
+                self._close(key)
+        return outputs
+
+    def forget(self, link: Link) -> None:
+        """The link is gone, and all clients on it."""
+        for key in [key for key in self._sessions if key[0].link == link]:
+            self._close(key)
+        for peer in [peer for peer in self._replies if peer.link == link]:
+            del self._replies[peer]
+
+    # ---- requests
+
+    def _do(self, asked: Packet, peer: Peer, now_us: int) -> Packet | None:
+        """The reply; None for a burst, whose packets are replies of their own."""
+        tree, data = self._tree, asked.data
+        if asked.size > DATA_BYTES:
+            raise FileError(Trouble.INVALID_DATA_SIZE)
+        match asked.opcode:
+            case Op.NONE:
+                return _ack(asked)
+            case Op.TERMINATE:
+                self._session(asked, peer, now_us)
+                self._close((peer, asked.session))
+                return _ack(asked)
+            case Op.RESET:
+                for key in [key for key in self._sessions if key[0] == peer]:
+                    self._close(key)
+                self._replies.pop(peer, None)
+                return _ack(asked)
+            case Op.LIST:
+                return _ack(asked, _listing(tree.entries(data), asked.offset), asked.offset)
+            case Op.OPEN_RO:
+                file = tree.open(data)
+                return self._open(file, asked, peer, now_us)
+            case Op.CREATE | Op.OPEN_WO:
+                self._room(asked, peer)
+                file = tree.open_to_write(data, asked.opcode == Op.CREATE)
+                return self._open(file, asked, peer, now_us)
+            case Op.READ:
+                file = self._session(asked, peer, now_us).file
+                return _ack(asked, tree.read(file, asked.offset, asked.size or DATA_BYTES), asked.offset)
+            case Op.WRITE:
+                file = self._session(asked, peer, now_us).file
+                tree.write(file, asked.offset, data)
+                return _ack(asked, _UINT32.pack(len(data)), asked.offset)
+            case Op.BURST:
+                self._session(asked, peer, now_us)
+                size = asked.size or DATA_BYTES
+                self._bursts[peer, asked.session] = _Burst(
+                    asked.seq + 1, asked.offset, size, BURST_PACKETS, now_us
+                )
+                return None
+            case Op.REMOVE:
+                tree.remove(data)
+            case Op.MAKE_FOLDER:
+                tree.make_folder(data)
+            case Op.REMOVE_FOLDER:
+                tree.remove_folder(data)
+            case Op.TRUNCATE:
+                tree.truncate(data, asked.offset)
+            case Op.RENAME:
+                old, _, new = data.partition(b"\0")
+                tree.rename(old, new)
+            case Op.CHECKSUM:
+                return _ack(asked, _UINT32.pack(tree.checksum(data)))
+            case _:
+                raise FileError(Trouble.UNKNOWN_COMMAND)
+        return _ack(asked)
+
+    def _room(self, asked: Packet, peer: Peer) -> None:
+        if len(self._sessions) >= MOST_SESSIONS and (peer, asked.session) not in self._sessions:
+            raise FileError(Trouble.NO_SESSIONS)
+
+    def _open(self, file: OpenFile, asked: Packet, peer: Peer, now_us: int) -> Packet:
+        self._room(asked, peer)
+        key = (peer, asked.session)
+        self._close(key)
+        self._sessions[key] = _Session(file, now_us)
+        return _ack(asked, _UINT32.pack(min(self._tree.size(file), 2**32 - 1)))
+
+    def _session(self, asked: Packet, peer: Peer, now_us: int) -> _Session:
+        session = self._sessions.get((peer, asked.session))
+        if session is None:
+            raise FileError(Trouble.INVALID_SESSION)
+        session.used_us = now_us
+        return session
+
+    def _close(self, key: _Key) -> None:
+        self._sessions.pop(key, None)
+        self._bursts.pop(key, None)
+
+    def _keep(self, peer: Peer, payload: bytes, reply: Packet, now_us: int) -> None:
+        replies = self._replies.setdefault(peer, OrderedDict())
+        self._replies.move_to_end(peer)
+        replies[payload] = (reply, now_us)
+        replies.move_to_end(payload)
+        if len(replies) > MOST_REPLIES:
+            replies.popitem(last=False)
+        if len(self._replies) > MOST_CLIENTS:
+            self._replies.popitem(last=False)
+
+    # ---- bursts
+
+    def _go_on(self, key: _Key, burst: _Burst, now_us: int) -> list[Output]:
+        peer, number = key
+        outputs: list[Output] = []
+        session = self._sessions[key]
+        session.used_us = max(session.used_us, now_us)
+        due = min((now_us - burst.due_us) // BURST_PACE_US + 1, BURST_AT_ONCE, burst.left)
+        for _ in range(due):
+            asked = Packet(burst.seq - 1, number, Op.BURST, burst.size)
+            try:
+                data = self._tree.read(session.file, burst.offset, burst.size)
+            except FileError as error:
+                del self._bursts[key]
+                refusal = _refusal(asked, error)._replace(offset=burst.offset, last=1)
+                return [*outputs, _message(refusal, peer)]
+            packet = _ack(asked, data, burst.offset)._replace(last=int(burst.left == 1))
+            outputs.append(_message(packet, peer))
+            burst = replace(
+                burst,
+                seq=burst.seq + 1,
+                offset=burst.offset + len(data),
+                left=burst.left - 1,
+                due_us=max(burst.due_us, now_us - BURST_AT_ONCE * BURST_PACE_US) + BURST_PACE_US,
+            )
+        if burst.left:
+            self._bursts[key] = burst
+        else:
+            del self._bursts[key]
+        return outputs
+
+
+def _listing(entries: list[Entry], first: int) -> bytes:
+    """As many entries as go in, each ended by NUL; FileError END_OF_FILE behind the last."""
+    listing = b""
+    for entry in entries[first:]:
+        text = f"D{entry.name}" if entry.is_folder else f"F{entry.name}\t{entry.size}"
+        one = text.encode() + b"\0"
+        if len(one) > DATA_BYTES:
+            one = b"S\0"  # a name too long to be told: skipped, but counted
+        if len(listing) + len(one) > DATA_BYTES:
+            break
+        listing += one
+    if not listing:
+        raise FileError(Trouble.END_OF_FILE)
+    return listing
+
+
+def _ack(asked: Packet, data: bytes = b"", offset: int = 0) -> Packet:
+    return Packet(asked.seq + 1, asked.session, Op.ACK, len(data), asked.opcode, 0, offset, data)
+
+
+def _refusal(asked: Packet, error: FileError) -> Packet:
+    data = bytes((error.trouble,))
+    if error.trouble is Trouble.FAIL_ERRNO:
+        data += bytes((error.errno & 0xFF,))
+    return Packet(asked.seq + 1, asked.session, Op.NAK, len(data), asked.opcode, 0, asked.offset, data)
+
+
+def _message(packet: Packet, peer: Peer) -> Send:
+    message = mavlink.MAVLink_file_transfer_protocol_message(
+        0, peer.system, peer.component, list(payload_of(packet))
+    )
+    return Send(peer.link, message)

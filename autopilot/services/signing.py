@@ -1,0 +1,91 @@
+"""SETUP_SIGNING, and which frames are heard and how ours leave, over all links of the vehicle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.services.records import Decide, Output, Peer, Say, SigningChanged
+from autopilot.services.requests import ChangeSigningKey
+from autopilot.services.streams import NEVER_US
+from autopilot.wire.codec import Received
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import NEWEST, UNITS_PER_S, Sign, Signing, timestamp_of
+
+AHEAD = 10 * UNITS_PER_S  # by so much the stored time is ahead of the one in use
+_COMPLAIN_US = 10_000_000
+_NO_KEY = bytes(32)
+
+
+class SigningService:
+    """The key in force, if there is one."""
+
+    def __init__(self, signing: Signing | None, boot_unix_us: int) -> None:
+        self.signing = signing
+        self._boot_unix_us = boot_unix_us
+        self._stored = 0 if signing is None else signing.timestamp
+        self._refused = False
+        self._complain_us = 0
+        self._told: int | None = None
+
+    def tell_time(self, unix_us: int) -> None:
+        """The time of the wall clock; without it, that of the vehicle's clock since its boot."""
+        self._told = unix_us
+
+    def _clock(self, now_us: int) -> int:
+        return timestamp_of(self._boot_unix_us + now_us if self._told is None else self._told)
+
+    def next_timer(self) -> int:
+        """When `poll` has something to do, in us."""
+        return self._complain_us if self._refused else NEVER_US
+
+    def signer(self, link_id: int) -> Sign | None:
+        """What signs the frames of a link; None without a key."""
+        return None if self.signing is None else self.signing.signer(link_id)
+
+    def hears(self, received: Received, message_id: int) -> bool:
+        """Whether a frame is to be heard."""
+        if self.signing is None:
+            return True
+        heard = self.signing.accepts(received.frame, message_id, received.system, received.component)
+        self._refused = self._refused or not heard
+        return heard
+
+    def receive_setup(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """SETUP_SIGNING: a new key, or none (all zeros). Once there is a key, only by who knows it."""
+        verdict = decide(ChangeSigningKey())
+        if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
+            why = verdict.text or "not allowed"
+            return [Say(mavlink.MAV_SEVERITY_WARNING, f"Signing key not changed: {why}")]
+        key = bytes(message.secret_key)
+        if key == _NO_KEY:
+            self.signing = None
+            self._stored = 0
+            return [
+                SigningChanged(None, 0),
+                Say(mavlink.MAV_SEVERITY_NOTICE, "Signing is off: all messages are heard"),
+            ]
+        begin = max(min(message.initial_timestamp, NEWEST), self._clock(now_us))
+        self.signing = Signing(key, begin)
+        self._stored = min(begin + AHEAD, NEWEST)
+        return [
+            SigningChanged(key, self._stored),
+            Say(mavlink.MAV_SEVERITY_NOTICE, "Signing is on: only signed messages are heard"),
+        ]
+
+    def poll(self, now_us: int) -> list[Output]:
+        """The time to be stored before it is reached; a word to those who are not heard."""
+        signing = self.signing
+        if signing is None:
+            return []
+        signing.advance(self._clock(now_us))
+        outputs: list[Output] = []
+        if signing.timestamp >= self._stored:
+            self._stored = min(signing.timestamp + AHEAD, NEWEST)
+            outputs.append(SigningChanged(signing.key, self._stored))
+        if self._refused and now_us >= self._complain_us:
+            self._refused = False
+            self._complain_us = now_us + _COMPLAIN_US
+            outputs.append(
+                Say(mavlink.MAV_SEVERITY_WARNING, "Unsigned or wrongly signed messages are refused")
+            )
+        return outputs

@@ -1,0 +1,124 @@
+"""Flight logs in PX4's ULog format, version 1: bytes out, no file.
+
+A log is its definitions (`beginning`), then messages in the order of their time. Flight Review, PlotJuggler
+and pyulog read it.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+_MAGIC = b"ULog\x01\x12\x35"
+_VERSION = 1
+_HEAD = struct.Struct("<HB")  # size of what follows, kind
+_TIME = struct.Struct("<Q")
+_FLAGS = bytes(40)  # nothing incompatible, no data appended
+_DEFAULT_OF_THE_SYSTEM = 1
+_CODES = {
+    "uint64_t": "Q",
+    "int64_t": "q",
+    "double": "d",
+    "uint32_t": "I",
+    "int32_t": "i",
+    "float": "f",
+    "uint16_t": "H",
+    "int16_t": "h",
+    "uint8_t": "B",
+    "int8_t": "b",
+    "bool": "?",
+    "char": "c",
+}
+_LONGEST_TEXT = 1000
+
+
+class Topic(NamedTuple):
+    """One kind of record: a name and its fields behind the time, each `type name` or `type[n] name`.
+
+    Fields stand in the order of their size, the largest first, as PX4 packs them.
+    """
+
+    name: str
+    fields: tuple[str, ...]
+
+    @property
+    def format(self) -> str:
+        """The format as it stands in the log."""
+        return f"{self.name}:uint64_t timestamp;" + "".join(f"{field};" for field in self.fields)
+
+    @property
+    def packer(self) -> struct.Struct:
+        """Time and all numbers of a record, one after the other."""
+        code = "<Q"
+        for field in self.fields:
+            kind, bracket, count = field.split(" ")[0].partition("[")
+            code += f"{int(count.rstrip(']')) if bracket else ''}{_CODES[kind]}"
+        return struct.Struct(code)
+
+
+class UlogWriter:
+    """Makes the bytes of one log."""
+
+    def __init__(self, topics: Iterable[Topic]) -> None:
+        self._topics = tuple(topics)
+        packers = [topic.packer for topic in self._topics]
+        # whole messages: head, number of the topic, record
+        self._records = [struct.Struct("<HBH" + packer.format[1:]) for packer in packers]
+        self._sizes = [2 + packer.size for packer in packers]
+
+    def beginning(
+        self,
+        time_us: int,
+        facts: Mapping[str, str | int],
+        parameters: Mapping[str, float],
+        defaults: Mapping[str, float],
+    ) -> bytes:
+        """Header, definitions and subscriptions; `defaults` where they differ from the parameters."""
+        parts = [_MAGIC + bytes((_VERSION,)) + _TIME.pack(time_us), _message(b"B", _FLAGS)]
+        parts += [_fact(name, value) for name, value in facts.items()]
+        parts += [_message(b"F", topic.format.encode()) for topic in self._topics]
+        parts += [parameter(name, value) for name, value in parameters.items()]
+        for name, value in defaults.items():
+            default = bytes((_DEFAULT_OF_THE_SYSTEM,)) + _keyed("float", name, struct.pack("<f", value))
+            parts.append(_message(b"Q", default))
+        for number, topic in enumerate(self._topics):
+            parts.append(_message(b"A", struct.pack("<BH", 0, number) + topic.name.encode()))
+        return b"".join(parts)
+
+    def record(self, topic: int, time_us: int, *numbers: float) -> bytes:
+        """One record of the topic with this number, its arrays spread out."""
+        return self._records[topic].pack(self._sizes[topic], 0x44, topic, time_us, *numbers)  # 'D'
+
+
+def parameter(name: str, value: float) -> bytes:
+    """The value of a parameter from here on."""
+    return _message(b"P", _keyed("float", name, struct.pack("<f", value)))
+
+
+def text(time_us: int, severity: int, line: str) -> bytes:
+    """A line for a person; MAV_SEVERITY 0 ... 7 is the level of the log."""
+    level = ord("0") + min(max(severity, 0), 7)
+    return _message(b"L", bytes((level,)) + _TIME.pack(time_us) + line.encode()[:_LONGEST_TEXT])
+
+
+def dropout(duration_ms: int) -> bytes:
+    """That records of so long a time are missing here."""
+    whole, rest = divmod(duration_ms, 0xFFFF)  # as much as one message can tell
+    return b"".join(_message(b"O", struct.pack("<H", part)) for part in (*(0xFFFF,) * whole, rest))
+
+
+def _message(kind: bytes, body: bytes) -> bytes:
+    return _HEAD.pack(len(body), kind[0]) + body
+
+
+def _keyed(kind: str, name: str, value: bytes) -> bytes:
+    key = f"{kind} {name}".encode()
+    return bytes((len(key),)) + key + value
+
+
+def _fact(name: str, value: str | int) -> bytes:
+    if isinstance(value, str):
+        encoded = value.encode()
+        return _message(b"I", _keyed(f"char[{len(encoded)}]", name, encoded))
+    return _message(b"I", _keyed("uint32_t", name, struct.pack("<I", value)))

@@ -1,0 +1,1 @@
+"""Files of other ground stations: missions (.plan, .waypoints) and parameters (.params)."""

@@ -1,0 +1,93 @@
+"""What mission files have in common: numbers as people write them, and items with where they came from."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import NamedTuple
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
+from autopilot.wire.parameters import decimal_from_float32
+from gcs.errors import GcsError
+
+NO_INT = 2**31 - 1  # a coordinate that is not given
+_FLOAT32 = struct.Struct("<f")
+_GLOBAL = frozenset(
+    {
+        mavlink.MAV_FRAME_GLOBAL,
+        mavlink.MAV_FRAME_GLOBAL_INT,
+        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+        mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+    }
+)
+_LOCAL = frozenset(
+    {mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_ENU, mavlink.MAV_FRAME_LOCAL_OFFSET_NED}
+)
+
+
+class FormatError(GcsError):
+    """A file that is not what it should be; says where and what."""
+
+
+class FileItem(NamedTuple):
+    """A mission item and where in its file it stands."""
+
+    item: WireItem
+    where: str
+
+
+def item_of(
+    frame: int, command: int, current: int, autocontinue: int, params: list[float], where: str
+) -> WireItem:
+    """The item of a row of a file: seven parameters in degrees and metres, NaN for what is not given."""
+    for name, value, most in (("frame", frame, 255), ("command", command, 65535)):
+        if not 0 <= value <= most:
+            raise FormatError(f"{where}: {name} {value}; must be 0 ... {most}")
+    x, y = (_whole(value, frame, number, where) for number, value in ((5, params[4]), (6, params[5])))
+    p1, p2, p3, p4, _, _, z = (_float32(value, number, where) for number, value in enumerate(params, start=1))
+    flags = (int(current == 1), int(bool(autocontinue)))
+    return WireItem(frame, command, *flags, p1, p2, p3, p4, x, y, z)
+
+
+def params_of(item: WireItem) -> list[float]:
+    """The seven parameters of an item in degrees and metres, with the digits that give the item again."""
+    floats = [decimal_from_float32(value) for value in (item.param1, item.param2, item.param3, item.param4)]
+    scale = _scale(item.frame)
+    places = [math.nan if value == NO_INT else value / scale for value in (item.x, item.y)]
+    return [*floats, *places, decimal_from_float32(item.z)]
+
+
+def command_name(command: int) -> str:
+    """The name of a command without its prefix, or its number."""
+    for enum in ("PLUMBLINE_COMMAND", "MAV_CMD"):
+        entry = mavlink.enums[enum].get(command)
+        if entry is not None:
+            return str(entry.name).removeprefix("MAV_CMD_").removeprefix("PLUMBLINE_")
+    return str(command)
+
+
+def _scale(frame: int) -> float:
+    """What MISSION_ITEM_INT multiplies its coordinates by: degrees, metres, or numbers as they are."""
+    if frame in _GLOBAL:
+        return 1e7
+    return 1e4 if frame in _LOCAL else 1.0
+
+
+def _whole(value: float, frame: int, number: int, where: str) -> int:
+    if math.isnan(value):
+        return NO_INT
+    scaled = value * _scale(frame)
+    if not abs(scaled) < NO_INT:
+        raise FormatError(f"{where}: parameter {number} = {value:g} is beyond what an item holds")
+    return round(scaled)
+
+
+def _float32(value: float, number: int, where: str) -> float:
+    try:
+        rounded: float = _FLOAT32.unpack(_FLOAT32.pack(value))[0]
+    except OverflowError:
+        raise FormatError(f"{where}: parameter {number} = {value:g} is beyond what an item holds") from None
+    return rounded

@@ -1,0 +1,134 @@
+"""Missions of other ground stations for our vehicle: read, told what cannot be flown, and written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import FLOWN_COMMANDS, MissionItemError, WireItem, located_steps
+from gcs.formats.items import FormatError, command_name
+from gcs.formats.plan import Plan, read_plan, write_plan
+from gcs.formats.waypoints import HEAD, read_waypoints, write_waypoints
+
+PLAN_ENDING = ".plan"
+WAYPOINT_ENDINGS = (".waypoints", ".wpl", ".txt", ".mission")
+
+
+class Judged(NamedTuple):
+    """What can be sent to the vehicle of a file, and what of it is not flown, a line each."""
+
+    items: tuple[WireItem, ...]
+    unflown: list[str]
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a mission file is another ground station's, by its ending."""
+    return path.suffix.lower() in (PLAN_ENDING, *WAYPOINT_ENDINGS)
+
+
+def read_foreign(path: Path) -> Plan:
+    """What is in a .plan or .waypoints file; FormatError says what is wrong with it."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise FormatError(f"{path}: cannot be read: not a text file") from None
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        if path.suffix.lower() == PLAN_ENDING and not text.startswith(HEAD):
+            return read_plan(text)
+        return Plan(read_waypoints(text), [])
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def write_foreign(path: Path, items: Sequence[WireItem], home: Home) -> None:
+    """Write the items as the ending says; what was there is replaced once the new file is whole."""
+    if not is_foreign(path):
+        endings = ", ".join((PLAN_ENDING, *WAYPOINT_ENDINGS))
+        raise FormatError(f"{path}: ending {path.suffix!r}; must be one of {endings}")
+    text = write_plan(items, home) if path.suffix.lower() == PLAN_ENDING else write_waypoints(items)
+    partial = path.with_name(path.name + ".part")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def judge(plan: Plan, home: Home) -> Judged:
+    """What the vehicle would take of a plan, and all that it would not fly.
+
+    Commands that the vehicle keeps and passes over (camera, gimbal ...) stay among the items; those that it
+    would refuse are left out. Both are told.
+    """
+    left = list(plan.items)
+    numbers = list(range(len(left)))
+    told: list[tuple[int, str]] = []
+    if _is_row_of_another_home(plan, home):
+        numbers.pop(0)
+        _, where = left.pop(0)
+        told.append((0, f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"))
+    for number, (item, where) in zip(numbers, left, strict=True):
+        if item.command > mavlink.MAV_CMD_NAV_LAST and item.command not in FLOWN_COMMANDS:
+            told.append((number, f"{_named(number, item, where)}: kept on the vehicle but not done"))
+    while True:
+        try:
+            located_steps([one.item for one in left], home)
+            break
+        except MissionItemError as error:
+            place = min(max(error.seq, 0), len(left) - 1)
+            number, (item, where) = numbers.pop(place), left.pop(place)
+            told.append((number, f"{_named(number, item, where)}: {_advice(item, error.text)}"))
+    told.sort()
+    return Judged(tuple(one.item for one in left), [*(line for _, line in told), *plan.lost])
+
+
+def _is_row_of_another_home(plan: Plan, home: Home) -> bool:
+    """Whether the list begins with a home, as Mission Planner writes it, that is not the vehicle's."""
+    if len(plan.items) < 2:
+        return False
+    (first, _), (second, _) = plan.items[:2]
+    return (
+        first.command == mavlink.MAV_CMD_NAV_WAYPOINT
+        and first.current == 1
+        and first.frame in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
+        and second.command == mavlink.MAV_CMD_NAV_TAKEOFF
+        and _is_no_home(first, home)
+    )
+
+
+def _is_no_home(item: WireItem, home: Home) -> bool:
+    """Whether the vehicle would fly it as an item of its own, or refuse it."""
+    try:
+        return bool(located_steps([item], home))
+    except MissionItemError:
+        return True
+
+
+def _named(number: int, item: WireItem, where: str) -> str:
+    name = command_name(item.command)
+    number_too = "" if name == str(item.command) else f" ({item.command})"
+    return f"item {number} ({where}), {name}{number_too}"
+
+
+def _advice(item: WireItem, text: str) -> str:
+    if item.command in _INSTEAD:
+        return f"cannot be flown; {_INSTEAD[item.command]}"
+    if item.command not in FLOWN_COMMANDS:
+        return "cannot be flown; take it out, or use waypoints"
+    return text
+
+
+_INSTEAD = {
+    mavlink.MAV_CMD_NAV_LOITER_UNLIM: "a mission that ends holds the load: take it out",
+    mavlink.MAV_CMD_NAV_LOITER_TURNS: "use waypoints on the circle, or NAV_LOITER_TIME to hold",
+    mavlink.MAV_CMD_NAV_LOITER_TO_ALT: "use a waypoint at that height",
+    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT: "use NAV_WAYPOINT: legs are smooth anyway",
+    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: "use NAV_TAKEOFF",
+    mavlink.MAV_CMD_NAV_VTOL_LAND: "use NAV_LAND",
+    mavlink.MAV_CMD_NAV_PAYLOAD_PLACE: "use NAV_LAND: landing sets the load down first",
+}

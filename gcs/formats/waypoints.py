@@ -1,0 +1,46 @@
+"""QGC WPL 110: one item a line, twelve columns; Mission Planner, MAVProxy and QGroundControl know it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from autopilot.wire.mission_items import WireItem
+from gcs.formats.items import FileItem, FormatError, item_of, params_of
+
+HEAD = "QGC WPL 110"
+_COLUMNS = 12
+
+
+def read_waypoints(text: str) -> list[FileItem]:
+    """The items of a file; columns may be parted by tabs or spaces, `#` begins a comment."""
+    lines = text.lstrip("\ufeff").splitlines()
+    if not lines or lines[0].split() != HEAD.split():
+        first = lines[0].strip()[:40] if lines else ""
+        raise FormatError(f"line 1: {first!r}; must be {HEAD!r}")
+    items: list[FileItem] = []
+    for number, line in enumerate(lines[1:], start=2):
+        words = line.partition("#")[0].split()
+        if not words:
+            continue
+        where = f"line {number}"
+        if len(words) != _COLUMNS:
+            raise FormatError(f"{where}: {len(words)} columns; must be {_COLUMNS}")
+        try:
+            seq, current, frame, command, autocontinue = (int(words[i]) for i in (0, 1, 2, 3, 11))
+            params = [float(word) for word in words[4:11]]
+        except ValueError as error:
+            raise FormatError(f"{where}: {error}") from None
+        if seq != len(items):
+            raise FormatError(f"{where}: item number {seq}; must be {len(items)}")
+        items.append(FileItem(item_of(frame, command, current, autocontinue, params, where), where))
+    return items
+
+
+def write_waypoints(items: Sequence[WireItem]) -> str:
+    """The file of the items; every number with the digits that give the same item again."""
+    lines = [HEAD]
+    for seq, item in enumerate(items):
+        params = map(repr, params_of(item))
+        columns = (seq, item.current, item.frame, item.command, *params, item.autocontinue)
+        lines.append("\t".join(map(str, columns)))
+    return "\n".join(lines) + "\n"

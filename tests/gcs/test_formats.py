@@ -1,0 +1,256 @@
+"""Mission and parameter files of other ground stations: read, judged, written, and back again."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink import mavwp
+
+from autopilot.wire.convert import Home
+from autopilot.wire.mission_items import WireItem, encode_mission
+from autopilot.wire.parameters import parse_text
+from gcs.clients.operation import Target
+from gcs.formats.items import NO_INT, FormatError
+from gcs.formats.missions import judge, read_foreign, write_foreign
+from gcs.formats.params import lines_of, qgc_of
+from gcs.formats.plan import Plan, read_plan, write_plan
+from gcs.formats.waypoints import read_waypoints, write_waypoints
+from missions.fileformat import load_mission, shipped
+
+HOME = Home()
+
+
+def simple(command: int, frame: int = 3, params: Any = None, **more: Any) -> dict[str, Any]:
+    params = params or [0, 0, 0, None, 47.3977, 8.5456, 3]
+    return {
+        "type": "SimpleItem",
+        "autoContinue": True,
+        "command": command,
+        "doJumpId": 1,
+        "frame": frame,
+        "params": params,
+        **more,
+    }
+
+
+def survey(*items: Any, kind: str = "survey") -> dict[str, Any]:
+    """As QGroundControl writes it: the polygon, and the items that it stands for."""
+    return {
+        "type": "ComplexItem",
+        "complexItemType": kind,
+        "version": 5,
+        "angle": 90,
+        "polygon": [[47.3979, 8.5457], [47.3979, 8.5462], [47.3974, 8.5462]],
+        "TransectStyleComplexItem": {"version": 1, "CameraShots": 6, "Items": list(items)},
+    }
+
+
+def plan_text(*items: Any, **more: Any) -> str:
+    return json.dumps(
+        {
+            "fileType": "Plan",
+            "version": 1,
+            "groundStation": "QGroundControl",
+            "mission": {"version": 2, "items": list(items), "plannedHomePosition": [47.397742, 8.545594, 0]},
+            "geoFence": {"version": 2, "circles": [], "polygons": []},
+            "rallyPoints": {"version": 2, "points": []},
+            **more,
+        }
+    )
+
+
+TAKEOFF = simple(22, params=[0, 0, 0, None, 47.397742, 8.545594, 2])
+TRIGGER = simple(206, 2, [25, 0, 1, 0, 0, 0, 0])
+WAYPOINTS = [simple(16, params=[0, 0, 0, None, 47.3977 + i * 1e-5, 8.5456, 3.5]) for i in range(3)]
+
+
+def test_a_survey_is_taken_apart_in_its_order() -> None:
+    plan = read_plan(plan_text(TAKEOFF, survey(WAYPOINTS[0], TRIGGER, WAYPOINTS[1]), simple(20, 2)))
+    assert [one.item.command for one in plan.items] == [22, 16, 206, 16, 20]
+    assert plan.items[2].where == "mission.items[1].TransectStyleComplexItem.Items[1]"
+    assert plan.lost == []
+    first = plan.items[1].item
+    assert (first.x, first.y, first.z, first.frame) == (473977000, 85456000, 3.5, 3)
+    assert math.isnan(first.param4)
+
+
+def test_what_is_no_item_is_told() -> None:
+    fence = {"version": 2, "circles": [{}], "polygons": [{}, {}], "breachReturn": [1, 2, 3]}
+    structure = {"type": "ComplexItem", "complexItemType": "StructureScan", "Layers": 2}
+    text = plan_text(structure, geoFence=fence, rallyPoints={"version": 2, "points": [[47.0, 8.0, 3.0]]})
+    lost = read_plan(text).lost
+    assert len(lost) == 5
+    assert "mission.items[0]: StructureScan" in lost[0]
+    assert any("geoFence.polygons: 2" in line for line in lost)
+    assert any("rallyPoints.points: 1" in line for line in lost)
+
+
+def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
+    text = plan_text(
+        TAKEOFF, simple(18), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31004), simple(177, 2)
+    )
+    judged = judge(read_plan(text), HOME)
+    lines = judged.unflown
+    assert [line.partition(" (")[0] for line in lines] == ["item 1", "item 2", "item 4", "item 5", "item 6"]
+    assert "NAV_LOITER_TURNS (18)" in lines[0]
+    assert "use waypoints" in lines[0]
+    assert "DO_SET_CAM_TRIGG_DIST (206): kept on the vehicle but not done" in lines[1]
+    assert "frame 10" in lines[2]
+    assert "DO_JUMP (177)" in lines[4]
+    assert [item.command for item in judged.items] == [22, 206, 16, 31004, 177]
+
+
+def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:
+    judged = judge(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME)
+    assert judged.unflown == []
+    assert [item.command for item in judged.items] == [22, 16, 16, 16, 21]
+
+
+@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("ending", [".plan", ".waypoints"])
+def test_shipped_missions_pass_through_files_unchanged(name: str, ending: str, tmp_path: Path) -> None:
+    items = encode_mission(load_mission(name), HOME)
+    path = tmp_path / f"mission{ending}"
+    write_foreign(path, items, HOME)
+    judged = judge(read_foreign(path), HOME)
+    assert judged.unflown == []
+    assert judged.items == items
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+FLOAT32 = st.floats(width=32, allow_infinity=False)
+WHOLE = st.integers(-(2**31) + 2, 2**31 - 1)
+FRAMES = st.sampled_from([0, 1, 2, 3, 5, 6, 10])
+ITEM = st.builds(
+    WireItem, FRAMES, st.integers(0, 65535), st.just(0), st.integers(0, 1),
+    FLOAT32, FLOAT32, FLOAT32, FLOAT32, WHOLE, WHOLE, FLOAT32,
+)  # fmt: skip
+
+
+def bits(items: Any) -> list[bytes]:
+    """The items as they travel; every NaN is the same one."""
+    plain = [[math.nan if math.isnan(value) else value for value in item] for item in items]
+    return [struct.pack("<BHBBffffiif", *item) for item in plain]
+
+
+@given(items=st.lists(ITEM, max_size=5))
+def test_any_items_come_back_bit_for_bit(items: list[WireItem]) -> None:
+    assert bits(one.item for one in read_plan(write_plan(items, HOME)).items) == bits(items)
+    current = [item._replace(current=1) for item in items]
+    assert bits(one.item for one in read_waypoints(write_waypoints(current))) == bits(current)
+
+
+def test_what_is_not_given_is_null() -> None:
+    item = WireItem(6, 16, 0, 1, 0.1, 0.0, 0.0, math.nan, NO_INT, 85455940, 2.0)
+    (entry,) = json.loads(write_plan([item], HOME))["mission"]["items"]
+    assert entry["params"] == [0.1, 0.0, 0.0, None, None, 8.545594, 2.0]
+
+
+def test_an_infinite_number_is_not_lost_silently() -> None:
+    with pytest.raises(FormatError, match="item 0"):
+        write_plan([WireItem(6, 16, 0, 1, math.inf, 0.0, 0.0, 0.0, 0, 0, 2.0)], HOME)
+
+
+def test_pymavlink_reads_our_waypoints_and_we_read_its(tmp_path: Path) -> None:
+    ours, theirs = tmp_path / "ours.waypoints", tmp_path / "theirs.waypoints"
+    items = encode_mission(load_mission("square"), HOME)
+    write_foreign(ours, items, HOME)
+    loader = mavwp.MAVWPLoader()
+    assert loader.load(str(ours)) == len(items)
+    for seq, item in enumerate(items):
+        point = loader.wp(seq)
+        assert (point.command, point.frame, point.autocontinue) == (
+            item.command,
+            item.frame,
+            item.autocontinue,
+        )
+        assert (round(point.x * 1e7), round(point.y * 1e7)) == (item.x, item.y) or item.frame == 2
+    loader.save(str(theirs))
+    read = [one.item for one in read_foreign(theirs).items]
+    for got, item in zip(read, items, strict=True):
+        assert (got.x, got.y) == pytest.approx((item.x, item.y), abs=6)  # it writes six decimals of a degree
+        assert got._replace(current=0, x=item.x, y=item.y) == item
+
+
+def test_a_home_row_of_another_place_is_not_flown() -> None:
+    def rows(latitude: float) -> Plan:
+        text = f"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t{latitude}\t8.545594\t0\t1\n"
+        return Plan(read_waypoints(text + "1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t2\t1\n"), [])
+
+    at_home = judge(rows(47.397742), HOME)
+    assert at_home.unflown == []
+    assert len(at_home.items) == 2
+    elsewhere = judge(rows(47.39), HOME)
+    assert len(elsewhere.unflown) == 1
+    assert "home row" in elsewhere.unflown[0]
+    assert [item.command for item in elsewhere.items] == [22]
+
+
+BAD_PLANS = [
+    ("", "not JSON"),
+    ("[" * 100_000, "not JSON"),
+    ("[]", "fileType"),
+    ('{"fileType": "Parameters"}', "fileType"),
+    ('{"fileType": "Plan"}', "mission: must be an object"),
+    ('{"fileType": "Plan", "mission": {"items": {}}}', "mission.items: must be a list"),
+    (plan_text(7), "mission.items[0]: must be an object"),
+    (plan_text({"type": "Other"}), "mission.items[0].type"),
+    (plan_text(simple(16, params=[1])), "mission.items[0].params: 1 numbers; must be 7"),
+    (plan_text(simple(16, params=[0, "x", 0, 0, 0, 0, 0])), "mission.items[0].params[1]"),
+    (plan_text(simple(16, params=[0, 0, 0, 0, 400, 0, 0])), "parameter 5"),
+    (plan_text(simple(16, params=[1e300, 0, 0, 0, 0, 0, 0])), "parameter 1"),
+    (plan_text(simple(70_000)), "command 70000"),
+    (plan_text(simple(16, -1)), "frame -1"),
+    (plan_text(simple(16) | {"command": "x"}), "mission.items[0].command"),
+    (plan_text(survey(3)), "Items[0]: must be an object"),
+]
+
+
+@pytest.mark.parametrize(("text", "part"), BAD_PLANS)
+def test_a_bad_plan_is_refused_with_the_place(text: str, part: str) -> None:
+    with pytest.raises(FormatError) as error:
+        read_plan(text)
+    assert part in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+BAD_WAYPOINTS = [
+    ("", "line 1"),
+    ("QGC WPL 120\n", "must be 'QGC WPL 110'"),
+    ("QGC WPL 110\n1\t2\n", "line 2: 2 columns; must be 12"),
+    ("QGC WPL 110\n0 0 3 16 0 0 0 0 x 8.5 2 1\n", "line 2"),
+    ("QGC WPL 110\n1 0 3 16 0 0 0 0 47 8.5 2 1\n", "item number 1; must be 0"),
+    ("QGC WPL 110\n0 0 3 16 0 0 0 0 470 8.5 2 1\n", "parameter 5"),
+    ("QGC WPL 110\n0 0 3 16 inf 0 0 0 47 8.5 1e99 1\n", "parameter 7"),
+]
+
+
+@pytest.mark.parametrize(("text", "part"), BAD_WAYPOINTS)
+def test_bad_waypoints_are_refused_with_the_line(text: str, part: str) -> None:
+    with pytest.raises(FormatError) as error:
+        read_waypoints(text)
+    assert part in str(error.value)
+
+
+@given(text=st.text(max_size=200))
+def test_any_text_is_a_mission_or_a_format_error(text: str) -> None:
+    for reader in (read_plan, read_waypoints):
+        try:
+            reader("QGC WPL 110\n" + text if reader is read_waypoints else text)
+        except FormatError:
+            continue
+
+
+def test_parameter_files_of_both_kinds_are_read_back() -> None:
+    values = {"NGC_KX": 6.0, "SIXTEEN_LETTERS1": 0.1, "TINY": 1e-7}
+    assert parse_text(lines_of(values)) == values
+    text = qgc_of(values, Target(1, 1))
+    assert parse_text(text) == values
+    assert "1\t1\tNGC_KX\t6\t9\n" in text
