@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from autopilot.condition import Condition, battery_constants, follow
 from autopilot.decisions import decide, with_plan
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
@@ -122,6 +123,8 @@ class Onboard:
         self._answer = b""
         self._last: Tick | None = None
         self._gps: HilGps | None = None
+        self._condition = Condition()
+        self._battery = battery_constants(parameters)
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
@@ -196,6 +199,9 @@ class Onboard:
         self._state, report = step(
             self._state, self._history, tick.readings, self._setup, tick.now_us, self.tick, dt
         )
+        self._condition = follow(
+            self._condition, tick, self._state.mixed.forces, self._battery, tick.now_us, dt
+        )
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
@@ -257,6 +263,7 @@ class Onboard:
             return
         self.fault = ""
         self._setup = build_setup(self.parameters, every)
+        self._battery = battery_constants(self.parameters)
         # a mission under way keeps the paths that it began with
         if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
             self._prepare()
@@ -362,5 +369,13 @@ class Onboard:
 
     def _snapshot(self) -> Snapshot:
         return make_snapshot(
-            self._state, self._setup, self._options, self.endpoint.mission, self._last, self._gps, self.now_us
+            self._state,
+            self._setup,
+            self._options,
+            self.endpoint.mission,
+            self._condition,
+            self._battery,
+            self._gps,
+            self.parameters["MAV_FAKE_GPS"] == 1.0,
+            self.now_us,
         )
