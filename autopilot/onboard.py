@@ -58,6 +58,7 @@ GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
+AT_ONCE_STEPS = 30  # of a mission that is prepared between two ticks on the ground; some 0.4 s
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
 
 
@@ -350,7 +351,8 @@ class Onboard:
         self._prepared_for = limits
         self.work = Work(plan.steps, plan.sequence, limits)
         self._have_prepared(PENDING)
-        if self._options.clock_waits or self._state.flight.phase in ON_GROUND:
+        short = self._state.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
+        if self._options.clock_waits or short:
             self.finish(self.work, self.work.done())
 
     def finish(self, work: Work, prepared: Prepared) -> None:

@@ -47,7 +47,13 @@ TOP: dict[str, tuple[str, ...]] = {
         "gcs.closed_loop",
         "gcs.sweep",
     ),
-    "autopilot.onboard": ("autopilot.__main__", "autopilot.tcp_server", "gcs.closed_loop", "gcs.sweep"),
+    "autopilot.onboard": (
+        "autopilot.__main__",
+        "autopilot.aside",
+        "autopilot.tcp_server",
+        "gcs.closed_loop",
+        "gcs.sweep",
+    ),
     "gcs.closed_loop": ("gcs",),
 }
 
@@ -55,6 +61,7 @@ WORLD = {"socket", "selectors", "time", "random", "logging", "threading", "async
 SHELLS = (
     "autopilot.__main__",
     "sitl.__main__",
+    "autopilot.aside",
     "autopilot.tcp_server",
     "autopilot.wire.shell",  # what these two have in common
     "gcs.__main__",
