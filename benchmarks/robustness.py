@@ -2,8 +2,8 @@
 
     python benchmarks/robustness.py [--out DIR] [--docs DIR] [--only NAME ...] [--whole]
 
-Each is a `gcs sweep` into a directory of its own below DIR: what was flown already by the same code is kept, and
-after Ctrl-C the same command goes on. `--whole` adds the sweep of 10 000 flights over everything at once.
+Each is a `gcs sweep` into a directory of its own below DIR: what was flown already by the same code is kept,
+and after Ctrl-C the same command goes on. `--whole` adds the sweep of 10 000 flights over everything at once.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ from gcs.cli import gcs
 
 ROOT = Path(__file__).resolve().parents[1]
 BOTH = "--law plumbline --law thesis"
+NOISE = "--vary SIM_NOISE_SCALE=0.5,1,2,4,8"
+DELAY = "--vary SIM_ACT_DELAY_MS=0:96:9"
 # name: what is flown
 SWEEPS = {
-    "delay-noise": f"case-b {BOTH} --seeds 3 --vary SIM_ACT_DELAY_MS=0:96:9 --vary SIM_NOISE_SCALE=0.5,1,2,4,8",
-    "latency-noise": f"case-b {BOTH} --seeds 3 --vary SIM_SENS_LAT_MS=0:80:9 --vary SIM_NOISE_SCALE=0.5,1,2,4,8",
-    "delay-lag": f"case-b {BOTH} --seeds 3 --vary SIM_ACT_DELAY_MS=0:96:9 --vary SIM_ROTOR_TAU_MS=0,10,20,30,40,60",
+    "delay-noise": f"case-b {BOTH} --seeds 3 {DELAY} {NOISE}",
+    "latency-noise": f"case-b {BOTH} --seeds 3 --vary SIM_SENS_LAT_MS=0:80:9 {NOISE}",
+    "delay-lag": f"case-b {BOTH} --seeds 3 {DELAY} --vary SIM_ROTOR_TAU_MS=0,10,20,30,40,60",
     "delay-unknown": "case-b --seeds 10 --set VEH_ACT_DELAY=40 --vary SIM_ACT_DELAY_MS=0:96:25",
     "mass-length": "case-c --seeds 3 --vary SIM_LOAD_MASS=0.025:0.25:10 --vary SIM_CABLE_LEN=0.6:0.8:9",
     "wind-gusts": "case-b --seeds 3 --vary SIM_WIND_E=0:10:11 --vary SIM_GUST_STD=0,0.5,1,2,3",

@@ -30,6 +30,7 @@ from missions.survey import Body
 
 HELD_M = 0.005  # by which the load may leave its place before the signals begin
 INTERVAL_S = 0.04  # of the splines
+_HELD_S = 0.005  # between samples of that bound: 10 m/s^2 make 0.03 mm in the middle
 WINDOW_S = 0.45  # before and after a place that cannot be flown
 LONGEST_S = 15.0  # of one window; a longer one is no local change of the path
 _WIDER = 1.6  # a window whose path exceeds the bounds is tried so many times as wide, ...
@@ -261,7 +262,7 @@ def _rows(step: Signals, table: SignalTable, begin: float, end: float, origin: A
     low: list[float] = []
     high: list[float] = []
     if begin < 0.0:
-        held = np.linspace(begin, 0.0, max(int(-begin / (0.5 * INTERVAL_S)), 1) + 1)[1:]
+        held = _span(begin, 0.0, _HELD_S)[1:]
         for axis in range(3):
             times += held.tolist()
             axes += [axis] * held.size

@@ -63,7 +63,7 @@ from autopilot.geometry.linear import (
     sub,
     times,
 )
-from autopilot.geometry.s2 import normalise
+from autopilot.geometry.s2 import normalise, tangent, unit_derivatives
 from autopilot.geometry.so3 import exp
 
 STEP = 2e-3  # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
@@ -77,7 +77,7 @@ _LEAST_SINE = 1e-2
 # tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
 _GREATEST_LEAN = 2.7
 _LEAST_LIFT = 0.2
-# of the pull along the cable: what is exerted across it at most
+# of the pull along the cable: what errors may exert across it at most, besides what the reference asks for
 _GREATEST_ACROSS = 0.7
 _GREATEST_RATE = 15.0  # rad/s
 _FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
@@ -209,6 +209,21 @@ def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, veh
 
 
 @kernel
+def flat_across(q_cable: Vec3, jet: Jet, vehicle: Vehicle) -> Vec3:
+    """What the reference itself exerts across the cable, N: -m_Q L q_d'', at most the weight; zero where it
+    asks for free fall."""
+    mass = vehicle.quad_mass + vehicle.load_mass
+    lift: Vec3 = (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity)
+    if mass * norm(lift) < _LEAST_FORCE:
+        zero: Vec3 = (0.0, 0.0, 0.0)
+        return zero
+    # q_d = -lift / |lift|
+    _, _, u_ddot = unit_derivatives(lift, jet[3], jet[4])
+    reach = vehicle.quad_mass * vehicle.cable_length
+    return gently(scale(reach, tangent(q_cable, u_ddot)), mass * vehicle.gravity)
+
+
+@kernel
 def wanted_force(
     state: State,
     motion: LoadMotion,
@@ -233,8 +248,9 @@ def wanted_force(
     )
     along = dot(state.q_cable, direction.F)
     pull = scale(along, state.q_cable)
-    across = gently(sub(direction.F, pull), _GREATEST_ACROSS * norm(position.A))
-    return WantedForce(sub(add(pull, across), air), position, direction, q_c)
+    asked = flat_across(state.q_cable, jet, vehicle)
+    across = gently(sub(sub(direction.F, pull), asked), _GREATEST_ACROSS * norm(position.A))
+    return WantedForce(sub(add3(pull, asked, across), air), position, direction, q_c)
 
 
 @kernel

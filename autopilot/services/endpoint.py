@@ -186,7 +186,11 @@ class VehicleEndpoint:
         return (
             self._work
             or any(state.streams.next_us <= now_us for state in self._links.values())
-            or any(service.next_timer() <= now_us for service in self._timed)
+            or self._signing.next_timer() <= now_us
+            or self._missions.next_timer() <= now_us
+            or self._parameters.next_timer() <= now_us
+            or self._ftp.next_timer() <= now_us
+            or self._logs.next_timer() <= now_us
         )
 
     def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:

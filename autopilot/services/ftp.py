@@ -155,8 +155,10 @@ class FtpService:
 
     def next_timer(self) -> int:
         """When `poll` has something to do, in us."""
+        if not self._sessions:
+            return NEVER_US
         bursts = min((burst.due_us for burst in self._bursts.values()), default=NEVER_US)
-        idle = min((session.used_us for session in self._sessions.values()), default=NEVER_US - IDLE_US)
+        idle = min(session.used_us for session in self._sessions.values())
         return min(bursts, idle + IDLE_US)
 
     def poll(self, now_us: int) -> list[Output]:

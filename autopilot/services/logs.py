@@ -1,7 +1,8 @@
 """The flight logs on the card, by the LOG_ messages: list, download, erase.
 
 Logs are numbered from 0 in the order of their names. A client may have several ranges of one log on order,
-as MAVProxy does for what it missed; blocks go out at a steady pace. A range that reaches beyond the end of
+as MAVProxy does for what it missed; one that lies within another is not sent twice (MAVSDK orders the rest of
+a range anew with every block of it). Blocks go out at a steady pace. A range that reaches beyond the end of
 the log ends with a block of fewer than 90 bytes, an empty one where the log is a multiple of that.
 """
 
@@ -72,7 +73,8 @@ class LogService:
         if client.log != message.id or wanted[1] >= logs[message.id].size:
             client.ranges.clear()  # another log, or all that is left of this one
         client.log = message.id
-        if wanted not in client.ranges and len(client.ranges) < MOST_RANGES:
+        on_order = any(start <= wanted[0] and wanted[1] <= end for start, end in client.ranges)
+        if not on_order and len(client.ranges) < MOST_RANGES:
             client.ranges.append(wanted)
         return []
 
@@ -98,6 +100,8 @@ class LogService:
 
     def next_timer(self) -> int:
         """When `poll` has something to send, in us."""
+        if not self._clients:
+            return NEVER_US
         return min((client.due_us for client in self._clients.values() if client.waiting), default=NEVER_US)
 
     def poll(self, now_us: int) -> list[Output]:

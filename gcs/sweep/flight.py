@@ -20,7 +20,7 @@ from autopilot.flight import CARRYING as CARRYING_PHASES
 from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, View, jet_ahead, leg_time_s
 from autopilot.flight_core import FlightState, Setup, control, initial_state, view_of
 from autopilot.geometry.linear import ZERO
-from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Creep, asked_jet
+from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Catch, Creep, asked_jet
 from autopilot.observer import nominal
 from autopilot.onboard import Onboard, build_setup, plan_of
 from autopilot.scheduler import divider, is_due
@@ -28,7 +28,9 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor import (
     CLEARANCE,
+    LIFT_OFF_US,
     LOAD_SUNK,
+    PULL_US,
     STILL_SPEED,
     STILL_US,
     TAUT_LATEST,
@@ -338,7 +340,7 @@ class _Flight:
     # ---- how far the kernel may go
 
     def _on_ground(self, stop_tick: int) -> k.Stretch:
-        return k.Stretch(k.GROUND, stop_tick, k.NOTHING, 0.0, 0.0, False, inf, False)
+        return k.Stretch(k.GROUND, stop_tick, k.NOTHING, 0.0, 0.0, False, inf, False, 0.0, 1.0, False)
 
     def _counts(self, flight: Flight) -> bool:
         return (
@@ -362,6 +364,8 @@ class _Flight:
             or not self.fused
             or leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
             or leg.control_mode != self.state.control_mode
+            or isinstance(leg, Catch)
+            or flight.slack_since_us >= 0
         ):
             return self._on_ground(here + 1)
         carries = leg.control_mode == LOAD_POSITION
@@ -370,12 +374,22 @@ class _Flight:
         settings = self.setup.settings
         if flight.phase == Phase.TAUTEN and len(flight.legs) == 1:
             watch, level = k.TAUT, _taut_by(leg, settings.cable_length_m)
+            if flight.still_since_us >= 0:
+                ends.append(self._tick_at(flight.still_since_us + PULL_US))
         elif flight.phase in (Phase.LOWER, Phase.SET_DOWN) and isinstance(leg, Creep):
             watch = k.LOAD_DOWN if carries else k.VEHICLE_DOWN
             level = LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED if carries else VEHICLE_SUNK
             if flight.still_since_us >= 0:
                 ends.append(self._tick_at(flight.still_since_us + STILL_US))
-        tracked = flight.phase in CARRYING_PHASES and carries
+        hangs = flight.phase in CARRYING_PHASES
+        tracked = hangs and carries
+        if flight.phase == Phase.LIFT:
+            lifted_us = flight.phase_start_us + LIFT_OFF_US
+            if self.world.now_us < lifted_us:
+                hangs = False
+                ends.append(self._tick_at(lifted_us))
+        elif flight.phase == Phase.LOWER and isinstance(leg, Creep):
+            hangs = False
         return k.Stretch(
             flown=k.CARRYING if carries else k.SLACK,
             stop_tick=max(min(ends), here + 1),
@@ -384,6 +398,9 @@ class _Flight:
             still_speed=STILL_SPEED,
             still=flight.still_since_us >= 0,
             error_limit=settings.load_error_limit_m if tracked else inf,
+            hangs=hangs,
+            taut_length=flight.taut_length_m,
+            load_weight=settings.load_weight_n,
             counts=self._counts(flight),
         )
 

@@ -10,11 +10,14 @@ from __future__ import annotations
 from math import isfinite
 from typing import NamedTuple
 
+from autopilot.control.load_motion import air_force
 from autopilot.control.records import Reference, State
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, ImuReading
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import E1, Vec3, norm, sub
+from autopilot.geometry.linear import E1, Vec3, add, axpy, column, dot, norm, scale, sub
 from autopilot.geometry.so3 import rotation_from_quat, tilt_angle
+from autopilot.supervisor import ASTRAY, LEAST_GAP, PULLED
+from autopilot.supervisor import SLACK as SLACK_SHARE
 from gcs.sweep.link import LinkModel, estimate, settled, wire_forces
 from gcs.sweep.pilot import Pilot, PilotModel, air_tick, ground_tick
 from gcs.sweep.world import Buffers, Floats, World, WorldModel, tick
@@ -55,6 +58,9 @@ class Stretch(NamedTuple):
     still_speed: float  # m/s: of VEHICLE_DOWN
     still: bool  # the supervisor has already noted that the thing is down
     error_limit: float  # m: of the load's position; infinite where it is not tracked
+    hangs: bool  # the load should hang on the cable
+    taut_length: float  # m, from load to vehicle
+    load_weight: float  # N
     counts: bool  # the figures of the flight are taken here
 
 
@@ -84,13 +90,13 @@ NO_FIGURES = Figures(
 @kernel
 def control_state(state: EstimatorState) -> State:
     """As `autopilot.estimation.filter.control_state`."""
-    vehicle, load = state.vehicle, state.load
+    vehicle, load, debt = state.vehicle, state.load, state.aids.debt
     return State(
-        load.x_load,
+        sub(load.x_load, debt),
         load.v_load,
         load.q_cable,
         load.q_cable_dot,
-        vehicle.x_quad,
+        sub(vehicle.x_quad, debt),
         vehicle.v_quad,
         rotation_from_quat(vehicle.quat_wxyz),
         vehicle.omega_body,
@@ -122,8 +128,23 @@ def reference_of(row: Floats) -> Reference:
 
 
 @kernel
+def felt_pull(pilot: Pilot, state: State, model: PilotModel) -> float:
+    """Pull of the cable on the vehicle (N); as `flight_core.felt_pull`."""
+    vehicle, a = model.vehicle, state.a_quad
+    felt = (a[0], a[1], a[2] + vehicle.gravity)
+    known = axpy(pilot.actuation.thrust, column(state.R, 2), air_force(state.v_quad, model.drag))
+    known = add(known, pilot.observed.push)
+    return dot(sub(scale(vehicle.quad_mass, felt), known), state.q_cable)
+
+
+@kernel
 def may_decide(
-    estimator: EstimatorState, state: State, target: Vec3, model: AutopilotModel, at: Stretch
+    estimator: EstimatorState,
+    state: State,
+    pilot: Pilot,
+    target: Vec3,
+    model: AutopilotModel,
+    at: Stretch,
 ) -> bool:
     """Whether the supervisor could do anything at this tick but let the time go by."""
     finite = (
@@ -137,8 +158,17 @@ def may_decide(
         return True
     if not norm(sub(state.x_load, target)) <= at.error_limit:
         return True
+    taut = estimator.load.taut > 0.0
+    pulled = felt_pull(pilot, state, model.pilot) / at.load_weight
+    if at.hangs:
+        gap = at.taut_length - norm(sub(state.x_quad, state.x_load))
+        if not taut or (gap > LEAST_GAP and pulled < SLACK_SHARE):
+            return True
     if at.watch == TAUT:
-        return estimator.load.taut > 0.0 or target[2] > at.level
+        beside = (state.x_load[0] - target[0], state.x_load[1] - target[1], 0.0)
+        if target[2] > at.level or not norm(beside) <= ASTRAY:
+            return True
+        return (pulled > PULLED and taut) != at.still
     if at.watch == LOAD_DOWN:
         return (state.x_load[2] - target[2] > at.level) != at.still
     if at.watch == VEHICLE_DOWN:
@@ -233,7 +263,7 @@ def fly_stretch(
             else:
                 at = world.tick - first
                 target = vector(targets[at], 0)
-                if may_decide(estimator, state, target, model, stretch):
+                if may_decide(estimator, state, pilot, target, model, stretch):
                     break
                 reference = reference_of(references[at])
                 pilot = air_tick(pilot, state, taut, reference, stretch.flown == CARRYING, model.pilot)

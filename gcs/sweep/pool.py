@@ -18,8 +18,8 @@ from gcs.sweep.plan import Case
 from gcs.sweep.store import Row, Store
 from gcs.sweep.work import Work, batches, fly_case
 
-BATCH = 8  # flights handed over at a time: about a second
-_AHEAD = 3  # batches waiting for each worker
+BATCH = 4  # flights handed over at a time: about a second
+_AHEAD = 2  # batches waiting for each worker
 _KEEP_S, _KEEP_ROWS = 5.0, 1000  # what is flown is on disk after so long, or so many
 _POLL_S = 0.2
 

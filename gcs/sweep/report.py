@@ -76,7 +76,7 @@ def margins(plan: Plan, laws: list[Flights], tables: tuple[ParameterTable, ...])
             nominal, unit = parameter.default, parameter.unit
             found = reach(flights, plan, varied.name, nominal)
             least, most = min(*varied.values, nominal), max(*varied.values, nominal)
-            limits = (max(parameter.low, least), min(parameter.high, nominal + 2.0 * (most - nominal)))
+            limits = (max(parameter.low, least), min(parameter.high, most))
             rows.append(
                 {
                     "law": flights.law,

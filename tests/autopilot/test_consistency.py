@@ -90,9 +90,9 @@ def flown(sensors: str) -> tuple[dict[str, Array], Array]:
     return {name: np.array(values) for name, values in nees.items()}, consistency
 
 
-# The mean is over 10 seeds and 8 instants. Instants of one flight are alike: the chi-square bounds are those of
+# Means over 10 seeds and 8 instants. Instants of one flight are alike: the chi-square bounds are those of
 # the seeds with three instants that count. Direction and rate are believed worse than they are: the noise of
-# the pendulum stands for drag on a fast load. Measured per degree of freedom, position to rate: lab 1.00, 1.00,
+# the pendulum stands for drag on a fast load. Measured per axis, position to rate: lab 1.00, 1.00,
 # 1.08, 0.86, 0.63; rtk 0.91, 0.94, 1.04, 0.90, 0.62.
 COUNTING = 3 * len(SEEDS)
 MODEL_MARGIN = 0.5  # share of the stated variance that the believed error of the pendulum may be too much

@@ -6,8 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from autopilot.flight_log import LogChunk
 from autopilot.services.mission_store import StoredMission
-from autopilot.storage import MISSION_FILE, PARAMETER_FILE, SIGNING_FILE, Storage, StorageError
+from autopilot.storage import (
+    CARD_DIRECTORY,
+    MISSION_FILE,
+    PARAMETER_FILE,
+    SIGNING_FILE,
+    Storage,
+    StorageError,
+)
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
@@ -71,6 +79,27 @@ def test_a_corrupt_mission_that_cannot_be_set_aside_is_said_too(tmp_path: Path) 
     mission, trouble = storage.load_mission(HOME)
     assert mission is None
     assert "starting without a mission" in trouble
+
+
+def test_logs_are_stored_in_parts_and_the_oldest_make_room(tmp_path: Path) -> None:
+    storage = Storage(tmp_path)
+    folder = tmp_path / CARD_DIRECTORY / "log"
+    for name in ("a", "b", "c"):
+        path = ("log", f"{name}.ulg")
+        storage.keep_log(LogChunk(path, bytes(600_000), False), 1.0)
+        storage.keep_log(LogChunk(path, b"end", True), 1.0)
+    # room is made when a log begins: what was there before it is no more than a megabyte
+    assert sorted(log.name for log in folder.iterdir()) == ["b.ulg", "c.ulg"]
+    assert (folder / "c.ulg").read_bytes() == bytes(600_000) + b"end"
+
+
+def test_a_log_is_not_written_through_a_link(tmp_path: Path) -> None:
+    storage = Storage(tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / CARD_DIRECTORY / "log").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(OSError, match="symbolic links"):
+        storage.keep_log(LogChunk(("log", "a.ulg"), b"x", False), 1.0)
+    assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
 def test_a_signing_key_is_kept_for_nobody_else_to_read(tmp_path: Path) -> None:

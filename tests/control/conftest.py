@@ -7,10 +7,12 @@ leaf.
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -122,14 +124,14 @@ def sources() -> dict[str, str]:
 
 def plain_laws(texts: dict[str, str]) -> SimpleNamespace:
     """The laws of these source texts as plain Python, compiled by nobody; all their names in one
-    namespace."""
+    namespace, and the modules by file as `modules`."""
     namespace = SimpleNamespace()
-    kept = {}
+    kept, modules = {}, {}
     try:
         for name, text in texts.items():
             module_name = "autopilot." + name[:-3].replace("/", ".")
             assert JIT_IMPORT in text
-            module = ModuleType(module_name)
+            module = modules[name] = ModuleType(module_name)
             kept[module_name] = sys.modules.get(module_name)
             sys.modules[module_name] = module
             plain = text.replace(JIT_IMPORT, "kernel = lambda function: function")
@@ -141,7 +143,25 @@ def plain_laws(texts: dict[str, str]) -> SimpleNamespace:
                 del sys.modules[module_name]
             else:
                 sys.modules[module_name] = module_kept
+    namespace.modules = modules
     return namespace
+
+
+@contextmanager
+def with_function(laws: SimpleNamespace, file: str, function: ast.FunctionDef) -> Iterator[None]:
+    """Plain laws with this in place of their function of that name, in all that use it."""
+    original = vars(laws.modules[file])[function.name]
+    made: dict[str, Any] = {}
+    source = ast.Module([function], [])
+    exec(compile(source, file, "exec"), vars(laws.modules[file]), made)
+    users = [scope for scope in (laws, *laws.modules.values()) if vars(scope).get(function.name) is original]
+    try:
+        for scope in users:
+            setattr(scope, function.name, made[function.name])
+        yield
+    finally:
+        for scope in users:
+            setattr(scope, function.name, original)
 
 
 ORACLE = json.loads((Path(__file__).parent / "gcdf_circle.json").read_text())
@@ -261,6 +281,7 @@ def model() -> SimpleNamespace:
         state_of,
         sources,
         plain_laws,
+        with_function,
         oracle_vehicle,
         oracle_start,
         oracle_command,

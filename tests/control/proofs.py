@@ -489,6 +489,8 @@ def errors_reach_the_command(laws: SimpleNamespace, model: SimpleNamespace, vehi
     command = laws.load_position(memory, state, reference, gains, filters, vehicle)[1]
     close(command.e_x, np.subtract(state.x_load, x_d), EXACT)
     close(command.e_v, state.v_load, EXACT)
+    # so near that the force is within its limits
+    x_d = model.vec(np.add(state.x_quad, (0.0, 0.1, -0.1)))
     reference = Reference((x_d, v_d, zero, zero, zero, zero, zero), (1.0, 0.0, 0.0))
     command = laws.quad_position(
         memory, state, reference, 0.0, (0.0, 0.0, 0.0), laws.QUAD_POSITION_GAINS, gains, filters, vehicle

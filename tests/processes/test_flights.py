@@ -37,7 +37,7 @@ STABLE_KEYS = {
     "slack_events",
     "report_dir",
 }
-FILES = ("flight.tlog", "flight.parquet", "summary.json", "report.html", "overview.png")
+FILES = ("flight.tlog", "flight.ulg", "flight.parquet", "summary.json", "report.html", "overview.png")
 
 
 def test_a_flight_over_udp_leaves_the_log_of_the_same_flight_in_one_process(gcs: Gcs, tmp_path: Path) -> None:

@@ -127,6 +127,16 @@ def test_gaps_are_filled_as_mavproxy_asks_for_them() -> None:
     assert joined(got, len(log)) == log
 
 
+def test_the_rest_of_a_range_ordered_anew_is_not_sent_twice() -> None:
+    rig = Rig(os.urandom(100_000))
+    rig.order(0, 0, 90 * 100)
+    got = rig.poll()
+    last = got[-1].ofs + BLOCK
+    rig.order(0, last, 90 * 100 - last)
+    rig.order(0, last + BLOCK, 90 * 100 - last - BLOCK)
+    assert [block.ofs for block in got + rig.run()] == list(range(0, 9000, BLOCK))
+
+
 def test_two_clients_and_the_end_of_one() -> None:
     logs = [os.urandom(9000), os.urandom(8000)]
     rig = Rig(*logs)
