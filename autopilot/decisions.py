@@ -12,33 +12,41 @@ from autopilot.flight import (
     ON_GROUND,
     Event,
     Flight,
+    Guide,
     Phase,
     Plan,
     Selected,
     Settings,
     View,
 )
-from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.following import Circle, Lean, Wish
+from autopilot.geometry.linear import Vec3, add, norm, scale, sub
 from autopilot.guidance import Hold, carry_leg
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
     Arm,
+    ChangeAltitude,
     ChangeSpeed,
     Continue,
+    FollowAttitude,
+    FollowSetpoint,
+    FollowStick,
     Land,
+    Orbit,
     Pause,
     ReplaceMission,
     Reposition,
     ReturnHome,
     RunPrearmChecks,
     SetCurrent,
+    SetHome,
     SetMode,
     StartMission,
     Takeoff,
     Terminate,
 )
-from autopilot.supervisor import TRANSITIONS, begin_step, disarmed, happen
+from autopilot.supervisor import TRANSITIONS, begin_step, disarmed, happen, load_motion
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
@@ -46,6 +54,13 @@ ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 LEAST_ALTITUDE_M = 0.3
 GROUND_SPEED_M_S = 0.3  # an arming vehicle moves no faster
 TILT_TO_ARM_RAD = math.radians(20.0)
+FARTHEST_M = 100_000.0
+LEAST_RADIUS_M = 0.2
+LEAST_SPEED_M_S = 0.05
+RAMP_SHARE = 4.0  # a circle is begun with a quarter of the acceleration along it
+STEADY_US = 500_000  # setpoints no further apart are a stream
+LEVEL_HOME_M = 1.0
+SLOWEST_M_S, FASTEST_M_S = 0.05, 15.0
 
 
 def _denied(text: str) -> Verdict:
@@ -199,12 +214,37 @@ def _mode_mission(flight: Flight, request: Any, view: View, settings: Settings) 
     return _start_mission(flight, StartMission(None), view, settings)
 
 
+def _offboard(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    if flight.phase == Phase.GUIDED and flight.guide == Guide.OFFBOARD:
+        return flight, ACCEPTED
+    if not flight.offboard.steady(view.now_us, STEADY_US):
+        return flight, _later("OFFBOARD denied: send setpoints first, more than two a second")
+    if flight.phase in ON_GROUND:
+        return replace(flight, selected=Selected.OFFBOARD, on_mission=False), ACCEPTED
+    return _guide(flight, Guide.OFFBOARD, "OFFBOARD", view, settings)
+
+
+def _position_control(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    if not flight.manual.alive(view.now_us, settings.manual_loss_us):
+        return flight, _later("POSCTL denied: no MANUAL_CONTROL is heard")
+    if flight.phase in ON_GROUND:
+        return flight, _later("POSCTL denied: take off first")
+    return _guide(flight, Guide.MANUAL, "POSCTL", view, settings)
+
+
+def _guide(flight: Flight, guide: Guide, what: str, view: View, settings: Settings) -> Decision:
+    after = happen(replace(flight, guide=guide, on_mission=False), Event.GUIDE, view, settings)
+    return (after, ACCEPTED) if after else (flight, _wrong_phase(flight, what))
+
+
 _MODES: dict[tuple[int, int], Callable[[Flight, Any, View, Settings], Decision]] = {
     (identity.AUTO, identity.AUTO_TAKEOFF): _mode_takeoff,
     (identity.AUTO, identity.AUTO_LOITER): _hold,
     (identity.AUTO, identity.AUTO_MISSION): _mode_mission,
     (identity.AUTO, identity.AUTO_RTL): _return_home,
     (identity.AUTO, identity.AUTO_LAND): _land,
+    (identity.OFFBOARD, 0): _offboard,
+    (identity.POSCTL, 0): _position_control,
 }
 
 
@@ -229,6 +269,9 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
         return flight, _wrong_phase(flight, "Reposition")
     if flight.phase != Phase.HOLD and not request.change_mode:
         return flight, _later("Reposition denied: not holding")
+    speed = flight.speed_m_s if request.speed_m_s is None else request.speed_m_s
+    if not SLOWEST_M_S <= speed <= FASTEST_M_S:
+        return flight, _denied(f"Reposition denied: {speed:.2f} m/s; must be {SLOWEST_M_S} ... {FASTEST_M_S}")
     held, verdict = _hold(flight, request, view, settings)
     asked = (request.east_m, request.north_m, request.altitude_m)
     if verdict.result != mavlink.MAV_RESULT_ACCEPTED or asked == (None, None, None):
@@ -247,12 +290,83 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
         return flight, _denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
-    go = carry_leg(here, there, flight.speed_m_s, settings.accel_m_s2, settings.least_move_s)
+    go = carry_leg(here, there, speed, settings.accel_m_s2, settings.least_move_s)
     return replace(held, legs=(*held.legs[:-1], go, Hold(there))), ACCEPTED
 
 
+def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settings: Settings) -> Decision:
+    position = request.position
+    if request.relative:
+        position = add(position, load_motion(flight, view, settings)[0])
+    elif settings.guides_vehicle:
+        position = (position[0], position[1], position[2] - settings.cable_length_m)
+    if any(abs(value) > FARTHEST_M for value in position):
+        return flight, _denied(f"Setpoint refused: more than {FARTHEST_M:g} m away")
+    asked = Wish(position, request.velocity, request.accel, view.now_us)
+    return replace(flight, offboard=flight.offboard.heard(asked, view.now_us)), ACCEPTED
+
+
+def _follow_attitude(flight: Flight, request: FollowAttitude, view: View, settings: Settings) -> Decision:
+    thrust = None if request.thrust is None else request.thrust / settings.hover_share * settings.weight_n
+    asked = Lean(request.upward, thrust)
+    return replace(flight, offboard=flight.offboard.heard(asked, view.now_us)), ACCEPTED
+
+
+def _follow_stick(flight: Flight, request: FollowStick, view: View, settings: Settings) -> Decision:
+    asked = Wish(velocity=scale(settings.stick_speed_m_s, request.share), since_us=view.now_us)
+    return replace(flight, manual=flight.manual.heard(asked, view.now_us)), ACCEPTED
+
+
+def _orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Decision:
+    if flight.phase not in CARRYING:
+        return flight, _wrong_phase(flight, "Orbit")
+    here = load_motion(flight, view, settings)[0]
+    centre: Vec3 = (
+        here[0] if request.east_m is None else request.east_m,
+        here[1] if request.north_m is None else request.north_m,
+        here[2] if request.altitude_m is None else request.altitude_m,
+    )
+    radius = abs(request.radius_m)
+    speed = flight.speed_m_s if request.speed_m_s is None else request.speed_m_s
+    if not (math.isfinite(speed) and LEAST_RADIUS_M <= radius <= FARTHEST_M):
+        return flight, _denied(f"Orbit denied: radius {radius:g} m, least {LEAST_RADIUS_M} m")
+    if not all(abs(value) <= FARTHEST_M for value in centre) or centre[2] < LEAST_ALTITUDE_M:
+        return flight, _denied(f"Orbit denied: load height {centre[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
+    if not LEAST_SPEED_M_S <= abs(speed) <= settings.fastest_m_s:
+        limits = f"{LEAST_SPEED_M_S:g} ... {settings.fastest_m_s:g} m/s"
+        return flight, _denied(f"Orbit denied: {speed:.2f} m/s; must be {limits}")
+    inward = speed * speed / radius
+    if inward > settings.accel_m_s2:
+        text = f"Orbit denied: {inward:.1f} m/s^2 inwards exceeds MIS_ACCEL {settings.accel_m_s2:g}"
+        return flight, _denied(text)
+    out = sub(here, centre)
+    phase = math.atan2(out[1], out[0]) if math.hypot(out[0], out[1]) > 0.0 else 0.0
+    circle = Circle(
+        centre,
+        radius,
+        -speed / request.radius_m,
+        phase,
+        view.now_us,
+        RAMP_SHARE * abs(speed) / settings.accel_m_s2,
+    )
+    return _guide(replace(flight, circle=circle), Guide.ORBIT, "Orbit", view, settings)
+
+
+def _change_altitude(flight: Flight, request: ChangeAltitude, view: View, settings: Settings) -> Decision:
+    return _reposition(flight, Reposition(None, None, request.altitude_m, True), view, settings)
+
+
+def _set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -> Decision:
+    place = view.x_quad if request.position is None else request.position
+    if not math.hypot(place[0], place[1]) <= FARTHEST_M:
+        return flight, _denied(f"Home denied: more than {FARTHEST_M:g} m away")
+    if request.position is not None and not abs(place[2]) <= LEVEL_HOME_M:
+        return flight, _denied("Home denied: its height must be that of the ground here, which is flat")
+    return replace(flight, home=(place[0], place[1], 0.0)), ACCEPTED
+
+
 def _change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Settings) -> Decision:
-    if not 0.05 <= request.speed_m_s <= 15.0:
+    if not SLOWEST_M_S <= request.speed_m_s <= FASTEST_M_S:
         return flight, _denied(f"Speed {request.speed_m_s:.2f} m/s denied; must be 0.05 ... 15")
     return replace(flight, speed_m_s=request.speed_m_s), ACCEPTED
 
@@ -286,6 +400,12 @@ _HANDLERS: dict[type, Callable[[Flight, Any, View, Settings], Decision]] = {
     SetCurrent: _set_current,
     ReplaceMission: _replace_mission,
     Reposition: _reposition,
+    FollowSetpoint: _follow_setpoint,
+    FollowAttitude: _follow_attitude,
+    FollowStick: _follow_stick,
+    Orbit: _orbit,
+    ChangeAltitude: _change_altitude,
+    SetHome: _set_home,
     ChangeSpeed: _change_speed,
     Terminate: _terminate,
     RunPrearmChecks: _run_checks,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from math import cos, inf, nan, radians
+from math import cos, inf, nan, radians, sqrt
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import Vec3
+from autopilot.following import SILENT, SMOOTH_SHARE, Circle, Pace, Stream
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance import Leg, asked_jet, least_move_s
 from autopilot.vehicle.parameters import LAWS, SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE
 from autopilot.wire.dialect import plumbline as mavlink
@@ -32,10 +33,11 @@ class Phase(IntEnum):
     LOWER = mavlink.PLUMBLINE_PHASE_LOWER
     SET_DOWN = mavlink.PLUMBLINE_PHASE_SET_DOWN
     FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
+    GUIDED = mavlink.PLUMBLINE_PHASE_GUIDED
 
 
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
-CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER})
+CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
 
 
@@ -49,6 +51,7 @@ class Event(Enum):
     DONE = "legs done"
     HOLD = "hold"
     MISSION = "fly the mission"
+    GUIDE = "follow setpoints"
     RETURN = "return"
     LAND = "land"
     LOAD_DOWN = "load on the ground"
@@ -62,6 +65,15 @@ class Selected(Enum):
     NOTHING = "hold"
     TAKEOFF = "take-off"
     MISSION = "mission"
+    OFFBOARD = "offboard"
+
+
+class Guide(Enum):
+    """Whose word is followed in the phase GUIDED."""
+
+    OFFBOARD = "setpoints"
+    MANUAL = "the stick"
+    ORBIT = "a circle"
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +107,11 @@ class Flight:
     slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
     slack_step: int = -1  # mission step in which it last went slack
     taut_length_m: float = 0.0  # from load to vehicle when lifting began: of the cable as it is
+    guide: Guide = Guide.OFFBOARD
+    offboard: Stream = SILENT
+    manual: Stream = SILENT
+    circle: Circle | None = None
+    home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +133,13 @@ class Settings:
     ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
     load_weight_n: float
     snap_speed_m_s: float  # greatest closing speed at which a slack cable is made taut
+    offboard_loss_us: int  # silence after which setpoints count as lost
+    manual_loss_us: int
+    stick_speed_m_s: float  # of the load, for a stick pushed home
+    fastest_m_s: float  # velocity setpoint
+    hover_share: float  # thrust of an attitude setpoint that hovers
+    weight_n: float  # of vehicle and load
+    guides_vehicle: bool  # position setpoints are for the vehicle, which is kept a cable length over the load
 
 
 class View(NamedTuple):
@@ -157,6 +181,13 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         ramp_lag_s=ramp_lag_s,
         load_weight_n=table["VEH_LOAD_MASS"] * table["VEH_GRAVITY"],
         snap_speed_m_s=table["MIS_SNAP_SPEED"],
+        offboard_loss_us=round(1e6 * table["COM_OF_LOSS_T"]),
+        manual_loss_us=round(1e6 * table["COM_RC_LOSS_T"]),
+        stick_speed_m_s=table["MPC_VEL_MANUAL"],
+        fastest_m_s=table["MPC_XY_VEL_MAX"],
+        hover_share=table["MPC_THR_HOVER"],
+        weight_n=(table["VEH_QUAD_MASS"] + table["VEH_LOAD_MASS"]) * table["VEH_GRAVITY"],
+        guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 
 
@@ -198,6 +229,12 @@ def limits_from(table: ParameterTable) -> Limits:
         table["MIS_ACCEL"],
         table["MIS_TIME_OPT"] != 0.0,
     )
+
+
+def pace_of(flight: Flight, settings: Settings) -> Pace:
+    """How setpoints are followed."""
+    rate = SMOOTH_SHARE * sqrt(settings.gravity_m_s2 / settings.cable_length_m)
+    return Pace(flight.speed_m_s, settings.fastest_m_s, settings.accel_m_s2, rate)
 
 
 def leg_time_s(flight: Flight, now_us: int) -> float:

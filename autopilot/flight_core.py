@@ -15,6 +15,7 @@ from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
 from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
+from autopilot.following import Posture
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance import (
@@ -184,7 +185,7 @@ def track(
         return law.load_position(memory, state, Reference(jet, heading), actuation, observed)
     if leg.control_mode == QUAD_POSITION:
         return law.quad_position(memory, state, Reference(jet, heading), actuation, observed)
-    assert isinstance(leg, Swing | Calm)
+    assert isinstance(leg, Swing | Calm | Posture)
     lift = held_height(setup, state, leg.anchor)
     upward = leg.upward(t)
     if leg.control_mode == LOAD_ATTITUDE:
@@ -192,6 +193,8 @@ def track(
         return law.load_attitude(memory, state, neg(upward), heading, pull, actuation, observed)
     assert leg.control_mode == QUAD_ATTITUDE
     R_d, thrust = attitude_towards(upward, heading, state.R), tilted_thrust(lift, state.R)
+    if isinstance(leg, Posture) and leg.lean.thrust_n is not None:
+        thrust = leg.lean.thrust_n
     return law.quad_attitude(memory, state, R_d, thrust, actuation, observed)
 
 

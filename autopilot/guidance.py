@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from math import comb, inf, pi, sqrt
 
 from autopilot.control.records import Jet
+from autopilot.following import Follow, Posture
 from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.shaping import Shaped
@@ -327,7 +328,7 @@ class Calm:
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
-Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Run | Pass | Swing | Calm
+Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Run | Pass | Swing | Calm | Follow | Posture
 
 
 def asked_jet(leg: Leg, t: float) -> Jet:

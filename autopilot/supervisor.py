@@ -15,14 +15,17 @@ from autopilot.flight import (
     IN_AIR,
     Event,
     Flight,
+    Guide,
     Phase,
     Report,
     Selected,
     Settings,
     View,
     leg_time_s,
+    pace_of,
     setpoint,
 )
+from autopilot.following import Asked, Follow, Lean, Posture, Wish, begin_following
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance import (
@@ -69,20 +72,30 @@ TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
     (P.TAUTEN, E.LAND): P.SET_DOWN,
     (P.LIFT, E.DONE): P.HOLD,
     (P.LIFT, E.HOLD): P.HOLD,
+    (P.LIFT, E.GUIDE): P.GUIDED,
     (P.LIFT, E.LAND): P.LOWER,
     (P.HOLD, E.HOLD): P.HOLD,
     (P.HOLD, E.MISSION): P.MISSION,
+    (P.HOLD, E.GUIDE): P.GUIDED,
     (P.HOLD, E.RETURN): P.RETURN,
     (P.HOLD, E.LAND): P.LOWER,
     (P.MISSION, E.DONE): P.HOLD,
     (P.MISSION, E.HOLD): P.HOLD,
     (P.MISSION, E.MISSION): P.MISSION,
     (P.MISSION, E.RETURN): P.RETURN,
+    (P.MISSION, E.GUIDE): P.GUIDED,
     (P.MISSION, E.LAND): P.LOWER,
     (P.RETURN, E.DONE): P.LOWER,
     (P.RETURN, E.HOLD): P.HOLD,
     (P.RETURN, E.MISSION): P.MISSION,
     (P.RETURN, E.LAND): P.LOWER,
+    (P.RETURN, E.GUIDE): P.GUIDED,
+    (P.GUIDED, E.GUIDE): P.GUIDED,
+    (P.GUIDED, E.HOLD): P.HOLD,
+    (P.GUIDED, E.MISSION): P.MISSION,
+    (P.GUIDED, E.RETURN): P.RETURN,
+    (P.GUIDED, E.LAND): P.LOWER,
+    (P.GUIDED, E.LOAD_DOWN): P.SET_DOWN,
     (P.LOWER, E.LOAD_DOWN): P.SET_DOWN,
     (P.LIFT, E.LOAD_DOWN): P.SET_DOWN,
     (P.HOLD, E.LOAD_DOWN): P.SET_DOWN,
@@ -91,6 +104,7 @@ TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
     (P.LOWER, E.HOLD): P.HOLD,
     (P.LOWER, E.MISSION): P.MISSION,
     (P.LOWER, E.RETURN): P.RETURN,
+    (P.LOWER, E.GUIDE): P.GUIDED,
     (P.SET_DOWN, E.VEHICLE_DOWN): P.DISARMED,
     (P.FAILSAFE, E.DISARM): P.DISARMED,
     **{(phase, E.FAIL): P.FAILSAFE for phase in IN_AIR},
@@ -169,7 +183,7 @@ def load_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, V
 
 
 def _swings(leg: Leg) -> bool:
-    return isinstance(leg, Swing | Calm)
+    return isinstance(leg, Swing | Calm | Posture)
 
 
 def _calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
@@ -178,7 +192,7 @@ def _calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
     length = norm(cable)
     lean = scale(1.0 / length, cable)
     rate = scale(1.0 / length, tangent(lean, sub(view.v_quad, view.v_load)))
-    anchor = leg.jet(0.0)[0]
+    anchor = view.x_load if isinstance(leg, Posture) else leg.jet(0.0)[0]
     duration = CALM_SHARE * settings.least_move_s
     return Calm(anchor, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration)
 
@@ -234,7 +248,29 @@ def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = _raised(flight, view, settings)
-    return (*legs, _carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings))
+    return (*legs, _carry(here, (flight.home[0], flight.home[1], here[2]), flight.speed_m_s, settings))
+
+
+def asked_of(flight: Flight) -> Asked | None:
+    """What the flight's guide asks for."""
+    match flight.guide:
+        case Guide.ORBIT:
+            return flight.circle
+        case Guide.MANUAL:
+            return flight.manual.asked
+        case Guide.OFFBOARD:
+            return flight.offboard.asked
+
+
+def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    asked = asked_of(flight)
+    if isinstance(asked, Lean):
+        return (Posture(asked, load_motion(flight, view, settings)[0]),)
+    jet = setpoint(flight, view.now_us)
+    if jet is None or flight.legs[0].control_mode != LOAD_POSITION:
+        x, v, a = load_motion(flight, view, settings)
+        jet = (x, v, a, ZERO, ZERO, ZERO, ZERO)
+    return (begin_following(jet, pace_of(flight, settings).rate),)
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -296,7 +332,8 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
         case Delay(duration_s=duration):
             return (Hold(here, max(duration - _borrowed(flight), 0.0)),)
         case ReturnHome():
-            return (_carry(here, (0.0, 0.0, here[2]), flight.speed_m_s, settings, _least_s(flight)),)
+            there = (flight.home[0], flight.home[1], here[2])
+            return (_carry(here, there, flight.speed_m_s, settings, _least_s(flight)),)
         case Signals():
             return (Run(here, _path_of(flight, flight.step) or unshaped(step)),)
         case AttitudeRun(
@@ -353,6 +390,7 @@ _ENTRY = {
     P.RETURN: _return,
     P.LOWER: _lower,
     P.SET_DOWN: _set_down,
+    P.GUIDED: _guided,
 }
 
 
@@ -393,6 +431,11 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             return _landed(flight, view, settings)
     reached: tuple[int, ...] = ()
     texts: tuple[tuple[int, str], ...] = ()
+    if flight.phase == P.ARMED and flight.selected == Selected.OFFBOARD:
+        flight = _rise(flight, view, settings)
+    if flight.phase == P.GUIDED:
+        flight, told = _guide(flight, view, settings)
+        texts += told.texts
     # a step may take no time at all: go on until one does
     while flight.phase in IN_AIR and (
         not flight.legs or leg_time_s(flight, view.now_us) >= flight.legs[0].duration_s
@@ -431,6 +474,48 @@ def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
     return after, Report(report.texts, reached)
 
 
+def lost(flight: Flight, now_us: int, settings: Settings) -> bool:
+    """Whether nothing is heard any more from the flight's guide."""
+    if flight.guide == Guide.OFFBOARD:
+        return not flight.offboard.alive(now_us, settings.offboard_loss_us)
+    return flight.guide == Guide.MANUAL and not flight.manual.alive(now_us, settings.manual_loss_us)
+
+
+def _guide(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
+    """The load led on towards what is asked at this moment; held if nobody asks any more."""
+    if lost(flight, view.now_us, settings):
+        text = f"Nothing heard from {flight.guide.value} any more: holding"
+        return _to(flight, E.HOLD, view, settings, (WARNING, text))
+    asked, leg = asked_of(flight), flight.legs[0]
+    if isinstance(leg, Posture) and isinstance(asked, Lean):
+        return replace(flight, legs=(replace(leg, lean=asked),)), Report()
+    if isinstance(leg, Follow) and isinstance(asked, Lean):
+        return enter(flight, P.GUIDED, view, settings), Report()
+    if isinstance(leg, Posture):
+        return enter(flight, P.GUIDED, view, settings), Report()
+    if isinstance(leg, Follow) and asked is not None and not isinstance(asked, Lean):
+        t = leg_time_s(flight, view.now_us)
+        led = leg.onward(t, asked, pace_of(flight, settings), view.now_us)
+        return replace(flight, legs=(led,), leg_start_us=view.now_us), Report()
+    return flight, Report()
+
+
+def _rise(flight: Flight, view: View, settings: Settings) -> Flight:
+    """From the ground a setpoint above it takes the load up."""
+    asked = flight.offboard.asked
+    if not isinstance(asked, Wish) or lost(flight, view.now_us, settings):
+        return flight
+    height = asked.position[2]
+    if not height >= LEAST_HEIGHT:
+        if not asked.velocity[2] > 0.0:
+            return flight
+        height = LEAST_HEIGHT
+    up = replace(flight, speed_m_s=settings.speed_m_s, takeoff_altitude_m=height, on_mission=False)
+    after = happen(up, E.TAKEOFF, view, settings)
+    assert after is not None
+    return after
+
+
 def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The last leg of the present phase is over."""
     calm = flight.legs[0] if flight.legs else None
@@ -439,6 +524,10 @@ def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
         return replace(flight, legs=legs, leg_start_us=view.now_us), Report()
     if flight.on_mission and flight.phase in (P.LIFT, P.MISSION):
         return _step_done(flight, view, settings)
+    if flight.phase == P.LIFT and flight.selected == Selected.OFFBOARD:
+        offboard = replace(flight, guide=Guide.OFFBOARD)
+        if not lost(offboard, view.now_us, settings):
+            return enter(offboard, P.GUIDED, view, settings), Report()
     after = happen(flight, E.DONE, view, settings)
     if after is None:  # a phase whose last leg has no end
         legs, here = stop(flight, view, settings)

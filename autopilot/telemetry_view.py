@@ -9,7 +9,7 @@ from autopilot.condition import BatteryConstants, Condition, remaining, sensors,
 from autopilot.decisions import arming_complaints
 from autopilot.estimation.filter import control_state
 from autopilot.estimation.records import TRACKER
-from autopilot.flight import CARRYING, IN_AIR, ON_GROUND, Flight, Phase, Selected, leg_time_s
+from autopilot.flight import CARRYING, IN_AIR, ON_GROUND, Flight, Guide, Phase, Selected, leg_time_s
 from autopilot.flight_core import FlightState, Setup, view_of
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.so3 import quat_from_rotation
@@ -32,12 +32,15 @@ _PHASE_MODES = {
     Phase.LOWER: identity.AUTO_LAND,
     Phase.SET_DOWN: identity.AUTO_LAND,
     Phase.FAILSAFE: identity.AUTO_LAND,
+    Phase.GUIDED: identity.AUTO_LOITER,
 }
 _SELECTED_MODES = {
     Selected.NOTHING: identity.AUTO_LOITER,
     Selected.TAKEOFF: identity.AUTO_TAKEOFF,
     Selected.MISSION: identity.AUTO_MISSION,
+    Selected.OFFBOARD: identity.AUTO_LOITER,
 }
+_GUIDE_MODES = {Guide.OFFBOARD: identity.OFFBOARD, Guide.MANUAL: identity.POSCTL}
 _LANDED_STATES = {
     Phase.DISARMED: mavlink.MAV_LANDED_STATE_ON_GROUND,
     Phase.ARMED: mavlink.MAV_LANDED_STATE_ON_GROUND,
@@ -78,6 +81,16 @@ def sub_mode(flight: Flight) -> int:
     if flight.phase in ON_GROUND:
         return _SELECTED_MODES[flight.selected]
     return _PHASE_MODES[flight.phase]
+
+
+def mode_of(flight: Flight) -> tuple[int, int]:
+    """PX4's pair of what was asked for."""
+    rising = flight.phase in ON_GROUND or flight.phase in (Phase.TAUTEN, Phase.LIFT)
+    if flight.selected == Selected.OFFBOARD and rising:
+        return identity.OFFBOARD, 0
+    if flight.phase == Phase.GUIDED and flight.guide in _GUIDE_MODES:
+        return _GUIDE_MODES[flight.guide], 0
+    return identity.AUTO, sub_mode(flight)
 
 
 def system_status(flight: Flight, ready: bool) -> int:
@@ -177,10 +190,11 @@ def make_snapshot(
         now_us=now_us,
         boot_unix_us=options.boot_unix_us,
         home=options.home,
+        launch=flight.home,
         armed=flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
         phase=int(flight.phase),
-        main_mode=identity.AUTO,
-        sub_mode=sub_mode(flight),
+        main_mode=mode_of(flight)[0],
+        sub_mode=mode_of(flight)[1],
         landed_state=_LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
         system_status=system_status(flight, ready),
         x_quad=control.x_quad,

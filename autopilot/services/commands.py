@@ -17,10 +17,12 @@ from autopilot.services.records import Announce, Decide, Output, Peer, Say, Send
 from autopilot.services.requests import (
     Answered,
     Arm,
+    ChangeAltitude,
     ChangeSpeed,
     Continue,
     GetMessageInterval,
     Land,
+    Orbit,
     Pause,
     Reboot,
     Reposition,
@@ -194,7 +196,45 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
         return Pause()  # what ground stations send for "hold here"
     flags = _whole(call.p[1]) or 0
     change_mode = bool(flags & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
-    return Reposition(east, north, up, change_mode)
+    return Reposition(east, north, up, change_mode, call.p[0] if call.p[0] > 0.0 else None)
+
+
+def _orbit(call: Call, context: Context) -> Request | Verdict:
+    place = _place(call, context)
+    if place is None:
+        return _refused("Orbit: no such place; must be latitude and longitude of a global frame")
+    if not math.isfinite(call.p[0]) or call.p[0] == 0.0:
+        return _refused(f"Orbit: param1 = {call.p[0]:g} m; must be a radius")
+    if math.isinf(call.p[1]):
+        return _refused("Orbit: param2 must be a speed")
+    east, north, up = (None if math.isnan(value) else value for value in place)
+    speed = None if math.isnan(call.p[1]) else call.p[1]
+    return Orbit(call.p[0], speed, east, north, up)
+
+
+def _change_altitude(call: Call, context: Context) -> Request | Verdict:
+    frame = _whole(call.p[1])
+    if not math.isfinite(call.p[0]) or frame not in (*_AMSL_FRAMES, *_ABOVE_HOME_FRAMES):
+        return _refused("Change altitude: param1 must be m, param2 a global frame")
+    return ChangeAltitude(call.p[0] - (context.home.altitude_m if frame in _AMSL_FRAMES else 0.0))
+
+
+def _loiter(call: Call, context: Context) -> Request | Verdict:
+    """Go there (0, 0 and NaN: here) and stay."""
+    if call.x == 0.0 and call.y == 0.0:
+        call = call._replace(x=math.nan, y=math.nan, z=call.z or math.nan)
+    place = _place(call, context)
+    if place is None:
+        return _refused("Loiter: no such place; must be latitude and longitude of a global frame")
+    east, north, up = (None if math.isnan(value) else value for value in place)
+    return Pause() if east is None and up is None else Reposition(east, north, up, True)
+
+
+def _calibrate(call: Call, context: Context) -> Request | Verdict:
+    asked = (*call.p, call.x, call.y, call.z)
+    if not any(value for value in asked):
+        return Verdict(ACCEPTED)  # stop a calibration: none is under way
+    return Verdict(UNSUPPORTED, "Calibration: sensors are simulated, their errors are what SIM_ says")
 
 
 def _change_speed(call: Call, context: Context) -> Request | Verdict:
@@ -268,6 +308,10 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
+    mavlink.MAV_CMD_DO_ORBIT: _orbit,
+    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
+    mavlink.MAV_CMD_NAV_LOITER_UNLIM: _loiter,
+    mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
     mavlink.MAV_CMD_DO_SET_HOME: _set_home,
     mavlink.MAV_CMD_DO_FLIGHTTERMINATION: _terminate,
     mavlink.MAV_CMD_RUN_PREARM_CHECKS: _plain(RunPrearmChecks()),

@@ -18,6 +18,7 @@ from autopilot.services.commands import CommandService
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
 from autopilot.services.ftp import FtpService
+from autopilot.services.guided import GuidedService
 from autopilot.services.identity import (
     AUTOPILOT_COMPONENT,
     DIALECT_COMPONENT,
@@ -43,6 +44,9 @@ from autopilot.services.records import (
     Verdict,
 )
 from autopilot.services.requests import (
+    FollowAttitude,
+    FollowSetpoint,
+    FollowStick,
     GetMessageInterval,
     RequestCapabilities,
     RequestMessage,
@@ -76,6 +80,7 @@ _METADATA = {
     mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: information_message,
 }
 
+_STREAMED = FollowSetpoint | FollowAttitude | FollowStick  # they change no mode
 SnapshotFactory = Callable[[], Snapshot]
 
 
@@ -102,6 +107,7 @@ class VehicleEndpoint:
         self._ftp = FtpService(self.files)
         self._logs = LogService(self.files)
         self._timed = (self._signing, self._missions, self._parameters, self._ftp, self._logs)
+        self._guided = GuidedService(home, identity.system)
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._table: dict[int, Stream] = dict(STREAMS)
@@ -330,7 +336,7 @@ class VehicleEndpoint:
                 case SetMessageInterval(message_id, interval_us):
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
-            if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
+            if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 if isinstance(request, SetMode):
                     self._asked_mode = request.number
                 self.state_changed()
@@ -389,6 +395,7 @@ class VehicleEndpoint:
     def _handler_table(self) -> dict[int, Handler]:
         """What is done about each message; all others are for somebody else."""
         commands, missions, parameters = self._commands, self._missions, self._parameters
+        guided = self._guided
         m = mavlink
         return {
             m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
@@ -396,6 +403,10 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,
+            m.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: guided.receive_local,
+            m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,
+            m.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: guided.receive_attitude,
+            m.MAVLINK_MSG_ID_MANUAL_CONTROL: guided.receive_stick,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: parameters.receive_request_list,
             m.MAVLINK_MSG_ID_PARAM_REQUEST_READ: parameters.receive_request_read,
             m.MAVLINK_MSG_ID_PARAM_SET: parameters.receive_set,

@@ -77,12 +77,59 @@ class ReplaceMission:
 
 @dataclass(frozen=True, slots=True)
 class Reposition:
-    """Bring the load to a place and hold it there; a component that is None is kept."""
+    """Bring the load to a place and hold it there; a component that is None is kept. `speed_m_s` None: the
+    speed of transfers."""
 
     east_m: float | None
     north_m: float | None
     altitude_m: float | None
     change_mode: bool
+    speed_m_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FollowSetpoint:
+    """One setpoint of a stream, ENU from home; NaN: not asked for. `relative`: the position is one from
+    where the load is asked to be now."""
+
+    position: Vec3
+    velocity: Vec3
+    accel: Vec3
+    relative: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FollowAttitude:
+    """One attitude of a stream: thrust axis, unit vector, ENU; thrust 0 ... 1, None: keep the height."""
+
+    upward: Vec3
+    thrust: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class FollowStick:
+    """One position of the stick: each component of the velocity, ENU, as a share of its greatest."""
+
+    share: Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class Orbit:
+    """Fly the load round a circle; None: here, at this height, at the speed of transfers. Clockwise seen from
+    above; a negative radius is counter-clockwise, and so is a negative speed."""
+
+    radius_m: float
+    speed_m_s: float | None
+    east_m: float | None
+    north_m: float | None
+    altitude_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeAltitude:
+    """Bring the load to a height above home, where it is."""
+
+    altitude_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +213,11 @@ Decided = (
     | SetCurrent
     | ReplaceMission
     | Reposition
+    | FollowSetpoint
+    | FollowAttitude
+    | FollowStick
+    | Orbit
+    | ChangeAltitude
     | ChangeSpeed
     | SetHome
     | Terminate

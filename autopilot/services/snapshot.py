@@ -58,6 +58,8 @@ class Snapshot(NamedTuple):
     system_status: int  # MAV_STATE
     asked_mode: int | None = None  # custom mode that was asked for by its number
 
+    launch: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
+
     # estimate of the vehicle
     x_quad: Vec3 = ZERO
     v_quad: Vec3 = ZERO

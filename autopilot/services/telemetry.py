@@ -150,7 +150,7 @@ def _gps_global_origin(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _home_position(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (home_position_message(s.now_us, s.home),)
+    return (home_position_message(s.now_us, s.launch, s.home),)
 
 
 def _local_position_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -412,5 +412,5 @@ WATCHED: dict[int, Callable[[Snapshot], tuple[Any, ...]]] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: lambda s: (s.armed, s.main_mode, s.sub_mode, s.system_status),
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda s: (s.landed_state,),
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda s: (s.mission_current, s.mission_total, s.mission_state),
-    mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home,),
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home, s.launch),
 }

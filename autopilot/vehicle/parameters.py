@@ -329,6 +329,27 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("BAT_CELLS", 3.0, 1.0, 24.0, "", "Lithium cells in series", integer=True),
             p("BAT_R", 0.06, 0.0, 10.0, "ohm", "Inner resistance of the battery"),
             p("BAT_HOVER_W", 65.0, 0.1, 1e5, "W", "Power with which the vehicle hovers without its load"),
+            p(
+                "COM_OF_LOSS_T",
+                1.0,
+                0.1,
+                60.0,
+                "s",
+                "Silence of a setpoint stream after which the load is held",
+            ),
+            p("COM_RC_LOSS_T", 0.5, 0.1, 60.0, "s", "The same of MANUAL_CONTROL"),
+            p("MPC_VEL_MANUAL", 1.0, 0.05, 15.0, "m/s", "Speed of the load for a stick pushed home"),
+            p("MPC_XY_VEL_MAX", 5.0, 0.05, 15.0, "m/s", "Greatest velocity setpoint that is followed"),
+            p("MPC_THR_HOVER", 0.5, 0.1, 0.9, "", "Thrust of an attitude setpoint that carries the weight"),
+            p(
+                "GDE_TARGET",
+                0.0,
+                0.0,
+                1.0,
+                "",
+                "Position setpoints are for 0 the load, 1 the vehicle a cable length over it",
+                integer=True,
+            ),
             p("SIM_LOSS_PCT", 0.0, 0.0, 100.0, "%", "Datagrams lost on the ground link, each way"),
         ]
     )

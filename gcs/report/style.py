@@ -35,6 +35,7 @@ _BANDS = {
     mavlink.PLUMBLINE_PHASE_LOWER: _EARTH,
     mavlink.PLUMBLINE_PHASE_SET_DOWN: _EARTH,
     mavlink.PLUMBLINE_PHASE_FAILSAFE: _ALARM,
+    mavlink.PLUMBLINE_PHASE_GUIDED: _BUSY,
 }
 _STYLE: Any = {
     "axes.axisbelow": True,

@@ -30,7 +30,13 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.estimation": (*LEAVES, RECORDS),
     "autopilot.mixer": (*LEAVES, RECORDS),
     "autopilot.services": LEAVES,
-    "autopilot.supervisor": (*LEAVES, RECORDS, "autopilot.flight", "autopilot.guidance"),
+    "autopilot.supervisor": (
+        *LEAVES,
+        RECORDS,
+        "autopilot.flight",
+        "autopilot.following",
+        "autopilot.guidance",
+    ),
     "autopilot": ("autopilot", "missions"),  # what joins the rooms; TOP says who may not be joined
     "sitl": ("autopilot.geometry", "autopilot.wire"),
     "gcs": ("autopilot.geometry", "autopilot.wire", "missions"),

@@ -10,6 +10,7 @@ import pytest
 
 from autopilot.flight import CARRYING, IN_AIR, ON_GROUND, Event, Flight, Phase, Plan
 from autopilot.geometry.linear import norm, sub
+from autopilot.following import Stream, Wish
 from autopilot.guidance import LOAD_POSITION, Brake, Calm, Creep, Hold, Run, Swing
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
@@ -34,23 +35,34 @@ lift      load on the ground     set_down
 hold      hold                   hold
 hold      fly the mission        mission
 hold      return                 return
+hold      follow setpoints       guided
 hold      land                   lower
 hold      load on the ground     set_down
 mission   legs done              hold
 mission   hold                   hold
 mission   fly the mission        mission
 mission   return                 return
+mission   follow setpoints       guided
 mission   land                   lower
 mission   load on the ground     set_down
 return    legs done              lower
 return    hold                   hold
 return    fly the mission        mission
 return    land                   lower
+return    follow setpoints       guided
 return    load on the ground     set_down
+guided    follow setpoints       guided
+guided    hold                   hold
+guided    fly the mission        mission
+guided    return                 return
+guided    land                   lower
+guided    load on the ground     set_down
+lift      follow setpoints       guided
 lower     load on the ground     set_down
 lower     hold                   hold
 lower     fly the mission        mission
 lower     return                 return
+lower     follow setpoints       guided
 set_down  vehicle on the ground  disarmed
 failsafe  disarm                 disarmed
 """
@@ -342,7 +354,14 @@ TROUBLES: dict[str, tuple[dict[str, Any], str]] = {
 def under_way(phase: Phase) -> Flight:
     """A flight at the beginning of a phase, over (1, 0, 2)."""
     plan = Plan(STEPS, (0, 1, 2), 3)
-    held = Flight(phase=Phase.HOLD, plan=plan, step=1, takeoff_altitude_m=4.0, speed_m_s=1.0)
+    held = Flight(
+        phase=Phase.HOLD,
+        plan=plan,
+        step=1,
+        takeoff_altitude_m=4.0,
+        speed_m_s=1.0,
+        offboard=Stream(Wish(HERE), 0, 0),
+    )
     return enter(held, phase, hanging(x=HERE), SETTINGS)
 
 

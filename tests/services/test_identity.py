@@ -112,7 +112,6 @@ def test_capabilities_promise_what_is_served_and_nothing_else():
     unserved = [
         "MISSION_FENCE",
         "MISSION_RALLY",
-        "SET_ATTITUDE_TARGET",
         "PARAM_ENCODE_C_CAST",
         "TERRAIN",
     ]

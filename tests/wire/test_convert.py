@@ -334,7 +334,7 @@ def test_no_state_however_wild_raises(v: Any, quat: Any) -> None:
         convert.gps_raw_int_message(0, 3, v, v, v[0], v[0], 10, HOME),
         convert.altitude_message(0, v[0], HOME),
         convert.vfr_hud_message(v, quat, v[0], v[0], HOME),
-        convert.home_position_message(0, HOME),
+        convert.home_position_message(0, v, HOME),
         convert.gps_global_origin_message(0, HOME),
         convert.position_target_local_ned_message(0, v, v, v),
         convert.attitude_target_message(0, quat, v, v[0]),

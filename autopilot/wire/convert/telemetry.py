@@ -165,10 +165,11 @@ def vfr_hud_message(velocity: Vec3, quat_wxyz: Quat, height: float, throttle: fl
     )
 
 
-def home_position_message(now_us: int, home: Home) -> Any:
-    """HOME_POSITION: the origin of the world."""
+def home_position_message(now_us: int, launch: Vec3, home: Home) -> Any:
+    """HOME_POSITION: where a return leads, ENU from the origin of the world."""
+    north, east, down = ned_from_enu(launch)
     return mavlink.MAVLink_home_position_message(
-        *geodetic_from_enu(ZERO, home), 0.0, 0.0, 0.0, _UPRIGHT, 0.0, 0.0, 0.0, now_us
+        *geodetic_from_enu(launch, home), north, east, down, _UPRIGHT, 0.0, 0.0, 0.0, now_us
     )
 
 

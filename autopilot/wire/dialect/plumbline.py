@@ -422,8 +422,10 @@ PLUMBLINE_PHASE_SET_DOWN = 8
 enums["PLUMBLINE_PHASE"][8] = EnumEntry("PLUMBLINE_PHASE_SET_DOWN", """Landing: the vehicle lands beside the load.""")
 PLUMBLINE_PHASE_FAILSAFE = 9
 enums["PLUMBLINE_PHASE"][9] = EnumEntry("PLUMBLINE_PHASE_FAILSAFE", """The flight was given up.""")
-PLUMBLINE_PHASE_ENUM_END = 10
-enums["PLUMBLINE_PHASE"][10] = EnumEntry("PLUMBLINE_PHASE_ENUM_END", """""")
+PLUMBLINE_PHASE_GUIDED = 10
+enums["PLUMBLINE_PHASE"][10] = EnumEntry("PLUMBLINE_PHASE_GUIDED", """A stream of setpoints, a stick or a circle moves the load.""")
+PLUMBLINE_PHASE_ENUM_END = 11
+enums["PLUMBLINE_PHASE"][11] = EnumEntry("PLUMBLINE_PHASE_ENUM_END", """""")
 
 # PLUMBLINE_COMMAND
 enums["PLUMBLINE_COMMAND"] = Enum()

@@ -19,6 +19,7 @@ from mavsdk.plugins.info import Info
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
 from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.mission_raw import MissionRaw
+from mavsdk.plugins.offboard import Offboard, PositionNedYaw, VelocityNedYaw
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 
@@ -189,8 +190,8 @@ class Pilot:
         def item(north: float, east: float, **how: Any) -> MissionItem:
             return MissionItem(
                 home.latitude_deg + north / DEGREE_M, home.longitude_deg + east / DEGREE_M, 2.0, 1.5,
-                how.get("fly_through", True), NAN, NAN, MissionItem.CameraAction.NONE, NAN, NAN, NAN, NAN, NAN,
-                MissionItem.VehicleAction.NONE,
+                how.get("fly_through", True), NAN, NAN, MissionItem.CameraAction.NONE,
+                NAN, NAN, NAN, NAN, NAN, MissionItem.VehicleAction.NONE,
             )  # fmt: skip
 
         plan = MissionPlan([item(1.0, 0.0), item(1.0, 1.5, fly_through=False), item(0.0, 1.5)])
@@ -216,6 +217,22 @@ class Pilot:
         self.mode("MISSION")
         self.until("the end of the mission", self.mission.is_mission_finished)
         self.told["progress"] = sorted(set(done))
+
+    def offboard(self) -> None:
+        """Places, then velocities, as the examples of MAVSDK do it."""
+        offboard = Offboard(self.system)
+        offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -2.0, NAN))
+        offboard.start()
+        self.mode("OFFBOARD")
+        offboard.set_position_ned(PositionNedYaw(0.8, 0.0, -2.0, NAN))
+        velocities = self.telemetry.position_velocity_ned
+        self.until("the place", lambda: abs(velocities().position.north_m - 0.8) < 0.15)
+        offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.4, 0.0, NAN))
+        self.until("the velocity", lambda: abs(velocities().velocity.east_m_s - 0.4) < 0.15)
+        offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.0, 0.0, NAN))
+        self.until("rest", lambda: abs(velocities().velocity.east_m_s) < 0.1)
+        offboard.stop()
+        self.mode("HOLD")
 
     def hold(self) -> None:
         self.action.hold()

@@ -1,0 +1,195 @@
+"""Setpoint messages, sticks and guided commands: what they become, and what is refused with a text."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from autopilot.services.guided import COMPLAIN_US, read_attitude, read_global, read_local, read_stick
+from autopilot.services.records import Verdict
+from autopilot.services.requests import (
+    ChangeAltitude,
+    FollowAttitude,
+    FollowSetpoint,
+    FollowStick,
+    Orbit,
+    Pause,
+    Reposition,
+)
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as m
+
+HOME = Home()
+POSITION, VELOCITY, BOTH = 0x9F8, 0xDC7, 0xDC0  # as MAVSDK sends them, MAVLink's bits
+
+
+def local(frame, mask, x=0.0, y=0.0, z=0.0, vx=0.0, vy=0.0, vz=0.0):
+    return m.MAVLink_set_position_target_local_ned_message(
+        0, 1, 1, frame, mask, x, y, z, vx, vy, vz, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+
+
+def attitude(q, thrust, mask=7):
+    return m.MAVLink_set_attitude_target_message(0, 1, 1, mask, q, 0.0, 0.0, 0.0, thrust)
+
+
+def same(a, b):
+    return all(x == pytest.approx(y, abs=1e-6, nan_ok=True) for x, y in zip(a, b, strict=True))
+
+
+NOTHING = (math.nan,) * 3
+
+
+@pytest.mark.parametrize(
+    ("message", "position", "velocity", "relative"),
+    [
+        (local(1, POSITION, 1.0, 2.0, -3.0), (2.0, 1.0, 3.0), NOTHING, False),
+        (local(1, VELOCITY, vx=1.0, vy=2.0, vz=-3.0), NOTHING, (2.0, 1.0, 3.0), False),
+        (local(1, BOTH, 1.0, 2.0, -3.0, 4.0, 5.0, 6.0), (2.0, 1.0, 3.0), (5.0, 4.0, -6.0), False),
+        (local(7, POSITION, 1.0, 2.0, -3.0), (2.0, 1.0, 3.0), NOTHING, True),
+        # the nose points east: forward is east, right is south
+        (local(8, VELOCITY, vx=1.0, vy=2.0, vz=-3.0), NOTHING, (1.0, -2.0, 3.0), True),
+        (local(9, POSITION, 1.0, 2.0, -3.0), (1.0, -2.0, 3.0), NOTHING, True),
+        # north and down ignored
+        (local(1, 0xDFD, 9.0, 2.0, 9.0), (2.0, math.nan, math.nan), NOTHING, False),
+    ],
+)
+def test_local_setpoints(message, position, velocity, relative):
+    asked = read_local(message)
+    assert isinstance(asked, FollowSetpoint)
+    assert same(asked.position, position) and same(asked.velocity, velocity)
+    assert asked.relative == relative
+
+
+def test_global_setpoints_are_above_home_or_above_the_sea():
+    home = Home(altitude_m=100.0)
+    lat, lon = home.latitude_deg * 1e7, home.longitude_deg * 1e7
+    for frame, alt in ((6, 5.0), (3, 5.0), (0, 105.0), (5, 105.0)):
+        message = m.MAVLink_set_position_target_global_int_message(
+            0, 1, 1, frame, POSITION, round(lat) + 1000, round(lon), alt, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+        asked = read_global(message, home)
+        assert isinstance(asked, FollowSetpoint)
+        assert asked.position[1] == pytest.approx(11.1, abs=0.1)  # 1e-4 deg of latitude
+        assert asked.position[2] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        local(2, POSITION),
+        local(1, 0xFFF),
+        local(1, POSITION, math.nan),
+        local(1, VELOCITY, vx=math.inf),
+        local(1, 0xFC0 | 0x200 & ~0, 1.0),
+    ],
+)
+def test_setpoints_that_ask_for_nothing_are_refused(message):
+    verdict = read_local(message)
+    assert isinstance(verdict, Verdict)
+    assert verdict.result == m.MAV_RESULT_DENIED and verdict.text
+
+
+def test_an_attitude_is_its_thrust_axis():
+    half = math.radians(5.0)
+    # nose down by 10 deg with the nose north: leans north
+    pitched = read_attitude(attitude((math.cos(half), 0.0, -math.sin(half), 0.0), 0.6))
+    assert isinstance(pitched, FollowAttitude)
+    assert same(pitched.upward, (0.0, math.sin(2 * half), math.cos(2 * half)))
+    assert pitched.thrust == pytest.approx(0.6)
+    rolled = read_attitude(attitude((math.cos(half), math.sin(half), 0.0, 0.0), 0.6, mask=7 | 64))
+    assert isinstance(rolled, FollowAttitude)
+    assert same(rolled.upward, (math.sin(2 * half), 0.0, math.cos(2 * half)))
+    assert rolled.thrust is None
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        attitude((1.0, 0.0, 0.0, 0.0), 0.5, mask=128),
+        attitude((0.0, 0.0, 0.0, 0.0), 0.5),
+        attitude((math.nan, 0.0, 0.0, 0.0), 0.5),
+        attitude((0.0, 1.0, 0.0, 0.0), 0.5),
+        attitude((1.0, 0.0, 0.0, 0.0), 1.5),
+        attitude((1.0, 0.0, 0.0, 0.0), math.nan),
+    ],
+)
+def test_attitudes_that_cannot_be_followed_are_refused(message):
+    verdict = read_attitude(message)
+    assert isinstance(verdict, Verdict)
+    assert verdict.result == m.MAV_RESULT_DENIED and verdict.text
+
+
+def test_the_stick():
+    asked = read_stick(m.MAVLink_manual_control_message(1, 500, -1000, 750, 0, 0))
+    assert isinstance(asked, FollowStick)
+    assert same(asked.share, (0.5, 1.0, 0.5))
+    centred = read_stick(m.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0))
+    assert isinstance(centred, FollowStick)
+    assert same(centred.share, (0.0, 0.0, 0.0))
+    assert isinstance(read_stick(m.MAVLink_manual_control_message(1, 2000, 0, 500, 0, 0)), Verdict)
+
+
+def test_setpoints_are_not_acknowledged_and_announce_nothing(rig):
+    rig.poll()
+    rig.send(local(1, POSITION, 1.0))
+    assert [type(r) for r in rig.asked] == [FollowSetpoint]
+    assert all(not link for link in rig.poll().values())
+
+
+def test_a_refusal_is_said_once_in_a_while(rig):
+    said = 0
+    for _ in range(2 * COMPLAIN_US // 100_000):
+        said += sum(r.get_type() == "STATUSTEXT" for r in rig.replies(local(1, 0xFFF)))
+        rig.now_us += 100_000
+    assert said == 3 or said == 2
+
+
+def test_a_stick_for_another_system_is_not_ours(rig):
+    rig.send(m.MAVLink_manual_control_message(7, 0, 0, 500, 0, 0))
+    assert rig.asked == []
+
+
+def long(rig, command, *p):
+    params = (*p, *([0.0] * (7 - len(p))))
+    replies = rig.replies(m.MAVLink_command_long_message(1, 1, command, 0, *params))
+    (ack,) = [r for r in replies if r.get_type() == "COMMAND_ACK"]
+    return ack.result
+
+
+NAN = math.nan
+
+
+def test_guided_commands(rig):
+    assert long(rig, m.MAV_CMD_DO_ORBIT, -2.0, 1.0, 0.0, 0.0, NAN, NAN, NAN) == 0
+    assert rig.asked[-1] == Orbit(-2.0, 1.0, None, None, None)
+    assert long(rig, m.MAV_CMD_DO_ORBIT, 0.0, 1.0, 0.0, 0.0, NAN, NAN, NAN) == m.MAV_RESULT_DENIED
+    assert long(rig, m.MAV_CMD_DO_CHANGE_ALTITUDE, 4.0, 3.0) == 0
+    assert rig.asked[-1] == ChangeAltitude(4.0)
+    assert long(rig, m.MAV_CMD_DO_CHANGE_ALTITUDE, NAN, 3.0) == m.MAV_RESULT_DENIED
+    assert long(rig, m.MAV_CMD_NAV_LOITER_UNLIM) == 0
+    assert rig.asked[-1] == Pause()
+    place = (HOME.latitude_deg, HOME.longitude_deg, 3.0)
+    assert long(rig, m.MAV_CMD_DO_REPOSITION, 0.7, 1.0, 0.0, NAN, *place) == 0
+    assert isinstance(rig.asked[-1], Reposition)
+    assert rig.asked[-1].speed_m_s == pytest.approx(0.7)
+    assert long(rig, m.MAV_CMD_PREFLIGHT_CALIBRATION, 1.0) == m.MAV_RESULT_UNSUPPORTED
+    assert long(rig, m.MAV_CMD_PREFLIGHT_CALIBRATION) == 0
+
+
+any_float = st.floats(width=32)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    frame=st.integers(0, 21), mask=st.integers(0, 0xFFF), values=st.lists(any_float, min_size=6, max_size=6)
+)
+def test_what_is_read_is_finite_wherever_it_is_asked(frame, mask, values):
+    asked = read_local(local(frame, mask, *values))
+    if isinstance(asked, FollowSetpoint):
+        used = (*asked.position, *asked.velocity)
+        assert not any(map(math.isinf, used))
+        assert not all(map(math.isnan, used))
