@@ -51,7 +51,7 @@ from autopilot.wire.mission_items import located_steps
 from autopilot.wire.parameters import ParameterTable
 from autopilot.wire.signing import Signing
 from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
-from missions.model import Step
+from missions.model import Step, Waypoint
 from missions.planning import PENDING, Limits, Prepared, prepare
 
 GROUND_WINDOW_US = 20_000
@@ -320,6 +320,8 @@ class Onboard:
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self._setup)
+        waypoints = (Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0))
+        Work(waypoints, (0, 1), self._setup.settings.limits).done()
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):

@@ -23,9 +23,9 @@ from typing import Any
 
 from autopilot.services.mission_store import MAX_ITEMS, StoredMission
 from autopilot.services.records import Announce, Decide, MissionChanged, Output, Peer, Say, Send
-from autopilot.services.requests import ReplaceMission
+from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
-from autopilot.wire.convert import Home
+from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import MissionItemError, WireItem, located_steps
 
@@ -42,6 +42,9 @@ _UNSERVED = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 _ACCEPTED = mavlink.MAV_MISSION_ACCEPTED
 
 _NO_INT = 2**31 - 1
+_GUIDED_ITEM = 2  # MISSION_ITEM.current of a place to go to at once
+_ABOVE_HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+_GLOBAL_FRAMES = (*_ABOVE_HOME_FRAMES, mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _LOCAL_FRAMES = (
     mavlink.MAV_FRAME_LOCAL_NED,
     mavlink.MAV_FRAME_LOCAL_ENU,
@@ -149,6 +152,8 @@ class MissionService:
         if message.mission_type != _MISSION:
             return []
         upload = self._upload
+        if (upload is None or upload.peer != peer) and message.current == _GUIDED_ITEM and item is not None:
+            return self._go_there(item, peer, decide)
         if upload is None or upload.peer != peer:
             return self._late_item(message, peer, now_us)
         expected = len(upload.items)
@@ -168,6 +173,18 @@ class MissionService:
         if len(upload.items) < upload.count:
             return [self._ask()]
         return self._complete(upload, now_us, decide)
+
+    def _go_there(self, item: WireItem, peer: Peer, decide: Decide) -> list[Output]:
+        """A single waypoint outside any upload: ArduPilot's way to say "go there" (DroneKit, Mission Planner)."""
+        if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or item.frame not in _GLOBAL_FRAMES:
+            return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED)]
+        east, north, _ = enu_from_geodetic(item.x, item.y, 0, self.home)
+        up = item.z if item.frame in _ABOVE_HOME_FRAMES else item.z - self.home.altitude_m
+        verdict = decide(Reposition(east, north, up, True))
+        if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
+            return [_ack(peer, _ACCEPTED)]
+        said: list[Output] = [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
+        return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED)]
 
     def _complete(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
         """All items are here: check them as a whole, and only then replace the mission."""

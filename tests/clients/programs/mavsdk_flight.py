@@ -172,6 +172,10 @@ class Pilot:
         self.mode("HOLD")
         assert self.telemetry.in_air()
 
+    def arm(self) -> None:
+        self.action.arm()
+        self.until("armed", self.telemetry.armed)
+
     def go_to(self) -> None:
         home = self.telemetry.home()
         north, height = 1.0, 2.5
