@@ -217,7 +217,8 @@ def _mode_mission(flight: Flight, request: Any, view: View, settings: Settings) 
 def _offboard(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     if flight.phase == Phase.GUIDED and flight.guide == Guide.OFFBOARD:
         return flight, ACCEPTED
-    if not flight.offboard.steady(view.now_us, STEADY_US):
+    # one is enough: MAVSDK asks for the mode right behind its first
+    if not flight.offboard.alive(view.now_us, STEADY_US):
         return flight, _later("OFFBOARD denied: send setpoints first, more than two a second")
     if flight.phase in ON_GROUND:
         return replace(flight, selected=Selected.OFFBOARD, on_mission=False), ACCEPTED

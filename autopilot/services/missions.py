@@ -175,7 +175,7 @@ class MissionService:
         return self._complete(upload, now_us, decide)
 
     def _go_there(self, item: WireItem, peer: Peer, decide: Decide) -> list[Output]:
-        """A single waypoint outside any upload: ArduPilot's way to say "go there" (DroneKit, Mission Planner)."""
+        """A single waypoint outside any upload: ArduPilot's way to say "go there"."""
         if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or item.frame not in _GLOBAL_FRAMES:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED)]
         east, north, _ = enu_from_geodetic(item.x, item.y, 0, self.home)

@@ -1,4 +1,4 @@
-"""A vehicle in real time, and the programs that people fly it with; every one is gone when its test is over."""
+"""A vehicle in real time, and the programs that people fly it with; all are gone when their test is over."""
 
 from __future__ import annotations
 
