@@ -44,9 +44,9 @@ def told_by(request: pytest.FixtureRequest) -> Callable[..., dict[str, object]]:
 
 
 def test_mavsdk_flies(vehicle: Start, told_by: Callable[..., dict[str, object]]) -> None:
-    steps = ("ready", "telemetry_seen", "parameters", "missions", "upload", "take_off", "go_to", "offboard")
+    steps = ("ready", "telemetry_seen", "parameters", "missions", "upload", "take_off", "go_to", "fly_mission")
     api = vehicle().api
-    told = told_by("mavsdk_flight.py", f"udpin://127.0.0.1:{api}", *steps, "fly_mission", "come_back")
+    told = told_by("mavsdk_flight.py", f"udpin://127.0.0.1:{api}", *steps, "offboard", "come_back")
     assert told["complaints"] == []
     assert told["version"] == [1, 15]
     assert told["progress"] == [0, 1, 2, 3]
