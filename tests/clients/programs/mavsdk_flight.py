@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from mavsdk import ComponentType, Configuration, LogLevel, Mavsdk, log_subscribe
+from mavsdk import ComponentType, Configuration, LogLevel, Mavsdk, MavsdkError, log_subscribe
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.info import Info
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
@@ -70,6 +70,18 @@ class Pilot:
         self.until("home", lambda: self.telemetry.health().is_home_position_ok)
         home = self.telemetry.home()
         return round(home.latitude_deg * 1e7), round(home.longitude_deg * 1e7)
+
+    def again(self, act: Callable[[], Any]) -> None:
+        """A command that was lost is given again, as a pilot does."""
+        for _ in range(5):
+            try:
+                act()
+            except MavsdkError as error:
+                if "TIMEOUT" not in str(error):
+                    raise
+            else:
+                return
+        act()
 
     # ---- steps
 
@@ -164,7 +176,7 @@ class Pilot:
         raw.upload_rally_points([])
 
     def take_off(self) -> None:
-        self.action.arm()
+        self.again(self.action.arm)
         self.until("armed", self.telemetry.armed)
         self.action.takeoff()
         self.mode("TAKEOFF")
@@ -173,7 +185,7 @@ class Pilot:
         assert self.telemetry.in_air()
 
     def arm(self) -> None:
-        self.action.arm()
+        self.again(self.action.arm)
         self.until("armed", self.telemetry.armed)
 
     def go_to(self) -> None:
@@ -211,13 +223,13 @@ class Pilot:
         """Start, pause on the way, go on, to the end."""
         done: list[int] = []
         self.mission.subscribe_mission_progress(lambda progress, *_: done.append(progress.current))
-        self.mission.start_mission()
+        self.again(self.mission.start_mission)
         self.mode("MISSION")
         self.until("the second item", lambda: bool(done) and done[-1] >= 1)
-        self.mission.pause_mission()
+        self.again(self.mission.pause_mission)
         self.mode("HOLD")
         assert not self.mission.is_mission_finished()
-        self.mission.start_mission()
+        self.again(self.mission.start_mission)
         self.mode("MISSION")
         self.until("the end of the mission", self.mission.is_mission_finished)
         self.told["progress"] = sorted(set(done))
@@ -249,7 +261,7 @@ class Pilot:
         self.landed(LandedState.ON_GROUND)
 
     def land(self) -> None:
-        self.action.land()
+        self.again(self.action.land)
         self.mode("LAND")
         self.until("disarmed", lambda: not self.telemetry.armed())
         self.landed(LandedState.ON_GROUND)
