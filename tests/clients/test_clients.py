@@ -93,8 +93,7 @@ def test_mavproxy_flies(vehicle: Start, mavproxy: Callable[[str], Mavproxy]) -> 
     ]
     (started.directory / "mission.txt").write_text("\n".join(rows) + "\n")
     program.type(f"wp load {started.directory / 'mission.txt'}")
-    program.expect("Sent waypoint 0")
-    program.expect("all sent")
+    program.expect("Got MISSION_ACK: TYPE_MISSION: ACCEPTED")
     program.type("wp list")
     program.expect("Requesting 4 waypoints")
     program.type("param fetch MIS_SPEED")
