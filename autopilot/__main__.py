@@ -8,16 +8,14 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import click
 from platformdirs import user_state_path
 
-from autopilot.onboard import Onboard, Work
-from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
+from autopilot.aside import Aside
+from autopilot.onboard import Onboard
+from autopilot.services.identity import AUTOPILOT_COMPONENT, identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
     AreasChanged,
@@ -29,6 +27,7 @@ from autopilot.services.records import (
     TimesyncAnswered,
 )
 from autopilot.storage import Storage, StorageError
+from autopilot.tcp_server import TcpServer
 from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import BeliefError, load_belief
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
@@ -52,7 +51,6 @@ from autopilot.wire.shell import (
     shown,
     signing_key_option,
 )
-from missions.planning import Prepared
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
@@ -80,6 +78,13 @@ def _open(address: Address, what: str) -> socket.socket:
     return sock
 
 
+def _listen(address: Address) -> TcpServer:
+    try:
+        return TcpServer(address)
+    except OSError as error:
+        raise AutopilotError(f"TCP clients {shown(address)}: {reason(error)}") from None
+
+
 def _is_loopback(host: str) -> bool:
     return host == "localhost" or host.startswith("127.")
 
@@ -90,7 +95,8 @@ class GroundStations:
     Whoever else speaks to such a socket is a link of its own and is answered where it is.
     """
 
-    def __init__(self, addresses: tuple[Address, ...]) -> None:
+    def __init__(self, addresses: tuple[Address, ...], tcp: TcpServer | None = None) -> None:
+        self._tcp = tcp
         self._sockets = [_open(address, "ground station") for address in addresses]
         self._links: list[Link] = [(i, address) for i, address in enumerate(addresses)]
 
@@ -98,9 +104,13 @@ class GroundStations:
         """Serve the configured links from now on."""
         for link in self._links:
             onboard.add_link(link)
+        if self._tcp is not None:
+            self._tcp.join(onboard)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
         """Hand over what came and send what is due."""
+        if self._tcp is not None:
+            self._tcp.exchange(onboard, handle)
         for i, sock in enumerate(self._sockets):
             for _ in range(_MOST_AT_ONCE):
                 arrived = receive(sock, socket.MSG_DONTWAIT)
@@ -112,21 +122,27 @@ class GroundStations:
 
     def send(self, onboard: Onboard) -> None:
         """Send what is due."""
-        self._send(onboard.ground_datagrams())
+        self._send(onboard.ground_datagrams(), onboard)
 
     def beat(self, onboard: Onboard) -> None:
         """A heartbeat while the clock stands and nothing is due."""
-        self._send([(link, onboard.stranded_heartbeat(link)) for link in self._links])
+        links = (*self._links, *(self._tcp.links() if self._tcp else ()))
+        self._send([(link, onboard.stranded_heartbeat(link)) for link in links], onboard)
 
-    def _send(self, datagrams: list[tuple[Link, bytes]]) -> None:
+    def _send(self, datagrams: list[tuple[Link, bytes]], onboard: Onboard) -> None:
         for link, datagram in datagrams:
             i, address = link  # type: ignore[misc]
+            if self._tcp is not None and i == "tcp":  # type: ignore[has-type]
+                self._tcp.send(link, datagram, onboard)
+                continue
             with suppress(OSError):  # nobody listens there yet, or the network is full: lost
                 self._sockets[i].sendto(datagram, address)  # type: ignore[has-type]
 
     def close(self) -> None:
         for sock in self._sockets:
             sock.close()
+        if self._tcp is not None:
+            self._tcp.close()
 
 
 class GroundInStep:
@@ -172,47 +188,6 @@ class GroundInStep:
 
     def close(self) -> None:
         self._socket.close()
-
-
-class Aside:
-    """Work for which the control loop must not wait, done by a process of its own."""
-
-    def __init__(self) -> None:
-        self._work: Work | None = None
-        self._process: SpawnProcess | None = None
-        self._answer: Connection | None = None
-
-    def attend(self, onboard: Onboard) -> None:
-        """Begin what waits; hand over what is done."""
-        if onboard.work is not None and onboard.work is not self._work:
-            self.close()
-            self._work = onboard.work
-            context = get_context("spawn")
-            self._answer, theirs = context.Pipe(duplex=False)
-            self._process = context.Process(target=_work_aside, args=(onboard.work, theirs), daemon=True)
-            self._process.start()
-            theirs.close()
-        if self._answer is not None and self._work is not None and self._answer.poll():
-            try:
-                onboard.finish(self._work, self._answer.recv())
-            except EOFError:
-                text = "the process that prepares paths has died"
-                onboard.finish(self._work, Prepared(refusal=text, notes=(text,)))
-            self.close()
-
-    def close(self) -> None:
-        """End what goes on."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-        if self._answer is not None:
-            self._answer.close()
-        self._work = self._process = self._answer = None
-
-
-def _work_aside(work: Work, answer: Connection) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
-    answer.send(work.done())
 
 
 class Program:
@@ -396,9 +371,16 @@ def _address_or_none(text: str) -> Address | None:
     "--api",
     type=_address_or_none,
     metavar="HOST:PORT",
-    default="127.0.0.1:14540",
+    multiple=True,
+    default=("127.0.0.1:14540",),
     show_default=True,
-    help="API client to speak to, `none` for none.",
+    help="API client to speak to; repeatable, `none` for none.",
+)
+@click.option(
+    "--tcp",
+    type=address_option,
+    metavar="HOST:PORT",
+    help="Listen here for ground stations that connect by TCP, as 127.0.0.1:5760.",
 )
 @click.option(
     "--ground-lockstep",
@@ -435,7 +417,8 @@ def _address_or_none(text: str) -> Address | None:
 def main(
     sim: Address,
     gcs: tuple[Address | None, ...],
-    api: Address | None,
+    api: tuple[Address | None, ...],
+    tcp: Address | None,
     ground_lockstep: Address | None,
     vehicle: str,
     settings: tuple[tuple[str, float], ...],
@@ -471,10 +454,14 @@ def main(
         options = Options(place, boot, clock_waits=in_step, log=True)
 
         def build(stored: StoredMission | None) -> Onboard:
-            return Onboard(table, Identity(), options, stored, kept.card, kept.load_signing())
+            return Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())
 
-        stations = [address for address in (*gcs, api) if address is not None]
-        ground = GroundInStep(ground_lockstep) if ground_lockstep else GroundStations(tuple(stations))
+        stations = [address for address in (*gcs, *api) if address is not None]
+        ground: GroundStations | GroundInStep
+        if ground_lockstep:
+            ground = GroundInStep(ground_lockstep)
+        else:
+            ground = GroundStations(tuple(stations), _listen(tcp) if tcp else None)
         program = Program(build, mission, kept, sim, ground, say)
         areas, troubles = kept.load_areas(place)
         for trouble in troubles:

@@ -254,6 +254,7 @@ def _mode_mission(flight: Flight, request: Any, view: View, settings: Settings) 
 def _offboard(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     if flight.phase == Phase.GUIDED and flight.guide == Guide.OFFBOARD:
         return flight, ACCEPTED
+    # one is enough: MAVSDK asks for the mode right behind its first
     if not flight.offboard.alive(view.now_us, STREAM_US):
         return flight, _later("OFFBOARD denied: send setpoints first, more than two a second")
     if flight.phase in ON_GROUND:

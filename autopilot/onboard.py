@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from autopilot.condition import Condition, battery_constants, follow
 from autopilot.decisions import decide, with_plan
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
@@ -52,7 +53,7 @@ from autopilot.wire.mission_items import WireItem, located_steps, unflown
 from autopilot.wire.parameters import ParameterTable
 from autopilot.wire.signing import Signing
 from autopilot.world_parameters import SIMULATOR_COMPONENT, WorldParameters
-from missions.model import Step
+from missions.model import Step, Waypoint
 from missions.planning import PENDING, Limits, Prepared, prepare
 
 GROUND_WINDOW_US = 20_000
@@ -60,6 +61,7 @@ _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MOST_NAMED = 8  # items in one text
+AT_ONCE_STEPS = 30  # of a mission that is prepared between two ticks on the ground; some 0.4 s
 LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
 
 
@@ -125,6 +127,8 @@ class Onboard:
         self._answer = b""
         self._last: Tick | None = None
         self._gps: HilGps | None = None
+        self._condition = Condition()
+        self._battery = battery_constants(parameters)
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
@@ -199,6 +203,9 @@ class Onboard:
         self._state, report = step(
             self._state, self._history, tick.readings, self._setup, tick.now_us, self.tick, dt
         )
+        self._condition = follow(
+            self._condition, tick, self._state.mixed.forces, self._battery, tick.now_us, dt
+        )
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
@@ -260,6 +267,7 @@ class Onboard:
             return
         self.fault = ""
         self._setup = build_setup(self.parameters, every)
+        self._battery = battery_constants(self.parameters)
         # a mission under way keeps the paths that it began with
         if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
             self._prepare()
@@ -317,6 +325,8 @@ class Onboard:
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self._setup)
+        waypoints = (Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0))
+        Work(waypoints, (0, 1), self._setup.settings.limits).done()
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):
@@ -362,7 +372,8 @@ class Onboard:
         self._prepared_for = limits
         self.work = Work(plan.steps, plan.sequence, limits)
         self._have_prepared(PENDING)
-        if self._options.clock_waits or self._state.flight.phase in ON_GROUND:
+        short = self._state.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
+        if self._options.clock_waits or short:
             self.finish(self.work, self.work.done())
 
     def finish(self, work: Work, prepared: Prepared) -> None:
@@ -381,5 +392,13 @@ class Onboard:
 
     def _snapshot(self) -> Snapshot:
         return make_snapshot(
-            self._state, self._setup, self._options, self.endpoint.mission, self._last, self._gps, self.now_us
+            self._state,
+            self._setup,
+            self._options,
+            self.endpoint.mission,
+            self._condition,
+            self._battery,
+            self._gps,
+            self.parameters["MAV_FAKE_GPS"] == 1.0,
+            self.now_us,
         )

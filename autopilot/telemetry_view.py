@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, nan, sqrt
 
+from autopilot.condition import BatteryConstants, Condition, remaining, sensors, vibration, voltage
 from autopilot.decisions import arming_complaints
 from autopilot.estimation.filter import control_state
 from autopilot.estimation.records import TRACKER
-from autopilot.flight import CARRYING, ON_GROUND, Flight, Guide, Phase, Selected, leg_time_s
+from autopilot.flight import CARRYING, IN_AIR, ON_GROUND, Flight, Guide, Phase, Selected, leg_time_s
 from autopilot.flight_core import FlightState, Setup, view_of
-from autopilot.geometry.linear import ZERO, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.so3 import quat_from_rotation
 from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, asked_jet
-from autopilot.sensor_link import Tick
 from autopilot.services import identity, snapshot
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.snapshot import GpsFix, Snapshot
-from autopilot.wire.convert import ACCEL, GYRO, MAG, PRESSURE, HilGps, Home
+from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
 
 FRESH_S = 0.5  # a tracker is healthy while its last reading is no older
-NOMINAL_VOLTAGE_V = 11.1  # a battery that does not drain is simulated
+_NO_COUNT = 255  # satellites of a fix that no receiver gave
 
 _PHASE_MODES = {
     Phase.TAUTEN: identity.AUTO_TAKEOFF,
@@ -49,6 +49,8 @@ _LANDED_STATES = {
     Phase.LOWER: mavlink.MAV_LANDED_STATE_LANDING,
     Phase.SET_DOWN: mavlink.MAV_LANDED_STATE_LANDING,
 }
+_ALWAYS = snapshot.MOTORS | snapshot.AHRS | snapshot.BATTERY
+_BY_TRACKER = snapshot.GPS | snapshot.MAG | snapshot.BARO
 _ESTIMATING = (
     mavlink.ESTIMATOR_ATTITUDE
     | mavlink.ESTIMATOR_VELOCITY_HORIZ
@@ -113,31 +115,34 @@ def mission_state(flight: Flight, items: int) -> int:
     return mavlink.MISSION_STATE_NOT_STARTED
 
 
-def sensor_bits(tick: Tick | None, state: FlightState, gps: HilGps | None, ready: bool) -> tuple[int, int]:
-    """Sensors present and healthy, as bits of SYS_STATUS."""
-    present = snapshot.MOTORS | snapshot.AHRS | snapshot.BATTERY
-    healthy = present
-    fields = tick.fields_updated if tick else 0
-    for field, bit in (
-        (ACCEL, snapshot.ACCEL),
-        (GYRO, snapshot.GYRO),
-        (MAG, snapshot.MAG),
-        (PRESSURE, snapshot.BARO),
-    ):
-        if fields & field:
-            present |= bit
-            healthy |= bit
+def sensor_bits(
+    condition: Condition, state: FlightState, ready: bool, fake_gps: bool, now_us: int
+) -> tuple[int, int]:
+    """Sensors present and healthy, as bits of SYS_STATUS; a tracker stands in for what it makes needless."""
+    present, healthy = (bits | _ALWAYS for bits in sensors(condition, now_us))
     estimator = state.estimator
     if estimator.vehicle.source == TRACKER:
-        present |= snapshot.TRACKER
+        tracked = snapshot.TRACKER | (_BY_TRACKER & ~present if fake_gps else 0)
+        present |= tracked
         if estimator.vehicle.age_s < FRESH_S and estimator.load.age_s < FRESH_S:
-            healthy |= snapshot.TRACKER
-    if gps is not None:
-        present |= snapshot.GPS
-        healthy |= snapshot.GPS
+            healthy |= tracked
     if ready:
         healthy |= snapshot.PREARM
     return present, healthy
+
+
+def wind(state: FlightState, setup: Setup) -> Vec3:
+    """The wind (m/s) whose drag on a resting vehicle is the push that is felt; NaN where that is unknown."""
+    if state.observed is None:
+        return (nan, nan, nan)
+    push, drag = state.observed.push, setup.drag
+    force = norm(push)
+    if force == 0.0:
+        return push
+    # force = (linear + quadratic speed) speed
+    root = sqrt(drag.linear * drag.linear + 4.0 * drag.quadratic * force)
+    slope = 0.5 * (drag.linear + root)
+    return scale(1.0 / slope, push) if slope > 0.0 else (nan, nan, nan)
 
 
 def make_snapshot(
@@ -145,8 +150,10 @@ def make_snapshot(
     setup: Setup,
     options: Options,
     mission: StoredMission,
-    tick: Tick | None,
+    condition: Condition,
+    battery: BatteryConstants,
     gps: HilGps | None,
+    fake_gps: bool,
     now_us: int,
 ) -> Snapshot:
     """All that telemetry tells of this instant."""
@@ -154,7 +161,13 @@ def make_snapshot(
     control = control_state(estimator)
     view = view_of(estimator, control, setup.settings, now_us)
     ready = not arming_complaints(flight, view, setup.settings)
-    present, healthy = sensor_bits(tick, state, gps, ready)
+    present, healthy = sensor_bits(condition, state, ready, fake_gps, now_us)
+    tracked = estimator.vehicle.source == TRACKER and healthy & snapshot.TRACKER
+    fix = _fix(gps)
+    if fix is None and fake_gps and tracked:
+        accuracy = (estimator.doubt.horizontal, estimator.doubt.vertical)
+        fixed = mavlink.GPS_FIX_TYPE_3D_FIX
+        fix = GpsFix(now_us, fixed, control.x_quad, control.v_quad, *accuracy, _NO_COUNT)
 
     leg = flight.legs[0] if flight.legs else None
     x_d, v_d, a_d, x_quad_d = control.x_load, ZERO, ZERO, (nan, nan, nan)
@@ -230,9 +243,13 @@ def make_snapshot(
         saturated=state.mixed.saturated,
         sensors_present=present,
         sensors_healthy=healthy,
-        gps=_fix(gps),
-        battery_voltage=NOMINAL_VOLTAGE_V,
-        battery_remaining=1.0,
+        gps=fix,
+        vibration=vibration(condition),
+        wind=wind(state, setup) if flight.phase in IN_AIR else (nan, nan, nan),
+        battery_voltage=voltage(condition, battery),
+        battery_current=condition.current,
+        battery_used_mah=condition.used_as / 3.6,
+        battery_remaining=remaining(condition, battery),
         mission_current=seq,
         mission_total=len(mission.items),
         mission_state=mission_state(flight, len(mission.items)),

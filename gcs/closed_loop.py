@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from autopilot.onboard import Onboard
-from autopilot.services.identity import Identity
+from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import load_belief
@@ -42,7 +42,7 @@ def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | N
     table = autopilot_parameters(load_belief(conditions.vehicle))
     apply_settings(table, conditions.settings.items())
     table.freeze()
-    return Onboard(table, Identity(), Options(home, LOCKSTEP_BOOT_UNIX_US), mission)
+    return Onboard(table, identity_of(table), Options(home, LOCKSTEP_BOOT_UNIX_US), mission)
 
 
 def build_simulator(conditions: Conditions, home: Home) -> HilSimulator:

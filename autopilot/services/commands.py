@@ -142,7 +142,7 @@ def _mode_of_number(number: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode_of_number(number)
     if mode is None:
         return _refused(f"Custom mode {number} is unknown to the {context.flavour.name} flavour")
-    return SetMode(mode.main, mode.sub)
+    return SetMode(mode.main, mode.sub, number)
 
 
 def _set_mode(call: Call, context: Context) -> Request | Verdict:
@@ -152,9 +152,17 @@ def _set_mode(call: Call, context: Context) -> Request | Verdict:
         return _refused("Set mode: param1 ... param3 must be whole numbers")
     if not flags & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         return Verdict(UNSUPPORTED, "Set mode: only custom modes are known (param1 must have bit 0)")
-    if number <= _MODE_BYTE:
+    if number <= _MODE_BYTE and context.flavour.modes_are_packed:
         return _mode_of_pair(number, sub, context)
     return _mode_of_number(number, context)
+
+
+def _set_standard_mode(call: Call, context: Context) -> Request | Verdict:
+    standard = _whole(call.p[0])
+    mode = None if standard is None else context.flavour.mode_of_standard(standard)
+    if mode is None:
+        return Verdict(UNSUPPORTED, f"Set mode: no mode flown is standard mode {call.p[0]:g}")
+    return SetMode(mode.main, mode.sub, mode.custom_mode)
 
 
 def _start_mission(call: Call, context: Context) -> Request | Verdict:
@@ -302,6 +310,7 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_NAV_LAND: _plain(Land()),
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _plain(ReturnHome()),
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
+    mavlink.MAV_CMD_DO_SET_STANDARD_MODE: _set_standard_mode,
     mavlink.MAV_CMD_MISSION_START: _start_mission,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: _pause_continue,
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
@@ -322,6 +331,9 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_message_interval,
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_message_interval,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_capabilities,
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _plain(
+        RequestMessage(mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION, 0.0)
+    ),
 }
 
 

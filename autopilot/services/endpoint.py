@@ -19,7 +19,12 @@ from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
 from autopilot.services.ftp import FtpService
 from autopilot.services.guided import GuidedService
-from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT, Identity
+from autopilot.services.identity import (
+    AUTOPILOT_COMPONENT,
+    DIALECT_COMPONENT,
+    Identity,
+    available_modes_messages,
+)
 from autopilot.services.links import LinkState, Outgoing
 from autopilot.services.logs import LogService
 from autopilot.services.made_files import information_message, made_files, metadata_message
@@ -46,13 +51,14 @@ from autopilot.services.requests import (
     RequestCapabilities,
     RequestMessage,
     SetMessageInterval,
+    SetMode,
     StoreParameters,
 )
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
-from autopilot.services.streams import OFF
-from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
+from autopilot.services.streams import DEFAULT, OFF
+from autopilot.services.telemetry import GROUPS, LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
 from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -62,6 +68,7 @@ from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
+_SECOND_US = 1_000_000
 _INT32 = 2**31 - 1
 _UINT16 = 2**16 - 1
 
@@ -109,6 +116,7 @@ class VehicleEndpoint:
             self._table |= LOAD_STREAMS
         self._defaults = {key: stream.interval_us for key, stream in self._table.items()}
         self._watched: dict[int, Any] = {}
+        self._asked_mode: int | None = None
         self._work = False  # something waits in a queue
         self._events: list[Event] = []  # of `poll`, until they are taken
         self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
@@ -139,6 +147,11 @@ class VehicleEndpoint:
         """A link that always gets telemetry, whether or not somebody is heard on it."""
         self._links[link] = self._new_link(True, now_us)
         self._work = True
+
+    def remove_link(self, link: Link) -> None:
+        """The link is no more."""
+        if link in self._links:
+            self._forget(link)
 
     def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
         """Handle what came over `link`; answers leave with the next `poll`. No bytes raise anything."""
@@ -206,7 +219,7 @@ class VehicleEndpoint:
         self._work = False
         taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
         if any(taken.values()) or any(state.announced for state in self._links.values()):
-            snapshot = make_snapshot()
+            snapshot = make_snapshot()._replace(asked_mode=self._asked_mode)
             self._watch(snapshot)
         datagrams: list[tuple[Link, bytes]] = []
         built: dict[int, list[Outgoing]] = {}
@@ -334,6 +347,8 @@ class VehicleEndpoint:
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
+                if isinstance(request, SetMode):
+                    self._asked_mode = request.number
                 self.state_changed()
             return verdict
 
@@ -347,6 +362,13 @@ class VehicleEndpoint:
         where = _METADATA.get(message_id)
         if where is not None:
             state.queue.append(where(self.identity, self._parameters.table, now_us))
+            return _ACCEPTED
+        if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
+            modes = available_modes_messages(self.identity)
+            if not 0.0 <= argument <= len(modes):
+                return Verdict(mavlink.MAV_RESULT_DENIED)
+            which = int(argument)  # 0: all
+            state.queue += modes[which - 1 : which] if which else modes
             return _ACCEPTED
         if message_id not in STREAMS:
             return _UNSUPPORTED
@@ -371,6 +393,15 @@ class VehicleEndpoint:
         state.streams.set_interval(message_id, interval_us, now_us)
         return _ACCEPTED
 
+    def _request_data_stream(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """REQUEST_DATA_STREAM: the rate of a group on the link of the asker; stop: the default rates."""
+        state = self._links[peer.link]
+        rate_hz = message.req_message_rate if message.start_stop else 0
+        interval_us = _SECOND_US // rate_hz if rate_hz else DEFAULT
+        for message_id in GROUPS.get(message.req_stream_id, ()):
+            state.streams.set_interval(message_id, interval_us, now_us)
+        return []
+
     def _handler_table(self) -> dict[int, Handler]:
         """What is done about each message; all others are for somebody else."""
         commands, missions, parameters = self._commands, self._missions, self._parameters
@@ -381,6 +412,7 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
+            m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: guided.receive_local,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,
             m.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: guided.receive_attitude,

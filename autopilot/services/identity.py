@@ -1,15 +1,17 @@
 """Who the vehicle says it is: one table per flavour, so that the tools in the field know its modes.
 
-Inside, a mode is PX4's pair (main, sub); a flavour says under which number it travels. A flavour is a promise
+Inside, a mode is PX4's pair (main, sub); a flavour says under which number it travels. Where several numbers
+of a flavour mean one pair, the one that was asked for is reported, else the first. A flavour is a promise
 about protocol habits (how modes are packed, what a take-off height means), not about whose code flies.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameters import ParameterTable
 
 AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 DIALECT_COMPONENT = mavlink.MAV_COMP_ID_USER1
@@ -28,6 +30,28 @@ _MANUAL_FLAGS = _CUSTOM | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED | mavlink.MAV_
 MANUAL, ALTCTL, POSCTL, AUTO, ACRO, OFFBOARD, STABILIZED = 1, 2, 3, 4, 5, 6, 7
 AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = 2, 3, 4, 5, 6
 
+_AUTOMATIC = 4  # MAV_MODE_PROPERTY_AUTO_MODE
+
+# What the supervisor flies; the other names are known and refused
+FLOWN = (
+    (AUTO, AUTO_TAKEOFF),
+    (AUTO, AUTO_LOITER),
+    (AUTO, AUTO_MISSION),
+    (AUTO, AUTO_RTL),
+    (AUTO, AUTO_LAND),
+    (OFFBOARD, 0),
+    (POSCTL, 0),
+)
+# MAV_STANDARD_MODE of a pair, and its name for people
+_STANDARD = {
+    (AUTO, AUTO_TAKEOFF): mavlink.MAV_STANDARD_MODE_TAKEOFF,
+    (AUTO, AUTO_MISSION): mavlink.MAV_STANDARD_MODE_MISSION,
+    (AUTO, AUTO_RTL): mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY,
+    (AUTO, AUTO_LAND): mavlink.MAV_STANDARD_MODE_LAND,
+    (ALTCTL, 0): mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD,
+    (POSCTL, 0): mavlink.MAV_STANDARD_MODE_POSITION_HOLD,
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Mode:
@@ -39,10 +63,24 @@ class Mode:
     custom_mode: int
     base_mode: int
 
+    @property
+    def pair(self) -> tuple[int, int]:
+        """PX4's pair."""
+        return self.main, self.sub
+
+    @property
+    def standard(self) -> int:
+        """MAV_STANDARD_MODE; NON_STANDARD for most."""
+        return _STANDARD.get(self.pair, mavlink.MAV_STANDARD_MODE_NON_STANDARD)
+
 
 def _px4(main: int, sub: int, name: str) -> Mode:
     flags = _AUTO_FLAGS if main in (AUTO, OFFBOARD) else _MANUAL_FLAGS
     return Mode(main, sub, name, sub << 24 | main << 16, flags)
+
+
+def _ardupilot(custom_mode: int, name: str, main: int, sub: int = 0) -> Mode:
+    return Mode(main, sub, name, custom_mode, _AUTO_FLAGS if main in (AUTO, OFFBOARD) else _MANUAL_FLAGS)
 
 
 @dataclass(frozen=True)
@@ -59,26 +97,66 @@ class Flavour:
 
     @cached_property
     def _by_pair(self) -> dict[tuple[int, int], Mode]:
-        return {(mode.main, mode.sub): mode for mode in self.modes}
+        return {mode.pair: mode for mode in reversed(self.modes)}
 
     @cached_property
     def _by_number(self) -> dict[int, Mode]:
-        return {mode.custom_mode: mode for mode in self.modes}
+        return {mode.custom_mode: mode for mode in reversed(self.modes)}
 
-    def mode(self, main: int, sub: int) -> Mode | None:
-        """The mode of PX4's pair; AUTO without a sub-mode is AUTO.MISSION, as PX4 has it."""
+    @property
+    def modes_are_packed(self) -> bool:
+        """A mode's number is PX4's pair."""
+        return all(mode.custom_mode == mode.sub << 24 | mode.main << 16 for mode in self.modes)
+
+    @cached_property
+    def flown(self) -> tuple[Mode, ...]:
+        """The modes that can be entered, each number once."""
+        return tuple(
+            mode for mode in self.modes if mode.pair in FLOWN and self._by_number[mode.custom_mode] is mode
+        )
+
+    def mode(self, main: int, sub: int, asked: int | None = None) -> Mode | None:
+        """The mode of PX4's pair, under the number `asked` where that means the pair.
+
+        AUTO without a sub-mode is AUTO.MISSION, as PX4 has it.
+        """
         if (main, sub) == (AUTO, 0):
             sub = AUTO_MISSION
+        for mode in self.modes:
+            if mode.custom_mode == asked and mode.pair == (main, sub):
+                return mode
         return self._by_pair.get((main, sub))
 
     def mode_of_number(self, custom_mode: int) -> Mode | None:
         """The mode with this number on the wire."""
         return self._by_number.get(custom_mode)
 
+    def mode_of_standard(self, standard: int) -> Mode | None:
+        """The mode that can be flown of this MAV_STANDARD_MODE."""
+        return next((mode for mode in self.flown if mode.standard == standard != 0), None)
+
+
+_CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+)
+_BYTEWISE = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+_CAST = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+_QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
 
 PX4 = Flavour(
     name="px4",
-    vehicle_type=mavlink.MAV_TYPE_QUADROTOR,
+    vehicle_type=_QUADROTOR,
     autopilot=mavlink.MAV_AUTOPILOT_PX4,
     modes=(
         _px4(MANUAL, 0, "MANUAL"),
@@ -94,25 +172,44 @@ PX4 = Flavour(
         _px4(STABILIZED, 0, "STABILIZED"),
     ),
     takeoff_above_home=False,
-    capabilities=(
-        mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
-        | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
-        | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-        | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-        | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-        | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
-        | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
-        | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
-        | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-        | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-        | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
-        | mavlink.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
-        | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    ),
+    capabilities=_CAPABILITIES | _BYTEWISE,
     release=(1, 15, 0),
 )
 
-FLAVOURS = {flavour.name: flavour for flavour in (PX4,)}
+ARDUPILOT = Flavour(
+    name="ardupilot",
+    vehicle_type=_QUADROTOR,
+    autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
+    modes=(
+        # GUIDED is where take-off, "go there" and holding happen; in a request it means holding
+        _ardupilot(4, "GUIDED", AUTO, AUTO_LOITER),
+        _ardupilot(5, "LOITER", AUTO, AUTO_LOITER),
+        _ardupilot(17, "BRAKE", AUTO, AUTO_LOITER),
+        _ardupilot(3, "AUTO", AUTO, AUTO_MISSION),
+        _ardupilot(6, "RTL", AUTO, AUTO_RTL),
+        _ardupilot(9, "LAND", AUTO, AUTO_LAND),
+        _ardupilot(4, "GUIDED", AUTO, AUTO_TAKEOFF),
+        _ardupilot(4, "GUIDED", OFFBOARD),
+        _ardupilot(0, "STABILIZE", STABILIZED),
+        _ardupilot(0, "STABILIZE", MANUAL),
+        _ardupilot(1, "ACRO", ACRO),
+        _ardupilot(2, "ALT_HOLD", ALTCTL),
+        _ardupilot(16, "POSHOLD", POSCTL),
+    ),
+    takeoff_above_home=True,
+    capabilities=_CAPABILITIES | _CAST,
+    release=(4, 5, 0),
+)
+
+GENERIC = replace(
+    PX4,
+    name="generic",
+    autopilot=mavlink.MAV_AUTOPILOT_GENERIC,
+    takeoff_above_home=True,
+    capabilities=_CAPABILITIES | _CAST,
+)
+
+FLAVOURS = {flavour.name: flavour for flavour in (PX4, ARDUPILOT, GENERIC)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +220,35 @@ class Identity:
     flavour: Flavour = PX4
     version: tuple[int, int, int] = (0, 1, 0)  # of this program
     load_system: int = 0
+
+
+def identity_of(table: ParameterTable) -> Identity:
+    """The identity that the parameters ask for; a load under the vehicle's own id is no system of its own."""
+    system, load = int(table["MAV_SYS_ID"]), int(table["MAV_LOAD_SYS_ID"])
+    flavour = tuple(FLAVOURS.values())[int(table["MAV_IDENTITY"])]
+    return Identity(system, flavour, load_system=0 if load == system else load)
+
+
+def available_modes_messages(identity: Identity) -> tuple[mavlink.MAVLink_available_modes_message, ...]:
+    """AVAILABLE_MODES for each mode that can be flown."""
+    modes = identity.flavour.flown
+    return tuple(
+        mavlink.MAVLink_available_modes_message(
+            number_modes=len(modes),
+            mode_index=i,
+            standard_mode=mode.standard,
+            custom_mode=mode.custom_mode,
+            properties=_AUTOMATIC if mode.main == AUTO else 0,
+            mode_name=mode.name.capitalize().encode(),
+        )
+        for i, mode in enumerate(modes, 1)
+    )
+
+
+def protocol_version_message() -> mavlink.MAVLink_protocol_version_message:
+    """PROTOCOL_VERSION: MAVLink 2 is spoken, MAVLink 1 understood."""
+    nothing = (0,) * 8
+    return mavlink.MAVLink_protocol_version_message(200, 100, 200, nothing, nothing)
 
 
 def _version_word(version: tuple[int, int, int]) -> int:

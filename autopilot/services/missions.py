@@ -24,9 +24,9 @@ from typing import Any
 
 from autopilot.services.mission_store import MAX_ITEMS, StoredMission
 from autopilot.services.records import Announce, AreasChanged, Decide, MissionChanged, Output, Peer, Say, Send
-from autopilot.services.requests import ReplaceMission
+from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
-from autopilot.wire.convert import Home
+from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import LocatedStep, MissionItemError, WireItem, located_steps
@@ -48,6 +48,9 @@ _READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
 }
 
 _NO_INT = 2**31 - 1
+_GUIDED_ITEM = 2  # MISSION_ITEM.current of a place to go to at once
+_ABOVE_HOME_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+_GLOBAL_FRAMES = (*_ABOVE_HOME_FRAMES, mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _LOCAL_FRAMES = (
     mavlink.MAV_FRAME_LOCAL_NED,
     mavlink.MAV_FRAME_LOCAL_ENU,
@@ -156,10 +159,13 @@ class MissionService:
         decide: Decide,
     ) -> list[Output]:
         upload = self._upload
-        if upload is not None and upload.peer == peer and message.mission_type != upload.kind:
-            return []
         if upload is None or upload.peer != peer:
+            alone = message.mission_type == _MISSION and message.current == _GUIDED_ITEM
+            if alone and item is not None:
+                return self._go_there(item, peer, decide)
             return self._late_item(message, peer, now_us)
+        if message.mission_type != upload.kind:
+            return []
         expected = len(upload.items)
         if message.seq < expected:
             return []
@@ -177,6 +183,18 @@ class MissionService:
         if len(upload.items) < upload.count:
             return [self._ask()]
         return self._complete(upload, now_us, decide)
+
+    def _go_there(self, item: WireItem, peer: Peer, decide: Decide) -> list[Output]:
+        """A single waypoint outside any upload: ArduPilot's way to say "go there"."""
+        if item.command != mavlink.MAV_CMD_NAV_WAYPOINT or item.frame not in _GLOBAL_FRAMES:
+            return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED)]
+        east, north, _ = enu_from_geodetic(item.x, item.y, 0, self.home)
+        up = item.z if item.frame in _ABOVE_HOME_FRAMES else item.z - self.home.altitude_m
+        verdict = decide(Reposition(east, north, up, True))
+        if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
+            return [_ack(peer, _ACCEPTED)]
+        said: list[Output] = [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
+        return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED)]
 
     def _complete(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
         """All items are here: check them as a whole, and only then replace the mission."""

@@ -5,7 +5,7 @@ The first group is decided by the supervisor, the second is answered by the endp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.mission_items import LocatedStep
@@ -42,6 +42,7 @@ class SetMode:
 
     main: int
     sub: int
+    number: int | None = field(default=None, compare=False)  # under which it was asked for
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,6 +56,7 @@ class Snapshot(NamedTuple):
     sub_mode: int
     landed_state: int  # MAV_LANDED_STATE
     system_status: int  # MAV_STATE
+    asked_mode: int | None = None  # custom mode that was asked for by its number
 
     launch: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
 
@@ -121,7 +122,11 @@ class Snapshot(NamedTuple):
     sensors_present: int = 0  # the bits above
     sensors_healthy: int = 0
     gps: GpsFix | None = None
+    vibration: Vec3 = ZERO  # m/s^2, body
+    wind: Vec3 = _UNKNOWN  # m/s, where to
     battery_voltage: float = math.nan  # V
+    battery_current: float = math.nan  # A
+    battery_used_mah: float = math.nan
     battery_remaining: float = math.nan  # 0 ... 1
 
     # mission

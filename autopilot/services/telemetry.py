@@ -20,6 +20,7 @@ from autopilot.services.identity import (
     LOAD_COMPONENT,
     Identity,
     autopilot_version_message,
+    protocol_version_message,
 )
 from autopilot.services.snapshot import PREARM, Snapshot
 from autopilot.services.streams import OFF
@@ -67,7 +68,7 @@ def _heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    # There is no fence, so none is breached: some tools read a missing health bit as a breach
+    # some tools read a missing health bit as a breach
     health = s.sensors_healthy | (0 if s.breach else mavlink.MAV_SYS_STATUS_GEOFENCE)
     present = s.sensors_present | PREARM
     return (
@@ -77,7 +78,7 @@ def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
             onboard_control_sensors_health=health,
             load=0,
             voltage_battery=_battery_mv(s),
-            current_battery=-1,
+            current_battery=_battery_ca(s),
             battery_remaining=_battery_percent(s),
             drop_rate_comm=0,
             errors_comm=0,
@@ -99,6 +100,16 @@ def _battery_percent(s: Snapshot) -> int:
     return -1 if math.isnan(s.battery_remaining) else saturated(s.battery_remaining * 100.0, 0, 100)
 
 
+def _battery_ca(s: Snapshot) -> int:
+    """cA"""
+    return -1 if math.isnan(s.battery_current) else saturated(s.battery_current * 100.0, 0, _INT16)
+
+
+def _battery_used(s: Snapshot) -> int:
+    """mAh"""
+    return -1 if math.isnan(s.battery_used_mah) else saturated(s.battery_used_mah, 0, 2**31 - 1)
+
+
 def _battery_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     return (
         mavlink.MAVLink_battery_status_message(
@@ -107,8 +118,8 @@ def _battery_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
             type=mavlink.MAV_BATTERY_TYPE_LIPO,
             temperature=_INT16,
             voltages=(_battery_mv(s), *(_UINT16,) * 9),
-            current_battery=-1,
-            current_consumed=-1,
+            current_battery=_battery_ca(s),
+            current_consumed=_battery_used(s),
             energy_consumed=-1,
             battery_remaining=_battery_percent(s),
         ),
@@ -192,6 +203,41 @@ def _estimator_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     return (mavlink.MAVLink_estimator_status_message(s.now_us, s.estimator_flags, *ratios, *accuracy),)
 
 
+def _ekf_status_report(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    flags = s.estimator_flags & _UINT16
+    return (mavlink.MAVLink_ekf_status_report_message(flags, *(0.0,) * 5),)  # no tests of innovations
+
+
+def _vibration(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (mavlink.MAVLink_vibration_message(s.now_us, *s.vibration, 0, 0, 0),)
+
+
+def _wind_cov(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    if math.isnan(s.wind[0]):
+        return ()
+    height, unknown = s.home.altitude_m + s.x_quad[2], math.nan
+    return (
+        mavlink.MAVLink_wind_cov_message(
+            s.now_us, *ned_from_enu(s.wind), *(unknown,) * 2, height, *(unknown,) * 2
+        ),
+    )
+
+
+def _current_mode(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    mode = identity.flavour.mode(s.main_mode, s.sub_mode, s.asked_mode)
+    if mode is None:
+        return ()
+    return (mavlink.MAVLink_current_mode_message(mode.standard, mode.custom_mode, mode.custom_mode),)
+
+
+def _available_modes_monitor(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (mavlink.MAVLink_available_modes_monitor_message(0),)
+
+
+def _protocol_version(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (protocol_version_message(),)
+
+
 def _position_target_local_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     if math.isnan(s.x_quad_d[0]):
         return ()
@@ -223,8 +269,10 @@ def _debug_vect(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    swing = math.degrees(math.acos(max(-1.0, min(1.0, -s.q_cable[2]))))
     values = (
         (b"TENSION", s.tension),
+        (b"SWING", swing),
         (b"LOAD_ERR", math.hypot(*s.e_x)),
         (b"PSI_R", s.psi_R),
         (b"PSI_Q", s.psi_q),
@@ -306,6 +354,9 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(_AUTOPILOT, _rate(1), _mission_current),
     mavlink.MAVLINK_MSG_ID_FENCE_STATUS: Stream(_AUTOPILOT, _rate(1), _fence_status),
     mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: Stream(_AUTOPILOT, _rate(1), _estimator_status),
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(_AUTOPILOT, _rate(1), _ekf_status_report),
+    mavlink.MAVLINK_MSG_ID_VIBRATION: Stream(_AUTOPILOT, _rate(1), _vibration),
+    mavlink.MAVLINK_MSG_ID_WIND_COV: Stream(_AUTOPILOT, _rate(1), _wind_cov),
     mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(_AUTOPILOT, _rate(25), _attitude),
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(_AUTOPILOT, _rate(25), _attitude_quaternion),
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(_AUTOPILOT, _rate(20), _local_position_ned),
@@ -322,11 +373,44 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_WINCH_STATUS: Stream(_AUTOPILOT, _rate(2), _winch_status),
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: Stream(_AUTOPILOT, OFF, _autopilot_version),
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(_AUTOPILOT, OFF, _gps_global_origin),
+    mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION: Stream(_AUTOPILOT, OFF, _protocol_version),
+    # not streamed: tools that do not know them would count them as lost
+    mavlink.MAVLINK_MSG_ID_CURRENT_MODE: Stream(_AUTOPILOT, OFF, _current_mode),
+    mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(_AUTOPILOT, OFF, _available_modes_monitor),
     mavlink.MAVLINK_MSG_ID_LOAD_STATE: Stream(_DIALECT, _rate(20), _load_state),
     mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: Stream(_DIALECT, _rate(20), _load_setpoint),
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: Stream(_DIALECT, _rate(20), _cascade_errors),
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _rate(20), _rotor_state),
 }
+
+_GROUPED: dict[int, tuple[int, ...]] = {
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+    ),
+    mavlink.MAV_DATA_STREAM_RAW_CONTROLLER: (
+        mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+        mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+    ),
+    mavlink.MAV_DATA_STREAM_RC_CHANNELS: (mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,),
+    mavlink.MAV_DATA_STREAM_POSITION: (
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    ),
+    mavlink.MAV_DATA_STREAM_EXTRA1: (
+        mavlink.MAVLINK_MSG_ID_ATTITUDE,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    ),
+    mavlink.MAV_DATA_STREAM_EXTRA2: (mavlink.MAVLINK_MSG_ID_VFR_HUD, mavlink.MAVLINK_MSG_ID_ALTITUDE),
+    mavlink.MAV_DATA_STREAM_EXTRA3: (
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+        mavlink.MAVLINK_MSG_ID_VIBRATION,
+    ),
+}
+# What REQUEST_DATA_STREAM means by its groups
+GROUPS = _GROUPED | {mavlink.MAV_DATA_STREAM_ALL: tuple(sum(_GROUPED.values(), ()))}
 
 # The load as a MAVLink system of its own. The keys stand beside those above: a message id has 24 bits.
 LOAD_SYSTEM = 1 << 24

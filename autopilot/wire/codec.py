@@ -179,6 +179,20 @@ def announced_length(data: bytes, start: int) -> int:
     return _HEADER_V2 + data[start + 1] + _CRC + (_SIGNATURE if data[start + 2] & _SIGNED else 0)
 
 
+def whole_frames(stream: bytes) -> int:
+    """How much of a byte stream can be decoded; what is behind may be the begin of a frame."""
+    start = 0
+    while start < len(stream):
+        if stream[start] not in MAGICS:
+            start += 1
+            continue
+        length = announced_length(stream, start)
+        if not length or start + length > len(stream):
+            break
+        start += length
+    return start
+
+
 # bytes of header, payload and signature; incompatibility flags, sequence, system, component, message id
 _Header = tuple[int, int, int, int, int, int, int, int]
 

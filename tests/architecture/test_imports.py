@@ -53,7 +53,13 @@ TOP: dict[str, tuple[str, ...]] = {
         "gcs.closed_loop",
         "gcs.sweep",
     ),
-    "autopilot.onboard": ("autopilot.__main__", "gcs.closed_loop", "gcs.sweep"),
+    "autopilot.onboard": (
+        "autopilot.__main__",
+        "autopilot.aside",
+        "autopilot.tcp_server",
+        "gcs.closed_loop",
+        "gcs.sweep",
+    ),
     "gcs.closed_loop": ("gcs",),
 }
 
@@ -61,6 +67,8 @@ WORLD = {"socket", "selectors", "time", "random", "logging", "threading", "async
 SHELLS = (
     "autopilot.__main__",
     "sitl.__main__",
+    "autopilot.aside",
+    "autopilot.tcp_server",
     "autopilot.wire.shell",  # what these two have in common
     "gcs.__main__",
     "gcs.commands",

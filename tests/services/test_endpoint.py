@@ -34,14 +34,14 @@ def test_a_configured_link_hears_from_the_first_tick(rig):
 
 
 def test_default_rates_over_ten_seconds(rig):
-    rig.changes = {"x_quad_d": (0.0, 0.0, 1.0)}
+    rig.changes = {"x_quad_d": (0.0, 0.0, 1.0), "wind": (1.0, 0.0, 0.0)}
     rig.run(1_000_000 - 4000)  # up to the tick before a whole second: each multiple is counted once
     rig.poll()
     counts: dict[int, int] = {}
     for received in rig.run(10_000_000):
         key = received.message.get_msgId()
         counts[key] = counts.get(key, 0) + 1
-    per_poll = {m.MAVLINK_MSG_ID_DEBUG_VECT: 4, m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: 4}
+    per_poll = {m.MAVLINK_MSG_ID_DEBUG_VECT: 4, m.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: 5}
     for message_id, stream in STREAMS.items():
         expected = 0 if stream.interval_us == OFF else 10_000_000 // stream.interval_us
         assert counts.get(message_id, 0) == expected * per_poll.get(message_id, 1), message_id

@@ -5,8 +5,23 @@ from __future__ import annotations
 import pytest
 from pymavlink import mavutil
 
+from autopilot import decisions
 from autopilot.services.heartbeat import heartbeat_message, load_heartbeat_message
-from autopilot.services.identity import AUTO, FLAVOURS, PX4, Identity, autopilot_version_message
+from autopilot.services.identity import (
+    ARDUPILOT,
+    AUTO,
+    AUTO_TAKEOFF,
+    FLAVOURS,
+    FLOWN,
+    OFFBOARD,
+    PX4,
+    Identity,
+    autopilot_version_message,
+    available_modes_messages,
+    identity_of,
+)
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink
 
 
@@ -19,11 +34,51 @@ def test_pymavlink_names_every_px4_mode_as_the_table_does(mode, snap):
 
 @pytest.mark.parametrize("flavour", FLAVOURS.values(), ids=lambda flavour: flavour.name)
 def test_modes_of_a_flavour_can_be_told_apart(flavour):
-    assert len({mode.custom_mode for mode in flavour.modes}) == len(flavour.modes)
-    assert len({(mode.main, mode.sub) for mode in flavour.modes}) == len(flavour.modes)
+    assert len({(mode.custom_mode, mode.pair) for mode in flavour.modes}) == len(flavour.modes)
     for mode in flavour.modes:
-        assert flavour.mode(mode.main, mode.sub) is mode
-        assert flavour.mode_of_number(mode.custom_mode) is mode
+        assert flavour.mode(*mode.pair, mode.custom_mode) is mode
+        shown = flavour.mode(*mode.pair)
+        assert shown is not None
+        assert shown.pair == mode.pair
+        meant = flavour.mode_of_number(mode.custom_mode)
+        assert meant is not None
+        assert meant.name == mode.name
+
+
+@pytest.mark.parametrize("mode", ARDUPILOT.modes, ids=lambda mode: f"{mode.name}-{mode.pair}")
+def test_pymavlink_names_every_ardupilot_mode_as_the_table_does(mode):
+    assert mavutil.mode_mapping_acm[mode.custom_mode] == mode.name
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS.values(), ids=lambda flavour: flavour.name)
+def test_the_modes_told_are_those_that_are_flown(flavour):
+    told = available_modes_messages(Identity(flavour=flavour))
+    assert [one.mode_index for one in told] == list(range(1, len(told) + 1))
+    assert {one.number_modes for one in told} == {len(told)}
+    pairs = set()
+    for one in told:
+        mode = flavour.mode_of_number(one.custom_mode)
+        assert mode is not None
+        pairs.add(mode.pair)
+    # take-off has no number of its own with ArduPilot, and OFFBOARD is GUIDED
+    hidden = {(AUTO, AUTO_TAKEOFF), (OFFBOARD, 0)} if flavour is ARDUPILOT else set()
+    assert pairs == set(FLOWN) - hidden
+
+
+def test_what_is_called_flown_is_what_the_supervisor_flies():
+    assert set(FLOWN) == set(decisions._MODES)
+
+
+def test_the_parameters_choose_the_identity():
+    table = autopilot_parameters(load_belief("bebop"))
+    for number, name in enumerate(("px4", "ardupilot", "generic")):
+        table.set("MAV_IDENTITY", number)
+        assert identity_of(table).flavour is FLAVOURS[name]
+    table.set("MAV_SYS_ID", 7)
+    table.set("MAV_LOAD_SYS_ID", 8)
+    assert (identity_of(table).system, identity_of(table).load_system) == (7, 8)
+    table.set("MAV_LOAD_SYS_ID", 7)
+    assert identity_of(table).load_system == 0
 
 
 def test_auto_without_a_sub_mode_is_the_mission_mode():

@@ -6657,8 +6657,13 @@ MAVLINK_MSG_ID_OPEN_DRONE_ID_MESSAGE_PACK = 12915
 MAVLINK_MSG_ID_OPEN_DRONE_ID_ARM_STATUS = 12918
 MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM_UPDATE = 12919
 MAVLINK_MSG_ID_HYGROMETER_SENSOR = 12920
+MAVLINK_MSG_ID_EKF_STATUS_REPORT = 193
 MAVLINK_MSG_ID_COMPONENT_INFORMATION = 395
 MAVLINK_MSG_ID_COMPONENT_METADATA = 397
+MAVLINK_MSG_ID_PROTOCOL_VERSION = 300
+MAVLINK_MSG_ID_AVAILABLE_MODES = 435
+MAVLINK_MSG_ID_CURRENT_MODE = 436
+MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR = 437
 MAVLINK_MSG_ID_GLOBAL_POSITION_INT = 33
 MAVLINK_MSG_ID_AUTOPILOT_VERSION = 148
 MAVLINK_MSG_ID_HEARTBEAT = 0
@@ -16979,6 +16984,50 @@ class MAVLink_hygrometer_sensor_message(MAVLink_message):
 setattr(MAVLink_hygrometer_sensor_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_ekf_status_report_message(MAVLink_message):
+    """
+    Health of the estimator, as ArduPilot says it; DroneKit waits for
+    it before arming.
+    """
+
+    id = MAVLINK_MSG_ID_EKF_STATUS_REPORT
+    msgname = "EKF_STATUS_REPORT"
+    fieldnames = ["flags", "velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance", "terrain_alt_variance"]
+    ordered_fieldnames = ["velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance", "terrain_alt_variance", "flags"]
+    fieldtypes = ["uint16_t", "float", "float", "float", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<fffffH")
+    orders = [5, 0, 1, 2, 3, 4]
+    lengths = [1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0]
+    crc_extra = 71
+    unpacker = struct.Struct("<fffffH")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, flags: int, velocity_variance: float, pos_horiz_variance: float, pos_vert_variance: float, compass_variance: float, terrain_alt_variance: float):
+        MAVLink_message.__init__(self, MAVLink_ekf_status_report_message.id, MAVLink_ekf_status_report_message.msgname)
+        self._fieldnames = MAVLink_ekf_status_report_message.fieldnames
+        self._instance_field = MAVLink_ekf_status_report_message.instance_field
+        self._instance_offset = MAVLink_ekf_status_report_message.instance_offset
+        self.flags = flags
+        self.velocity_variance = velocity_variance
+        self.pos_horiz_variance = pos_horiz_variance
+        self.pos_vert_variance = pos_vert_variance
+        self.compass_variance = compass_variance
+        self.terrain_alt_variance = terrain_alt_variance
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.velocity_variance, self.pos_horiz_variance, self.pos_vert_variance, self.compass_variance, self.terrain_alt_variance, self.flags), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_ekf_status_report_message, "name", mavlink_msg_deprecated_name_property())
+
+
 class MAVLink_component_information_message(MAVLink_message):
     """
     Where the general metadata file is; superseded by
@@ -17063,6 +17112,172 @@ class MAVLink_component_metadata_message(MAVLink_message):
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
 setattr(MAVLink_component_metadata_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_protocol_version_message(MAVLink_message):
+    """
+    Which MAVLink versions are spoken.
+    """
+
+    id = MAVLINK_MSG_ID_PROTOCOL_VERSION
+    msgname = "PROTOCOL_VERSION"
+    fieldnames = ["version", "min_version", "max_version", "spec_version_hash", "library_version_hash"]
+    ordered_fieldnames = ["version", "min_version", "max_version", "spec_version_hash", "library_version_hash"]
+    fieldtypes = ["uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<HHHBB")
+    orders = [0, 1, 2, 3, 4]
+    lengths = [1, 1, 1, 8, 8]
+    array_lengths = [0, 0, 0, 8, 8]
+    crc_extra = 217
+    unpacker = struct.Struct("<HHH8B8B")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, version: int, min_version: int, max_version: int, spec_version_hash: Sequence[int], library_version_hash: Sequence[int]):
+        MAVLink_message.__init__(self, MAVLink_protocol_version_message.id, MAVLink_protocol_version_message.msgname)
+        self._fieldnames = MAVLink_protocol_version_message.fieldnames
+        self._instance_field = MAVLink_protocol_version_message.instance_field
+        self._instance_offset = MAVLink_protocol_version_message.instance_offset
+        self.version = version
+        self.min_version = min_version
+        self.max_version = max_version
+        self.spec_version_hash = spec_version_hash
+        self.library_version_hash = library_version_hash
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.version, self.min_version, self.max_version, self.spec_version_hash[0], self.spec_version_hash[1], self.spec_version_hash[2], self.spec_version_hash[3], self.spec_version_hash[4], self.spec_version_hash[5], self.spec_version_hash[6], self.spec_version_hash[7], self.library_version_hash[0], self.library_version_hash[1], self.library_version_hash[2], self.library_version_hash[3], self.library_version_hash[4], self.library_version_hash[5], self.library_version_hash[6], self.library_version_hash[7]), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_protocol_version_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_available_modes_message(MAVLink_message):
+    """
+    One of the modes that can be flown; asked for by
+    MAV_CMD_REQUEST_MESSAGE.
+    """
+
+    id = MAVLINK_MSG_ID_AVAILABLE_MODES
+    msgname = "AVAILABLE_MODES"
+    fieldnames = ["number_modes", "mode_index", "standard_mode", "custom_mode", "properties", "mode_name"]
+    ordered_fieldnames = ["custom_mode", "properties", "number_modes", "mode_index", "standard_mode", "mode_name"]
+    fieldtypes = ["uint8_t", "uint8_t", "uint8_t", "uint32_t", "uint32_t", "char"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {"standard_mode": "MAV_STANDARD_MODE"}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<IIBBBc")
+    orders = [2, 3, 4, 0, 1, 5]
+    lengths = [1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 35]
+    crc_extra = 134
+    unpacker = struct.Struct("<IIBBB35s")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, number_modes: int, mode_index: int, standard_mode: int, custom_mode: int, properties: int, mode_name: bytes):
+        MAVLink_message.__init__(self, MAVLink_available_modes_message.id, MAVLink_available_modes_message.msgname)
+        self._fieldnames = MAVLink_available_modes_message.fieldnames
+        self._instance_field = MAVLink_available_modes_message.instance_field
+        self._instance_offset = MAVLink_available_modes_message.instance_offset
+        self.number_modes = number_modes
+        self.mode_index = mode_index
+        self.standard_mode = standard_mode
+        self.custom_mode = custom_mode
+        self.properties = properties
+        self._mode_name_raw = mode_name
+        self.mode_name = mode_name.split(b"\x00", 1)[0].decode("ascii", errors="replace")
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.custom_mode, self.properties, self.number_modes, self.mode_index, self.standard_mode, self._mode_name_raw), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_available_modes_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_current_mode_message(MAVLink_message):
+    """
+    The mode in force.
+    """
+
+    id = MAVLINK_MSG_ID_CURRENT_MODE
+    msgname = "CURRENT_MODE"
+    fieldnames = ["standard_mode", "custom_mode", "intended_custom_mode"]
+    ordered_fieldnames = ["custom_mode", "intended_custom_mode", "standard_mode"]
+    fieldtypes = ["uint8_t", "uint32_t", "uint32_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {"standard_mode": "MAV_STANDARD_MODE"}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<IIB")
+    orders = [2, 0, 1]
+    lengths = [1, 1, 1]
+    array_lengths = [0, 0, 0]
+    crc_extra = 193
+    unpacker = struct.Struct("<IIB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, standard_mode: int, custom_mode: int, intended_custom_mode: int):
+        MAVLink_message.__init__(self, MAVLink_current_mode_message.id, MAVLink_current_mode_message.msgname)
+        self._fieldnames = MAVLink_current_mode_message.fieldnames
+        self._instance_field = MAVLink_current_mode_message.instance_field
+        self._instance_offset = MAVLink_current_mode_message.instance_offset
+        self.standard_mode = standard_mode
+        self.custom_mode = custom_mode
+        self.intended_custom_mode = intended_custom_mode
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.custom_mode, self.intended_custom_mode, self.standard_mode), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_current_mode_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_available_modes_monitor_message(MAVLink_message):
+    """
+    Says by another number that AVAILABLE_MODES are to be asked for
+    again.
+    """
+
+    id = MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR
+    msgname = "AVAILABLE_MODES_MONITOR"
+    fieldnames = ["seq"]
+    ordered_fieldnames = ["seq"]
+    fieldtypes = ["uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<B")
+    orders = [0]
+    lengths = [1]
+    array_lengths = [0]
+    crc_extra = 30
+    unpacker = struct.Struct("<B")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, seq: int):
+        MAVLink_message.__init__(self, MAVLink_available_modes_monitor_message.id, MAVLink_available_modes_monitor_message.msgname)
+        self._fieldnames = MAVLink_available_modes_monitor_message.fieldnames
+        self._instance_field = MAVLink_available_modes_monitor_message.instance_field
+        self._instance_offset = MAVLink_available_modes_monitor_message.instance_offset
+        self.seq = seq
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.seq), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_available_modes_monitor_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_global_position_int_message(MAVLink_message):
@@ -17428,8 +17643,13 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_OPEN_DRONE_ID_ARM_STATUS: MAVLink_open_drone_id_arm_status_message,
     MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM_UPDATE: MAVLink_open_drone_id_system_update_message,
     MAVLINK_MSG_ID_HYGROMETER_SENSOR: MAVLink_hygrometer_sensor_message,
+    MAVLINK_MSG_ID_EKF_STATUS_REPORT: MAVLink_ekf_status_report_message,
     MAVLINK_MSG_ID_COMPONENT_INFORMATION: MAVLink_component_information_message,
     MAVLINK_MSG_ID_COMPONENT_METADATA: MAVLink_component_metadata_message,
+    MAVLINK_MSG_ID_PROTOCOL_VERSION: MAVLink_protocol_version_message,
+    MAVLINK_MSG_ID_AVAILABLE_MODES: MAVLink_available_modes_message,
+    MAVLINK_MSG_ID_CURRENT_MODE: MAVLink_current_mode_message,
+    MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: MAVLink_available_modes_monitor_message,
     MAVLINK_MSG_ID_GLOBAL_POSITION_INT: MAVLink_global_position_int_message,
     MAVLINK_MSG_ID_AUTOPILOT_VERSION: MAVLink_autopilot_version_message,
     MAVLINK_MSG_ID_HEARTBEAT: MAVLink_heartbeat_message,
@@ -25955,6 +26175,36 @@ class MAVLink(object):
         """
         self.send(self.hygrometer_sensor_encode(id, temperature, humidity), force_mavlink1=force_mavlink1)
 
+    def ekf_status_report_encode(self, flags: int, velocity_variance: float, pos_horiz_variance: float, pos_vert_variance: float, compass_variance: float, terrain_alt_variance: float) -> MAVLink_ekf_status_report_message:
+        """
+        Health of the estimator, as ArduPilot says it; DroneKit waits for it
+        before arming.
+
+        flags                     : As ESTIMATOR_STATUS_FLAGS. (type:uint16_t)
+        velocity_variance         : Velocity variance. (type:float)
+        pos_horiz_variance        : Horizontal position variance. (type:float)
+        pos_vert_variance         : Vertical position variance. (type:float)
+        compass_variance          : Compass variance. (type:float)
+        terrain_alt_variance        : Terrain altitude variance. (type:float)
+
+        """
+        return MAVLink_ekf_status_report_message(flags, velocity_variance, pos_horiz_variance, pos_vert_variance, compass_variance, terrain_alt_variance)
+
+    def ekf_status_report_send(self, flags: int, velocity_variance: float, pos_horiz_variance: float, pos_vert_variance: float, compass_variance: float, terrain_alt_variance: float, force_mavlink1: bool = False) -> None:
+        """
+        Health of the estimator, as ArduPilot says it; DroneKit waits for it
+        before arming.
+
+        flags                     : As ESTIMATOR_STATUS_FLAGS. (type:uint16_t)
+        velocity_variance         : Velocity variance. (type:float)
+        pos_horiz_variance        : Horizontal position variance. (type:float)
+        pos_vert_variance         : Vertical position variance. (type:float)
+        compass_variance          : Compass variance. (type:float)
+        terrain_alt_variance        : Terrain altitude variance. (type:float)
+
+        """
+        self.send(self.ekf_status_report_encode(flags, velocity_variance, pos_horiz_variance, pos_vert_variance, compass_variance, terrain_alt_variance), force_mavlink1=force_mavlink1)
+
     def component_information_encode(self, time_boot_ms: int, general_metadata_file_crc: int, general_metadata_uri: bytes, peripherals_metadata_file_crc: int, peripherals_metadata_uri: bytes) -> MAVLink_component_information_message:
         """
         Where the general metadata file is; superseded by COMPONENT_METADATA.
@@ -26002,6 +26252,102 @@ class MAVLink(object):
 
         """
         self.send(self.component_metadata_encode(time_boot_ms, file_crc, uri), force_mavlink1=force_mavlink1)
+
+    def protocol_version_encode(self, version: int, min_version: int, max_version: int, spec_version_hash: Sequence[int], library_version_hash: Sequence[int]) -> MAVLink_protocol_version_message:
+        """
+        Which MAVLink versions are spoken.
+
+        version                   : Version in use, times 100. (type:uint16_t)
+        min_version               : Least version, times 100. (type:uint16_t)
+        max_version               : Greatest version, times 100. (type:uint16_t)
+        spec_version_hash         : First bytes of the hash of the protocol. (type:uint8_t)
+        library_version_hash        : First bytes of the hash of the library. (type:uint8_t)
+
+        """
+        return MAVLink_protocol_version_message(version, min_version, max_version, spec_version_hash, library_version_hash)
+
+    def protocol_version_send(self, version: int, min_version: int, max_version: int, spec_version_hash: Sequence[int], library_version_hash: Sequence[int], force_mavlink1: bool = False) -> None:
+        """
+        Which MAVLink versions are spoken.
+
+        version                   : Version in use, times 100. (type:uint16_t)
+        min_version               : Least version, times 100. (type:uint16_t)
+        max_version               : Greatest version, times 100. (type:uint16_t)
+        spec_version_hash         : First bytes of the hash of the protocol. (type:uint8_t)
+        library_version_hash        : First bytes of the hash of the library. (type:uint8_t)
+
+        """
+        self.send(self.protocol_version_encode(version, min_version, max_version, spec_version_hash, library_version_hash), force_mavlink1=force_mavlink1)
+
+    def available_modes_encode(self, number_modes: int, mode_index: int, standard_mode: int, custom_mode: int, properties: int, mode_name: bytes) -> MAVLink_available_modes_message:
+        """
+        One of the modes that can be flown; asked for by
+        MAV_CMD_REQUEST_MESSAGE.
+
+        number_modes              : How many there are. (type:uint8_t)
+        mode_index                : Which one this is, from 1. (type:uint8_t)
+        standard_mode             : Standard mode. (type:uint8_t, values:MAV_STANDARD_MODE)
+        custom_mode               : Its number in HEARTBEAT. (type:uint32_t)
+        properties                : Properties: 1 advanced, 2 not for the user to select, 4 automatic. (type:uint32_t)
+        mode_name                 : Name, where the standard mode is 0. (type:char)
+
+        """
+        return MAVLink_available_modes_message(number_modes, mode_index, standard_mode, custom_mode, properties, mode_name)
+
+    def available_modes_send(self, number_modes: int, mode_index: int, standard_mode: int, custom_mode: int, properties: int, mode_name: bytes, force_mavlink1: bool = False) -> None:
+        """
+        One of the modes that can be flown; asked for by
+        MAV_CMD_REQUEST_MESSAGE.
+
+        number_modes              : How many there are. (type:uint8_t)
+        mode_index                : Which one this is, from 1. (type:uint8_t)
+        standard_mode             : Standard mode. (type:uint8_t, values:MAV_STANDARD_MODE)
+        custom_mode               : Its number in HEARTBEAT. (type:uint32_t)
+        properties                : Properties: 1 advanced, 2 not for the user to select, 4 automatic. (type:uint32_t)
+        mode_name                 : Name, where the standard mode is 0. (type:char)
+
+        """
+        self.send(self.available_modes_encode(number_modes, mode_index, standard_mode, custom_mode, properties, mode_name), force_mavlink1=force_mavlink1)
+
+    def current_mode_encode(self, standard_mode: int, custom_mode: int, intended_custom_mode: int) -> MAVLink_current_mode_message:
+        """
+        The mode in force.
+
+        standard_mode             : Standard mode. (type:uint8_t, values:MAV_STANDARD_MODE)
+        custom_mode               : Its number in HEARTBEAT. (type:uint32_t)
+        intended_custom_mode        : The mode that was asked for; 0: unknown. (type:uint32_t)
+
+        """
+        return MAVLink_current_mode_message(standard_mode, custom_mode, intended_custom_mode)
+
+    def current_mode_send(self, standard_mode: int, custom_mode: int, intended_custom_mode: int, force_mavlink1: bool = False) -> None:
+        """
+        The mode in force.
+
+        standard_mode             : Standard mode. (type:uint8_t, values:MAV_STANDARD_MODE)
+        custom_mode               : Its number in HEARTBEAT. (type:uint32_t)
+        intended_custom_mode        : The mode that was asked for; 0: unknown. (type:uint32_t)
+
+        """
+        self.send(self.current_mode_encode(standard_mode, custom_mode, intended_custom_mode), force_mavlink1=force_mavlink1)
+
+    def available_modes_monitor_encode(self, seq: int) -> MAVLink_available_modes_monitor_message:
+        """
+        Says by another number that AVAILABLE_MODES are to be asked for again.
+
+        seq                       : Number of the set of modes. (type:uint8_t)
+
+        """
+        return MAVLink_available_modes_monitor_message(seq)
+
+    def available_modes_monitor_send(self, seq: int, force_mavlink1: bool = False) -> None:
+        """
+        Says by another number that AVAILABLE_MODES are to be asked for again.
+
+        seq                       : Number of the set of modes. (type:uint8_t)
+
+        """
+        self.send(self.available_modes_monitor_encode(seq), force_mavlink1=force_mavlink1)
 
     def global_position_int_encode(self, time_boot_ms: int, lat: int, lon: int, alt: int, relative_alt: int, vx: int, vy: int, vz: int, hdg: int) -> MAVLink_global_position_int_message:
         """

@@ -1,0 +1,286 @@
+"""What an application does with MAVSDK: `python mavsdk_flight.py PORT STEP...`; what it saw, as JSON.
+
+Steps are done in their order: connect is always the first. Whatever MAVSDK itself warns of is told as
+`complaints`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from mavsdk import ComponentType, Configuration, LogLevel, Mavsdk, MavsdkError, log_subscribe
+from mavsdk.plugins.action import Action
+from mavsdk.plugins.info import Info
+from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
+from mavsdk.plugins.mission_raw import MissionItem as RawItem
+from mavsdk.plugins.mission_raw import MissionRaw
+from mavsdk.plugins.offboard import Offboard, PositionNedYaw, VelocityNedYaw
+from mavsdk.plugins.param import Param
+from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
+
+LONG_S = 60.0
+DEGREE_M = 111_319.5  # of latitude
+NAN = math.nan
+complaints: list[str] = []
+
+
+def hear(level: LogLevel, message: str, *_: Any) -> bool:
+    if level.name.startswith(("WARN", "ERR")):
+        complaints.append(f"{level.name}: {message}")
+    return True
+
+
+class Pilot:
+    """One connected application."""
+
+    def __init__(self, system: Any) -> None:
+        self.told: dict[str, Any] = {}
+        self.system = system
+        self.action = Action(system)
+        self.telemetry = Telemetry(system)
+        self.texts: list[str] = []
+        self.telemetry.subscribe_status_text(lambda text, *_: self.texts.append(text.text))
+        self.modes: list[str] = []
+        self.telemetry.subscribe_flight_mode(lambda mode, *_: self.modes.append(FlightMode(mode).name))
+        self._turn = threading.Event()
+
+    def until(self, what: str, condition: Callable[[], bool], timeout_s: float = LONG_S) -> None:
+        """Wait for what telemetry must show."""
+        for _ in range(round(timeout_s / 0.05)):
+            if condition():
+                return
+            self._turn.wait(0.05)
+        raise AssertionError(f"in vain waited for: {what}; modes {self.modes[-5:]}, texts {self.texts[-5:]}")
+
+    def mode(self, name: str) -> None:
+        self.until(name, lambda: bool(self.modes) and self.modes[-1] == name)
+
+    def landed(self, state: LandedState) -> None:
+        self.until(state.name, lambda: self.telemetry.landed_state() == state)
+
+    def height(self) -> float:
+        return float(self.telemetry.position().relative_altitude_m)
+
+    def home_e7(self) -> tuple[int, int]:
+        self.until("home", lambda: self.telemetry.health().is_home_position_ok)
+        home = self.telemetry.home()
+        return round(home.latitude_deg * 1e7), round(home.longitude_deg * 1e7)
+
+    def again(self, act: Callable[[], Any]) -> None:
+        """A command that was lost is given again, as a pilot does."""
+        for _ in range(5):
+            try:
+                act()
+            except MavsdkError as error:
+                if "TIMEOUT" not in str(error):
+                    raise
+            else:
+                return
+        act()
+
+    # ---- steps
+
+    def ready(self) -> None:
+        """What every example of MAVSDK waits for."""
+        self.until("health_all_ok", self.telemetry.health_all_ok)
+        health = self.telemetry.health()
+        assert health.is_global_position_ok
+        assert health.is_home_position_ok
+        assert health.is_armable
+        version = Info(self.system).get_version()
+        self.told["version"] = [version.flight_sw_major, version.flight_sw_minor]
+
+    def telemetry_seen(self) -> None:
+        """Every stream that there is a page for."""
+        seen: dict[str, Any] = {}
+        streams = (
+            "position",
+            "home",
+            "in_air",
+            "armed",
+            "attitude_quaternion",
+            "attitude_euler",
+            "velocity_ned",
+            "gps_info",
+            "raw_gps",
+            "battery",
+            "flight_mode",
+            "health",
+            "landed_state",
+            "heading",
+            "altitude",
+            "unix_epoch_time",
+            "position_velocity_ned",
+            "attitude_angular_velocity_body",
+        )
+        for name in streams:
+            getattr(self.telemetry, f"subscribe_{name}")(
+                lambda value, *_, name=name: seen.setdefault(name, value)
+            )
+        self.until("all streams", lambda: len(seen) == len(streams))
+        battery = seen["battery"]
+        self.told["battery"] = [battery.voltage_v, battery.remaining_percent]
+        self.told["satellites"] = seen["gps_info"].num_satellites
+        fast: list[Any] = []
+        self.telemetry.set_rate_position(20.0)
+        self.telemetry.subscribe_position(lambda value, *_: fast.append(value))
+        self.until("positions at 20 Hz", lambda: len(fast) >= 20, 3.0)
+        self.telemetry.set_rate_position(0.0)
+        origin = self.telemetry.get_gps_global_origin()
+        self.told["origin"] = [origin.latitude_deg, origin.longitude_deg]
+
+    def parameters(self) -> None:
+        param = Param(self.system)
+        everything = param.get_all_params()
+        self.told["parameters"] = len(everything.float_params) + len(everything.int_params)
+        param.set_param_float("MIS_SPEED", 1.25)
+        assert param.get_param_float("MIS_SPEED") == 1.25
+        param.set_param_float("MIS_SPEED", 1.5)
+        param.set_param_float("MIS_SHAPE", 1.0)  # an integer in our table
+        self.action.set_takeoff_altitude(1.5)
+        assert self.action.get_takeoff_altitude() == 1.5
+
+    def missions(self) -> None:
+        raw = MissionRaw(self.system)
+        x, y = self.home_e7()
+        items = [
+            RawItem(seq, 6, 16, int(seq == 0), 1, 0.0, 0.0, 0.0, NAN, x + 100 * seq, y - 70 * seq, 1.5, 0)
+            for seq in range(300)
+        ]
+        raw.upload_mission(items)
+        back = raw.download_mission()
+        assert [(i.seq, i.x, i.y, i.z) for i in back] == [(i.seq, i.x, i.y, i.z) for i in items]
+        assert all(math.isnan(i.param4) for i in back)
+        raw.clear_mission()
+        assert raw.download_mission() == []
+
+    def fences(self) -> None:
+        raw = MissionRaw(self.system)
+        home = self.home_e7()
+        corners = ((-2, -2), (-2, 4), (4, 4), (4, -2))
+        fence = [
+            RawItem(seq, 3, 5001, 0, 1, 4.0, 0.0, 0.0, 0.0, home[0] + x * 1000, home[1] + y * 1000, 0.0, 1)
+            for seq, (x, y) in enumerate(corners)
+        ]
+        raw.upload_geofence(fence)
+        assert [(i.x, i.y) for i in raw.download_geofence()] == [(i.x, i.y) for i in fence]
+        rally = [RawItem(0, 3, 5100, 0, 1, 0.0, 0.0, 0.0, 0.0, *home, 2.0, 2)]
+        raw.upload_rally_points(rally)
+        assert [(i.x, i.y) for i in raw.download_rallypoints()] == [home]
+        raw.upload_geofence([])
+        raw.upload_rally_points([])
+
+    def take_off(self) -> None:
+        self.again(self.action.arm)
+        self.until("armed", self.telemetry.armed)
+        self.action.takeoff()
+        self.mode("TAKEOFF")
+        self.landed(LandedState.IN_AIR)
+        self.mode("HOLD")
+        assert self.telemetry.in_air()
+
+    def arm(self) -> None:
+        self.again(self.action.arm)
+        self.until("armed", self.telemetry.armed)
+
+    def go_to(self) -> None:
+        home = self.telemetry.home()
+        north, height = 1.0, 2.5
+        place = (home.latitude_deg + north / DEGREE_M, home.longitude_deg)
+        self.action.goto_location(*place, home.absolute_altitude_m + height, NAN)
+
+        def there() -> bool:
+            position = self.telemetry.position()
+            return abs(position.latitude_deg - place[0]) < 0.2 / DEGREE_M
+
+        self.until("the place", there)
+
+    def upload(self) -> None:
+        home = self.telemetry.home()
+
+        def item(north: float, east: float, **how: Any) -> MissionItem:
+            return MissionItem(
+                home.latitude_deg + north / DEGREE_M, home.longitude_deg + east / DEGREE_M, 2.0, 1.5,
+                how.get("fly_through", True), NAN, NAN, MissionItem.CameraAction.NONE,
+                NAN, NAN, NAN, NAN, NAN, MissionItem.VehicleAction.NONE,
+            )  # fmt: skip
+
+        plan = MissionPlan([item(1.0, 0.0), item(1.0, 1.5, fly_through=False), item(0.0, 1.5)])
+        self.mission = Mission(self.system)
+        self.mission.upload_mission(plan)
+        back = self.mission.download_mission().mission_items
+        assert len(back) == 3
+        for ours, theirs in zip(plan.mission_items, back, strict=True):
+            assert abs(ours.latitude_deg - theirs.latitude_deg) < 1e-7
+            assert ours.relative_altitude_m == theirs.relative_altitude_m
+
+    def fly_mission(self) -> None:
+        """Start, pause on the way, go on, to the end."""
+        done: list[int] = []
+        self.mission.subscribe_mission_progress(lambda progress, *_: done.append(progress.current))
+        self.again(self.mission.start_mission)
+        self.mode("MISSION")
+        self.until("the second item", lambda: bool(done) and done[-1] >= 1)
+        self.again(self.mission.pause_mission)
+        self.mode("HOLD")
+        assert not self.mission.is_mission_finished()
+        self.again(self.mission.start_mission)
+        self.mode("MISSION")
+        self.until("the end of the mission", self.mission.is_mission_finished)
+        self.told["progress"] = sorted(set(done))
+
+    def offboard(self) -> None:
+        """Places, then velocities, as the examples of MAVSDK do it."""
+        offboard = Offboard(self.system)
+        offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -2.0, NAN))
+        offboard.start()
+        self.mode("OFFBOARD")
+        offboard.set_position_ned(PositionNedYaw(0.8, 0.0, -2.0, NAN))
+        velocities = self.telemetry.position_velocity_ned
+        self.until("the place", lambda: abs(velocities().position.north_m - 0.8) < 0.15)
+        offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.4, 0.0, NAN))
+        self.until("the velocity", lambda: abs(velocities().velocity.east_m_s - 0.4) < 0.15)
+        offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.0, 0.0, NAN))
+        self.until("rest", lambda: abs(velocities().velocity.east_m_s) < 0.1)
+        offboard.stop()
+        self.mode("HOLD")
+
+    def hold(self) -> None:
+        self.action.hold()
+        self.mode("HOLD")
+
+    def come_back(self) -> None:
+        self.action.return_to_launch()
+        self.mode("RETURN_TO_LAUNCH")
+        self.until("disarmed", lambda: not self.telemetry.armed())
+        self.landed(LandedState.ON_GROUND)
+
+    def land(self) -> None:
+        self.again(self.action.land)
+        self.mode("LAND")
+        self.until("disarmed", lambda: not self.telemetry.armed())
+        self.landed(LandedState.ON_GROUND)
+
+
+def main(address: str, steps: list[str]) -> None:
+    log_subscribe(hear)
+    with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
+        mavsdk.add_any_connection(address)
+        pilot = Pilot(mavsdk.first_autopilot(LONG_S))
+        for step in steps:
+            print(step, flush=True)
+            try:
+                getattr(pilot, step)()
+            except Exception as error:
+                sys.exit(f"{step}: {str(error)[:300]}\n{pilot.texts}\n{complaints}")
+        told = {**pilot.told, "texts": pilot.texts, "modes": pilot.modes}
+    print(json.dumps({**told, "complaints": complaints}))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2:])
