@@ -1,15 +1,18 @@
 """How every kernel is compiled, and where its machine code is kept.
 
-numba keys its disk cache by the file of the *outermost* function alone: after a change in a callee it would
-go on serving the old machine code. The cache directory is therefore named by a hash over all source files
-that hold kernels, so that a stale entry cannot be met.
+numba keys its disk cache by the file of the *outermost* function alone: after a change in a callee, or of a
+constant from another module, it would go on serving the old machine code. Kernels are therefore kept in a
+directory named by a hash over their own source file and all files of this project that it imports, directly
+or not, so that a stale entry cannot be met and a change recompiles only what it can reach.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
@@ -17,26 +20,44 @@ import numba
 from platformdirs import user_cache_path
 
 _ROOT = Path(__file__).resolve().parents[2]
-_KERNEL_ROOMS = ("autopilot", "sitl", "missions", "gcs")
+_IMPORT = re.compile(
+    rb"^\s*from\s+((?:autopilot|sitl|missions|gcs)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)", re.MULTILINE
+)
+_NAME = re.compile(rb"\w+")
+_CHOSEN_BY_USER = "NUMBA_CACHE_DIR" in os.environ
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def _source_hash() -> str:
+@cache
+def _source(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+@cache
+def _imported(path: Path) -> frozenset[Path]:
+    """Files of this project that the file imports itself."""
+    found: set[Path] = set()
+    for module, names in _IMPORT.findall(_source(path)):
+        base = _ROOT.joinpath(*module.decode().split("."))
+        for candidate in (base, *(base / name.decode() for name in _NAME.findall(names))):
+            found.update(p for p in (candidate.with_suffix(".py"), candidate / "__init__.py") if p.is_file())
+    return frozenset(found)
+
+
+@cache
+def sources_hash(path: Path) -> str:
+    """Of a source file and all that it imports of this project; the same wherever the project stands."""
+    seen, ahead = {path}, [path]
+    while ahead:
+        fresh = _imported(ahead.pop()) - seen
+        seen |= fresh
+        ahead += fresh
     digest = hashlib.sha256()
-    for room in _KERNEL_ROOMS:
-        for path in sorted((_ROOT / room).rglob("*.py")):
-            source = path.read_bytes()
-            if b"@kernel" in source:
-                digest.update(path.relative_to(_ROOT).as_posix().encode())
-                digest.update(source)
+    for name, file in sorted((os.path.relpath(file, _ROOT), file) for file in seen):
+        digest.update(name.encode() + b"\0" + _source(file) + b"\0")
     return digest.hexdigest()[:16]
-
-
-if "NUMBA_CACHE_DIR" not in os.environ:
-    # numba.config is filled from the environment; it declares no attributes to a type checker
-    vars(numba.config)["CACHE_DIR"] = str(user_cache_path("plumbline") / "kernels" / _source_hash())
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
@@ -45,5 +66,9 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     Fast-math stays off, so that CPython and machine code agree to the bit. Division by zero gives inf or nan
     as IEEE 754 says, in place of an exception.
     """
+    if not _CHOSEN_BY_USER:
+        folder = user_cache_path("plumbline") / "kernels" / sources_hash(Path(function.__code__.co_filename))
+        # read as numba decorates; it is filled from the environment and declares no attributes to a checker
+        vars(numba.config)["CACHE_DIR"] = str(folder)
     compiled: Callable[P, T] = numba.njit(cache=True, error_model="numpy")(function)
     return compiled

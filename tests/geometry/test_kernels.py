@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from autopilot.geometry import frames, linear, s2, so3
+from autopilot.geometry import frames, kernel, linear, s2, so3
 
 SAMPLES = 50
 
@@ -66,3 +67,38 @@ def test_kernels_are_found() -> None:
     assert not ALL or {"linear.cross", "so3.quat_exp", "s2.unit_derivatives", "frames.ned_from_enu"} <= set(
         ALL
     )
+
+
+@pytest.mark.parametrize(
+    ("changed", "stale"),
+    [
+        ("autopilot/law.py", True),
+        ("autopilot/leaf.py", True),
+        ("missions/path.py", True),
+        ("sitl/other.py", False),
+    ],
+)
+def test_machine_code_is_stale_after_a_change_in_whatever_it_can_reach(
+    changed: str, stale: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {
+        "autopilot/law.py": "from autopilot.middle import (\n    f,\n)\n",
+        "autopilot/middle.py": "from autopilot import leaf\nfrom missions.path import LENGTH\n",
+        "autopilot/leaf.py": "from autopilot.law import back  # a circle\n",
+        "autopilot/__init__.py": "",
+        "missions/path.py": "LENGTH = 1.0\n",
+        "sitl/other.py": "from autopilot.law import g\n",
+    }
+    monkeypatch.setattr(kernel, "_ROOT", tmp_path)
+
+    def hashed() -> str:
+        for name, text in files.items():
+            (tmp_path / name).parent.mkdir(exist_ok=True)
+            (tmp_path / name).write_text(text)
+        for kept in (kernel.sources_hash, kernel._imported, kernel._source):
+            kept.cache_clear()
+        return kernel.sources_hash(tmp_path / "autopilot/law.py")
+
+    before = hashed()
+    files[changed] += "# changed\n"
+    assert (hashed() != before) is stale
