@@ -23,7 +23,7 @@ from autopilot.flight import (
 )
 from autopilot.following import Circle, Lean, Stream, Wish
 from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
-from autopilot.guidance import Hold, carry_leg
+from autopilot.guidance import Hold, carry_leg, reel_leg
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
@@ -49,8 +49,10 @@ from autopilot.services.requests import (
     StartMission,
     Takeoff,
     Terminate,
+    Winch,
 )
 from autopilot.supervisor import (
+    LEAST_REEL_M,
     RELEASED_TEXT,
     TRANSITIONS,
     as_flown,
@@ -58,7 +60,9 @@ from autopilot.supervisor import (
     begin_step,
     disarmed,
     happen,
+    length_at,
     release,
+    stop,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
@@ -76,6 +80,7 @@ LEVEL_HOME_M = 1.0
 CIRCLE_POINTS = 72
 WAY_M, MOST_PIECES = 0.25, 4000  # at which a way between waypoints is looked at
 SLOWEST_M_S, FASTEST_M_S = 0.05, 15.0
+LEAST_REEL_M_S = 0.01
 
 
 def _denied(text: str) -> Verdict:
@@ -197,6 +202,27 @@ def _needs_load(flight: Flight) -> str:
     return ""
 
 
+def _reels_too_far(flight: Flight, settings: Settings) -> str:
+    """Which item that is still to be flown asks too much of the winch; an empty string: none."""
+    length, plan = settings.cable_length_m, flight.plan
+    for step, seq in zip(plan.steps[flight.step :], plan.sequence[flight.step :], strict=True):
+        if not isinstance(step, model.Winch):
+            continue
+        if not settings.reels:
+            return f"item {seq}: the law lqr flies one length of the cable"
+        if flight.released:
+            return f"item {seq} needs the load, which is released"
+        if step.speed_m_s is not None and step.speed_m_s > settings.reel_speed_m_s:
+            return f"item {seq}: {step.speed_m_s:g} m/s exceeds WNC_SPEED {settings.reel_speed_m_s:g}"
+        length += step.length_m
+        if flight.reel_to_m is not None:  # taken up again
+            length, flight = flight.reel_to_m, replace(flight, reel_to_m=None)
+        beyond = reel_trouble(length, math.inf, settings)
+        if beyond:
+            return f"item {seq}: {beyond}"
+    return ""
+
+
 def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     """Start the mission at `flight.step`, from the ground or from the air."""
     before, plan = flight, flight.plan
@@ -207,7 +233,7 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     beyond = _leaves_fence(flight, plan.steps, plan.sequence, settings)
     if beyond:
         return flight, _denied(f"Mission denied: {beyond}")
-    without = _needs_load(flight)
+    without = _needs_load(flight) or _reels_too_far(flight, settings)
     if without:
         return flight, _denied(f"Mission denied: {without}")
     if plan.prepared.refusal:
@@ -243,7 +269,7 @@ def _set_current(flight: Flight, request: SetCurrent, view: View, settings: Sett
     step = next((i for i, seq in enumerate(flight.plan.sequence) if seq >= request.seq), None)
     if step is None:
         return flight, _denied(f"Mission item {request.seq} denied: nothing is flown from there")
-    moved = replace(flight, step=step, step_anchor=None, mission_done=False)
+    moved = replace(flight, step=step, step_anchor=None, reel_to_m=None, mission_done=False)
     if flight.on_mission and flight.phase == Phase.SET_DOWN:
         return flight, _wrong_phase(flight, f"Mission item {request.seq}")
     if flight.on_mission and flight.phase in (Phase.MISSION, Phase.LOWER):
@@ -474,6 +500,46 @@ def _grab(flight: Flight, request: Grab, view: View, settings: Settings) -> Deci
     return replace(flight, released=False), Verdict(mavlink.MAV_RESULT_ACCEPTED, "Load taken")
 
 
+def _winch(flight: Flight, request: Winch, view: View, settings: Settings) -> Decision:
+    if flight.released:
+        return flight, _denied("Winch denied: the load is released, nothing hangs on the cable")
+    if not settings.reels:
+        return flight, _denied("Winch denied: the law lqr flies one length of the cable")
+    if flight.phase != Phase.HOLD or not isinstance(flight.legs[-1], Hold):
+        return flight, _later("Winch denied: hold the load in the air first")
+    speed = settings.reel_speed_m_s if request.speed_m_s is None else request.speed_m_s
+    if not LEAST_REEL_M_S <= speed <= settings.reel_speed_m_s:
+        limits = f"{LEAST_REEL_M_S:g} ... {settings.reel_speed_m_s:g} m/s (WNC_SPEED)"
+        return flight, _denied(f"Winch denied: {speed:.2f} m/s; must be {limits}")
+    legs, here = stop(flight, view, settings)
+    length = length_at(flight, here, settings)
+    wanted = length + request.length_m
+    if math.isinf(request.length_m):
+        wanted = settings.longest_m if request.length_m > 0.0 else settings.shortest_m
+        # out to the end, or as far as the load may sink
+        wanted = max(min(wanted, length + here[2] - LEAST_ALTITUDE_M), min(wanted, length))
+    beyond = reel_trouble(wanted, here[2] + length - wanted, settings)
+    if beyond:
+        return flight, _denied(f"Winch denied: {beyond}")
+    if abs(wanted - length) < LEAST_REEL_M:
+        return replace(flight, legs=(*legs, Hold(here)), leg_start_us=view.now_us), ACCEPTED
+    reel = reel_leg(here, length, wanted, speed, settings.reel_accel_m_s2)
+    there = reel.end
+    text = f"Winch: {length:.2f} m to {wanted:.2f} m"
+    after = replace(flight, legs=(*legs, reel, Hold(there)), leg_start_us=view.now_us)
+    return after, Verdict(mavlink.MAV_RESULT_ACCEPTED, text)
+
+
+def reel_trouble(wanted: float, height: float, settings: Settings) -> str:
+    """Why the cable may not get so long (m) with the load at that height; an empty string if it may."""
+    if not settings.shortest_m - LEAST_REEL_M <= wanted <= settings.longest_m + LEAST_REEL_M:
+        limits = f"{settings.shortest_m:g} ... {settings.longest_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
+        return f"a cable of {wanted:.2f} m; must be {limits}"
+    if height < LEAST_ALTITUDE_M - LEAST_REEL_M:
+        return f"load height {height:.2f} m, least {LEAST_ALTITUDE_M} m"
+    return ""
+
+
 def _terminate(flight: Flight, request: Terminate, view: View, settings: Settings) -> Decision:
     after = happen(replace(flight, on_mission=False), Event.FAIL, view, settings)
     if after is None:
@@ -488,7 +554,7 @@ def _run_checks(flight: Flight, request: RunPrearmChecks, view: View, settings: 
 
 def with_plan(flight: Flight, plan: Plan) -> Flight:
     """The flight with another mission, rewound."""
-    return replace(flight, plan=plan, step=0, step_anchor=None, mission_done=False)
+    return replace(flight, plan=plan, step=0, step_anchor=None, reel_to_m=None, mission_done=False)
 
 
 _HANDLERS: dict[type, Callable[[Flight, Any, View, Settings], Decision]] = {
@@ -509,6 +575,7 @@ _HANDLERS: dict[type, Callable[[Flight, Any, View, Settings], Decision]] = {
     Orbit: _orbit,
     ChangeAltitude: _change_altitude,
     SetHome: _set_home,
+    Winch: _winch,
     Release: _release,
     Grab: _grab,
     ChangeSpeed: _change_speed,

@@ -119,6 +119,10 @@ class Flight:
     breaches: int = 0
     breach_us: int = 0  # when the last one began
     released: bool = False  # the load: what is flown and asked for is the vehicle, by itself
+    cable_m: float | None = None  # length that the winch has given the cable; None: VEH_CABLE_LEN
+    reel_rate: float = 0.0  # m/s, at which it grows now
+    reel_accel: float = 0.0  # m/s^2
+    reel_to_m: float | None = None  # length that the present mission step asks for
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +153,11 @@ class Settings:
     fence_action: int  # GF_ACTION
     fence_radius_m: float  # 0: none
     fence_height_m: float  # 0: none
+    shortest_m: float  # cable, by the winch
+    longest_m: float
+    reel_speed_m_s: float
+    reel_accel_m_s2: float
+    reels: bool  # the law can fly another length than it was made for
     guides_vehicle: bool  # position setpoints are for the vehicle, which is kept a cable length over the load
 
 
@@ -200,6 +209,11 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         fence_action=int(table["GF_ACTION"]),
         fence_radius_m=table["GF_MAX_HOR_DIST"],
         fence_height_m=table["GF_MAX_VER_DIST"],
+        shortest_m=table["WNC_LEN_MIN"],
+        longest_m=table["WNC_LEN_MAX"],
+        reel_speed_m_s=table["WNC_SPEED"],
+        reel_accel_m_s2=table["WNC_ACCEL"],
+        reels=LAWS[int(table["CTL_LAW"])] != "lqr",
         guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 

@@ -34,6 +34,7 @@ from autopilot.mixer import MixerResult, mix
 from autopilot.observer import Observed, ObserverConstants, nominal, observe
 from autopilot.scheduler import is_due
 from autopilot.supervisor import advance
+from autopilot.winch import as_if_firm, as_reeled, cable_now, lengthened, with_cable, with_reel
 
 HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 by the mass of Table 4-1
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
@@ -113,7 +114,14 @@ def step(
     before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
 ) -> tuple[FlightState, Report]:
     """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
+    flight = cable_now(before.flight, now_us)
+    setup = with_cable(setup, flight)
     estimator, tuning = before.estimator, setup.tuning
+    if flight.cable_m is not None:
+        was = before.flight.cable_m
+        estimator = lengthened(estimator, 0.0 if was is None else flight.cable_m - was)
+        readings = as_if_firm(readings, estimator, flight.reel_rate)
+    before = before._replace(flight=flight)
     if before.flight.released:
         tuning = untied(tuning)
         estimator = parted(estimator, history, tuning)
@@ -126,8 +134,8 @@ def step(
 
 def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState, Report]:
     """The supervisor's, the law's and the mixer's part of a tick: `before` holds the estimate already."""
-    estimator = before.estimator
-    state = control_state(estimator)
+    estimator, reel = before.estimator, before.flight
+    state = as_reeled(control_state(estimator), estimator, reel.reel_rate)
     pull_n = felt_pull(before, state, setup)
     view = view_of(estimator, state, setup.settings, now_us, pull_n, before.flight.released)
     flight, report = advance(before.flight, view, setup.settings)
@@ -168,7 +176,8 @@ def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState
     memory = after.memory
     if memory is None or leg.control_mode != after.control_mode:
         memory = setup.law.start(state, jet[0], jet[1])
-    memory, command = track(setup, memory, state, leg, jet, t, after.actuation, observed)
+    pushed = with_reel(observed, state, reel.reel_accel, setup.vehicle.quad_mass)
+    memory, command = track(setup, memory, state, leg, jet, t, after.actuation, pushed)
     mixed = mix(command.thrust, command.moment, setup.vehicle, setup.limited)
     return after._replace(
         memory=memory,

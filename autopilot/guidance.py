@@ -25,6 +25,7 @@ QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
 LEAST_SWINGS = 1.2  # a move of the load takes at least so many periods of its pendulum, however short it is
 CATCH_S = 0.15  # in which the slack of a cable is taken up in the air
 CALM_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
+SHORTEST_RAMP_S = 0.3  # in which the winch comes to its rate
 STEEPEST_LEAN = 0.7  # sine of the cable's lean that a swinging load is asked for at most
 
 # Taylor coefficients of transfer's s(u): of u^7 ... u^13
@@ -226,6 +227,57 @@ class Creep:
 
 
 @dataclass(frozen=True, slots=True)
+class Reel:
+    """The winch lowers the load (raises it: `speed` negative) while the vehicle is held at height `top_m`.
+
+    The cable is as long as the load is below that. The rate rises to `speed` along the s of
+    `missions.transfer` in `ramp_s`, stays for `cruise_s`, and falls as it rose.
+    """
+
+    begin: Vec3
+    top_m: float
+    speed: float
+    ramp_s: float
+    cruise_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From rest to rest."""
+        return 2.0 * self.ramp_s + self.cruise_s
+
+    @property
+    def end(self) -> Vec3:
+        """Where the load is left."""
+        x = self.begin
+        return (x[0], x[1], x[2] - self.speed * (self.ramp_s + self.cruise_s))
+
+    def _ramp(self, t: float) -> tuple[float, ...]:
+        """What the cable grows by in `t` seconds of the first ramp, for a rate of 1, and six derivatives."""
+        u = t / self.ramp_s
+        grown = sum(c * u ** (power + 1) / (power + 1) for power, c in _STEP)
+        return (self.ramp_s * grown, *(w[0] for w in transfer(ZERO, (1.0, 0.0, 0.0), self.ramp_s, t)[:6]))
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        left = self.duration_s - t
+        if left <= 0.0:
+            return _rest(self.end)
+        whole = self.ramp_s + self.cruise_s
+        if t <= self.ramp_s:
+            w = self._ramp(max(t, 0.0))
+        elif left >= self.ramp_s:
+            w = (t - 0.5 * self.ramp_s, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        else:
+            back = self._ramp(left)
+            w = (whole - back[0], *((-1.0) ** (n + 1) * back[n] for n in range(1, 7)))
+        x, down = self.begin, -self.speed
+        later = [(0.0, 0.0, down * w[n]) for n in range(1, 7)]
+        at = (x[0], x[1], x[2] + down * w[0])
+        return (at, later[0], later[1], later[2], later[3], later[4], later[5])
+
+
+@dataclass(frozen=True, slots=True)
 class Run:
     """The signals of a mission as they are flown, from where the load hung when they began."""
 
@@ -328,7 +380,7 @@ class Calm:
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
-Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Run | Pass | Swing | Calm | Follow | Posture
+Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Reel | Run | Pass | Swing | Calm | Follow | Posture
 
 
 def asked_jet(leg: Leg, t: float) -> Jet:
@@ -364,6 +416,25 @@ def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mod
     """A transfer whose peak speed and acceleration stay within the limits given."""
     distance = norm(sub(end, begin))
     return Transfer(begin, end, transfer_duration(distance, speed, accel), control_mode)
+
+
+def reel_leg(begin: Vec3, length: float, wanted: float, speed: float, accel: float) -> Reel:
+    """The winch makes a cable of `length` m `wanted` m long within speed and acceleration given; the load
+    hangs at `begin`, the vehicle stays."""
+    longer = abs(wanted - length)
+    # a ramp takes PEAK_SPEED rate / accel and half of that way; short ways do not reach the rate
+    rate = min(speed, sqrt(longer * accel / PEAK_SPEED))
+    ramp = max(PEAK_SPEED * rate / accel, SHORTEST_RAMP_S)
+    rate = min(rate, longer / ramp)
+    sign = 1.0 if wanted > length else -1.0
+    return Reel(begin, begin[2] + length, sign * rate, ramp, longer / rate - ramp)
+
+
+def top_of(leg: Leg) -> float | None:
+    """Height at which the vehicle is held while the winch works; None where it rests."""
+    if isinstance(leg, Slow):
+        return top_of(leg.leg)
+    return leg.top_m if isinstance(leg, Reel) else None
 
 
 def carry_leg(begin: Vec3, end: Vec3, speed: float, accel: float, least_s: float) -> Transfer:

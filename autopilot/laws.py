@@ -42,6 +42,9 @@ class Law(Protocol):
     def ramp_lag_s(self) -> float:
         """How far the load keeps behind a reference that rises or sinks steadily, in time."""
 
+    def with_cable(self, length: float) -> Law:
+        """The law for another length (m) of the cable: the loops about it as fast as they were."""
+
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
         """Memory of a law that begins now, without a jump of its command."""
 
@@ -159,6 +162,11 @@ class ThesisLaw(NamedTuple):
         position_gains = quad_position.QuadPositionGains(k_x=(k_x, k_x, k_z), k_v=(k_v, k_v, k_w))
         return cls(gains, filters, position_gains, vehicle)
 
+    def with_cable(self, length: float) -> ThesisLaw:
+        longer = length / self.vehicle.cable_length
+        gains = self.gains._replace(k_q=longer * self.gains.k_q, k_omega=longer * self.gains.k_omega)
+        return self._replace(gains=gains, vehicle=self.vehicle._replace(cable_length=length))
+
     @property
     def ramp_lag_s(self) -> float:
         return self.filters.reference.ramp_lag
@@ -226,6 +234,10 @@ class LqrLaw(NamedTuple):
             moment=table["LQR_R_MOMENT"],
         )
         return cls(lqr.lqr(vehicle, weights), ThesisLaw.build(table, vehicle))
+
+    def with_cable(self, length: float) -> LqrLaw:
+        # its gains are those of one length: the supervisor keeps the winch still
+        return self
 
     @property
     def ramp_lag_s(self) -> float:
@@ -306,6 +318,15 @@ class PlumblineLaw(NamedTuple):
             )
         )
         return cls(constants, designed, others)
+
+    def with_cable(self, length: float) -> PlumblineLaw:
+        vehicle, gains = self.constants.vehicle, self.constants.gains
+        longer = length / vehicle.cable_length
+        constants = self.constants._replace(
+            gains=gains._replace(k_q=longer * gains.k_q, k_omega=longer * gains.k_omega),
+            vehicle=vehicle._replace(cable_length=length),
+        )
+        return self._replace(constants=constants, other_modes=self.other_modes.with_cable(length))
 
     @property
     def ramp_lag_s(self) -> float:

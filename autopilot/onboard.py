@@ -45,6 +45,7 @@ from autopilot.services.records import (
 from autopilot.services.requests import ChangeSigningKey, Reboot
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
+from autopilot.winch import as_reeled, commanded_rate, with_cable
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
@@ -169,6 +170,7 @@ class Onboard:
             self.armed,
             self._options.lockstep,
             self._state.flight.released,
+            commanded_rate(self._state.flight, tick.now_us, self._shortest_us * 1e-6),
         )
         aside = self._world.messages(self.now_us)
         if self._reboot:
@@ -346,14 +348,11 @@ class Onboard:
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         state = self._state
-        view = view_of(
-            state.estimator,
-            control_state(state.estimator),
-            self._setup.settings,
-            self.now_us,
-            released=state.flight.released,
-        )
-        flight, verdict = decide(state.flight, request, view, self._setup.settings)
+        estimator, flight = state.estimator, state.flight
+        settings = with_cable(self._setup, flight).settings
+        seen = as_reeled(control_state(estimator), estimator, flight.reel_rate)
+        view = view_of(estimator, seen, settings, self.now_us, released=flight.released)
+        flight, verdict = decide(flight, request, view, settings)
         self._state = state._replace(flight=flight)
         return verdict
 
@@ -403,7 +402,7 @@ class Onboard:
     def _snapshot(self) -> Snapshot:
         return make_snapshot(
             self._state,
-            self._setup,
+            with_cable(self._setup, self._state.flight),
             self._options,
             self.endpoint.mission,
             self._condition,

@@ -47,7 +47,9 @@ from autopilot.guidance import (
     Swing,
     brake_leg,
     carry_leg,
+    reel_leg,
     slow_leg,
+    top_of,
     transfer_leg,
 )
 from autopilot.wire.dialect import plumbline as mavlink
@@ -62,6 +64,7 @@ from missions.model import (
     Step,
     Takeoff,
     Waypoint,
+    Winch,
 )
 from missions.shaping import Shaped, unshaped
 from missions.waypoints import Passage
@@ -136,6 +139,7 @@ IDLE_DISARM_US = 10_000_000
 FAILSAFE_DISARM_US = 3_000_000
 SETTLE_S = 3.0  # hold after an attitude run
 RELEASE_S = 2.0  # hold of a mission after the load was released: the vehicle jumps up and comes back
+LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
 RELEASED_TEXT = "Load released"
 NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
@@ -403,6 +407,14 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
             return (Hold(here, 0.0),)
         case Release():
             return (Hold(here, RELEASE_S),)
+        case Winch(speed_m_s=speed):
+            wanted = settings.cable_length_m if flight.reel_to_m is None else flight.reel_to_m
+            length = length_at(flight, here, settings)
+            if abs(wanted - length) < LEAST_REEL_M:
+                return (Hold(here, 0.0),)
+            return (
+                reel_leg(here, length, wanted, speed or settings.reel_speed_m_s, settings.reel_accel_m_s2),
+            )
         case Land():
             return ()
     raise AssertionError(step)
@@ -508,14 +520,31 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
     ):
         if len(flight.legs) > 1:
             ended = flight.leg_start_us + round(flight.legs[0].duration_s * 1e6)
+            flight = _reeled(flight)
             flight = replace(flight, legs=flight.legs[1:], leg_start_us=ended)
             continue
-        flight, more = _legs_done(flight, view, settings)
+        flight, more = _legs_done(_reeled(flight), view, settings)
         reached += more.reached
         texts += more.texts
     if flight.released and had_load:
         texts += ((INFO, RELEASED_TEXT),)
     return flight, Report(texts, reached)
+
+
+def length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
+    """Length of the cable when the load has come to rest at `here`, whose height a winch at work decides."""
+    top = top_of(flight.legs[0]) if flight.legs else None
+    return settings.cable_length_m if top is None else top - here[2]
+
+
+def _reeled(flight: Flight) -> Flight:
+    """The flight at the end of its present leg, with the cable that this leg leaves."""
+    leg = flight.legs[0] if flight.legs else None
+    top = None if leg is None else top_of(leg)
+    if leg is None or top is None:
+        return flight
+    length = top - leg.jet(leg.duration_s)[0][2]
+    return replace(flight, cable_m=length, reel_rate=0.0, reel_accel=0.0)
 
 
 def _to(
@@ -530,7 +559,9 @@ def _to(
 
 def disarmed(flight: Flight) -> Flight:
     """The flight with its rotors stopped: nothing selected, the mission rewound."""
-    return replace(flight, selected=Selected.NOTHING, on_mission=False, step=0, step_anchor=None, legs=())
+    return replace(
+        flight, selected=Selected.NOTHING, on_mission=False, step=0, step_anchor=None, reel_to_m=None, legs=()
+    )
 
 
 def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
@@ -619,7 +650,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
         legs, here = stop(flight, view, settings)
         return replace(flight, legs=(*legs, Hold(here, SETTLE_S)), leg_start_us=view.now_us), Report()
     done = Report((), (plan.sequence[flight.step],))
-    flight = replace(flight, step=flight.step + 1, step_anchor=None)
+    flight = replace(flight, step=flight.step + 1, step_anchor=None, reel_to_m=None)
     if following is None:
         rewound = replace(flight, on_mission=False, mission_done=True, step=0)
         return enter(rewound, P.HOLD, view, settings), Report(
@@ -651,6 +682,9 @@ def begin_step(flight: Flight, view: View, settings: Settings) -> Flight:
         flight = replace(flight, speed_m_s=step.speed_m_s)
     if isinstance(step, Land):
         return enter(flight, P.LOWER, view, settings)
+    if isinstance(step, Winch) and flight.reel_to_m is None:
+        here = stop(flight, view, settings)[1]
+        flight = replace(flight, reel_to_m=length_at(flight, here, settings) + step.length_m)
     if isinstance(step, Release) and not flight.released:
         flight = replace(flight, released=True, legs=(), slack_since_us=-1)
     if flight.step_anchor is None and not (flight.legs and _swings(flight.legs[0])):

@@ -17,6 +17,7 @@ from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, asked_jet
 from autopilot.services import identity, snapshot
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.snapshot import GpsFix, Snapshot
+from autopilot.winch import as_reeled
 from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -158,7 +159,7 @@ def make_snapshot(
 ) -> Snapshot:
     """All that telemetry tells of this instant."""
     flight, estimator, command = state.flight, state.estimator, state.command
-    control = control_state(estimator)
+    control = as_reeled(control_state(estimator), estimator, flight.reel_rate)
     view = view_of(estimator, control, setup.settings, now_us, released=flight.released)
     ready = not arming_complaints(flight, view, setup.settings)
     present, healthy = sensor_bits(condition, state, ready, fake_gps, now_us)

@@ -20,7 +20,7 @@ from numpy import linspace
 from autopilot.geometry.linear import Vec3, norm, sub
 from missions.demand import Bounds
 from missions.legs import Leg, legs
-from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint
+from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint, Winch
 from missions.planning import REFUSE, Limits, prepare, trouble_of
 from missions.shaping import Shaped, path_jets, shape
 from missions.signals import evaluate, joints, signal_table
@@ -321,6 +321,7 @@ def _kind(leg: Leg) -> str:
         Waypoint: "waypoint",
         ReturnHome: "return",
         Land: "land",
+        Winch: "winch",
     }
     return names[type(leg.step)]
 

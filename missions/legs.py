@@ -19,6 +19,7 @@ from missions.model import (
     Step,
     Takeoff,
     Waypoint,
+    Winch,
 )
 from missions.signals import evaluate, signal_table
 from missions.transfer import transfer_duration
@@ -28,6 +29,7 @@ from missions.transfer import transfer_duration
 TAUTEN_S = 10.0
 SET_DOWN_S = 10.0
 VERTICAL_SPEED_M_S = 0.8
+REEL_M_S = 0.3  # of a winch as delivered
 RELEASE_S = 2.0  # held when the load is released
 # of transfers, for a vehicle as delivered (MIS_SPEED, MIS_ACCEL)
 SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
@@ -69,6 +71,9 @@ def legs(mission: Mission, speed: float, accel: float) -> Iterator[Leg]:
                 waiting, pace = SET_DOWN_S, min(speed, VERTICAL_SPEED_M_S)
             case Speed():
                 speed = step.speed_m_s
+            case Winch():
+                end = (here[0], here[1], here[2] - step.length_m)
+                pace = min(speed, step.speed_m_s or REEL_M_S)
             case Release():
                 waiting = RELEASE_S
             case Delay() | AttitudeRun():

@@ -60,6 +60,17 @@ class Release:
 
 
 @dataclass(frozen=True, slots=True)
+class Winch:
+    """Make the cable longer by `length_m` (negative: shorter): the vehicle stays, the load sinks or rises.
+
+    `speed_m_s` is the peak rate of the winch; None: what it is set to.
+    """
+
+    length_m: float
+    speed_m_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Sine:
     """sin(2 pi (t - start_s) / period_s + phase_rad), t in seconds since the signals began."""
 
@@ -112,7 +123,7 @@ class AttitudeRun:
     duration_s: float
 
 
-Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Signals | AttitudeRun
+Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | Signals | AttitudeRun
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,6 +87,14 @@ class ReleaseItem(Item):
         return model.Release()
 
 
+class WinchItem(Item):
+    length_m: Metres = Field(description="by which the cable gets longer; negative: shorter")
+    speed_m_s: float | None = Field(None, ge=0.01, le=1.0, description="peak rate of the winch")
+
+    def step(self) -> model.Step:
+        return model.Winch(self.length_m, self.speed_m_s)
+
+
 class SineSpec(Spec):
     period_s: float = Field(ge=0.1, le=2000.0, description="period of the sine")
     phase_deg: float = Field(0.0, ge=-360.0, le=360.0, description="phase at start_s")
@@ -165,6 +173,7 @@ ITEMS: dict[str, type[Item]] = {
     "attitude": AttitudeItem,
     "return": ReturnItem,
     "release": ReleaseItem,
+    "winch": WinchItem,
     "land": LandItem,
 }
 

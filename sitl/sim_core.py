@@ -14,6 +14,7 @@ from autopilot.wire.parameters import ParameterError, ParameterTable
 from sitl.plant.gripper import dropped, takes_hold, without_cable
 from sitl.plant.records import PlantState, Rotors, Truth
 from sitl.plant.step import advance, initial_state
+from sitl.plant.winch import later, reeling
 from sitl.plant.wind import gust
 from sitl.sensors import (
     barometer,
@@ -121,7 +122,7 @@ class SimCore:
         self.command = STOPPED  # in force, N
         self.wind = settings.wind  # ENU, m/s
         self.released = False  # the gripper has let the cable go
-        self._plant_truth = truth  # what the plant is told: without the cable while it is released
+        self._tied = truth  # the truth with the cable as the winch has it
         self.snap_speed = 0.0  # m/s, at which the cable came taut in the last tick; 0: it did not
         self._pulse_at_us = settings.pulse_at_us
         self._commands: deque[tuple[int, Rotors]] = deque()  # (takes effect at, forces)
@@ -142,20 +143,24 @@ class SimCore:
         later_us = settings.actuator_delay_us - self.settings.actuator_delay_us
         self._commands = deque((effect_us + later_us, command) for effect_us, command in self._commands)
         self.truth = truth
-        self._plant_truth = without_cable(truth) if self.released else truth
+        reeled = self._tied
+        self._tied = truth._replace(cable_length=reeled.cable_length, reel_rate=reeled.reel_rate)
         self.settings = settings
         for stream, channel in zip(CHANNEL_STREAMS, self._channels, strict=True):
             if channel is not None:
                 channel.retune(self._noise(stream), self._extra_loss(stream))
 
-    def tick(self, command: Rotors, gripper_open: bool = False) -> Readings:
+    def tick(self, command: Rotors, gripper_open: bool = False, reel_rate: float = 0.0) -> Readings:
         """Integrate to the next tick; `command` (N) is the one that answers the present tick.
 
         It takes effect after the actuator delay; before the first one the rotors stand still. A gripper that
-        opens lets go at once; one that closes takes hold as soon as the load lies within reach.
+        opens lets go at once; one that closes takes hold as soon as the load lies within reach. The winch
+        reaches `reel_rate` (m/s, positive: out) by the next tick; one without a cable stands.
         """
         if gripper_open != self.released:
             self._move_gripper(gripper_open)
+        tick_s = self.settings.tick_us / SECOND_US
+        self._tied = reeling(self._tied, 0.0 if self.released else reel_rate, tick_s)
         now_us = self.now_us
         end_us = now_us + self.settings.tick_us
         commands = self._commands
@@ -170,9 +175,10 @@ class SimCore:
                 stop_us = commands[0][0]
             for channel in self._fitted:
                 stop_us = min(stop_us, channel.due_us)
-            self.state = advance(
-                self.state, self._plant_truth, self.command, wind, (stop_us - now_us) / SECOND_US
-            )
+            h = (stop_us - now_us) / SECOND_US
+            truth = without_cable(self.truth) if self.released else self._tied
+            self.state = advance(self.state, truth, self.command, wind, h)
+            self._tied = later(self._tied, h)
             snap_speed = max(snap_speed, self.state.snap_speed)
             now_us = stop_us
             self._measure(now_us)
@@ -185,10 +191,14 @@ class SimCore:
     def _move_gripper(self, gripper_open: bool) -> None:
         if gripper_open:
             self.state = dropped(self.state)
-        elif not takes_hold(self.state, self.truth):
+        elif not takes_hold(self.state, self._tied):
             return
         self.released = gripper_open
-        self._plant_truth = without_cable(self.truth) if gripper_open else self.truth
+
+    @property
+    def cable_length(self) -> float:
+        """Length of the cable in m, held or not."""
+        return self._tied.cable_length
 
     @property
     def pulse(self) -> Vec3:

@@ -41,9 +41,11 @@ from autopilot.services.requests import (
     StoreParameters,
     Takeoff,
     Terminate,
+    Winch,
 )
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameters import decimal_from_float32
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED
@@ -53,7 +55,7 @@ FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGround
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
 REPEAT_US = 3_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
-GRIPPERS = (0.0, 1.0)  # by number; 0: all of them
+GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all of them
 _NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -307,7 +309,22 @@ def _gripper(call: Call, context: Context) -> Request | Verdict:
 
 
 def _winch(call: Call, context: Context) -> Request | Verdict:
-    return Verdict(UNSUPPORTED, "Winch: the length of the cable cannot be changed")
+    if call.p[0] not in WINCHES and not math.isnan(call.p[0]):
+        return _refused(f"Winch: param1 = {call.p[0]:g}; there is one, 1")
+    action, length, rate = call.p[1], *map(decimal_from_float32, call.p[2:])
+    if action == mavlink.WINCH_RELATIVE_LENGTH_CONTROL:
+        if not math.isfinite(length) or math.isinf(rate):
+            return _refused(f"Winch: param3 = {length:g} m at param4 = {rate:g} m/s; must be numbers")
+        return Winch(length, abs(rate) if rate else None)
+    if action == mavlink.WINCH_RATE_CONTROL:
+        if not math.isfinite(rate):
+            return _refused(f"Winch: param4 = {rate:g} m/s; must be a number")
+        return Winch(math.copysign(math.inf, rate), abs(rate)) if rate else Winch(0.0)
+    if action == mavlink.WINCH_HOLD:
+        return Winch(0.0)
+    if action == mavlink.WINCH_RETRACT:
+        return Winch(-math.inf)
+    return Verdict(UNSUPPORTED, f"Winch: action {call.p[1]:g} is not offered; 1, 2, 5 and 6 are")
 
 
 def _plain(request: Request) -> Parser:

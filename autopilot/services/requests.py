@@ -155,6 +155,15 @@ class Release:
 
 
 @dataclass(frozen=True, slots=True)
+class Winch:
+    """Make the cable longer by `length_m` (negative: shorter; infinite: as far as it goes; 0: stop).
+    `speed_m_s` None: as fast as the winch may."""
+
+    length_m: float
+    speed_m_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Grab:
     """Take hold of the cable of a load that lies within reach; nothing where it was never let go."""
 
@@ -235,6 +244,7 @@ Decided = (
     | SetHome
     | Release
     | Grab
+    | Winch
     | Terminate
     | RunPrearmChecks
     | Reboot

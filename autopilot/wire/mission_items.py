@@ -15,7 +15,7 @@ Positions are positions of the load. Where a standard command leaves freedom:
 * DO_JUMP is flown by flying its items again; one without end is refused.
 * Commands that point or trigger something (camera, gimbal, region of interest ...) and those above
   MAV_CMD_NAV_LAST that are not known are kept and not flown. Commands whose effect somebody relies on and
-  that this vehicle has not (winch, parachute, termination, change of mode or home) are refused.
+  that this vehicle has not (parachute, termination, change of mode or home) are refused.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ from missions.model import (
     Takeoff,
     Term,
     Waypoint,
+    Winch,
 )
 
 # limits of what is flown, those of the mission file where it has them
@@ -60,6 +61,8 @@ MOST_FLOWN = 4000  # items, those that jumps repeat counted again
 MOST_TURNS, MOST_RADIUS_M = 1000.0, 1000.0
 TURN_SPEED_M_S = 1.5  # of NAV_LOITER_TURNS where no speed was set before
 TURN_ACCEL_M_S2 = 1.0  # inwards
+LONGEST_CABLE_M, FASTEST_REEL_M_S = 100.0, 1.0
+LEAST_REELED_M = 0.3  # height at which a winch leaves the load
 _HOME_ROW_M = 1.0  # how near to home item 0 is home
 
 _MISSION = mavlink.MAV_FRAME_MISSION
@@ -152,6 +155,9 @@ def _items(step: Step, home: Home, seq: int) -> Iterator[WireItem]:
             yield _item(mavlink.MAV_CMD_NAV_DELAY, duration_s, -1.0, -1.0, -1.0)
         case Release():
             yield _item(mavlink.MAV_CMD_DO_GRIPPER, 1.0, mavlink.GRIPPER_ACTION_RELEASE)
+        case Winch(length_m, speed_m_s):
+            action = mavlink.WINCH_RELATIVE_LENGTH_CONTROL
+            yield _item(mavlink.MAV_CMD_DO_WINCH, 1.0, action, length_m, speed_m_s or 0.0)
         case ReturnHome():
             yield _item(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
         case Land():
@@ -317,6 +323,8 @@ class _Reader:
                 self._add(seq, Speed(self._speed))
         elif command == mavlink.MAV_CMD_DO_GRIPPER:
             self._gripper(seq, item)
+        elif command == mavlink.MAV_CMD_DO_WINCH:
+            self._winch(seq, item)
         elif command == mavlink.MAV_CMD_DO_CHANGE_ALTITUDE:
             self._change_altitude(seq, item)
         elif command in (mavlink.MAV_CMD_NAV_DELAY, mavlink.MAV_CMD_CONDITION_DELAY):
@@ -341,6 +349,22 @@ class _Reader:
         elif action == mavlink.GRIPPER_ACTION_GRAB and self._released:
             text = "the load, released before, can be taken on the ground only and not by a mission"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM2)
+
+    def _winch(self, seq: int, item: WireItem) -> None:
+        self._expect_load(seq)
+        _choice(seq, 1, "winch", item.param1, (0, 1))
+        _choice(seq, 2, "winch action", item.param2, (mavlink.WINCH_RELATIVE_LENGTH_CONTROL,))
+        length = _check(seq, 3, "length", item.param3, "m", -LONGEST_CABLE_M, LONGEST_CABLE_M)
+        rate = _check(seq, 4, "rate", abs(item.param4), "m/s", 0.0, FASTEST_REEL_M_S)
+        if self._left_at is None:
+            text = "nothing before it says how high the load hangs"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+        east, north, height = self._left_at
+        if height - length < LEAST_REELED_M:
+            text = f"it would leave the load at {height - length:.2f} m; least {LEAST_REELED_M} m"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM3)
+        self._left_at = (east, north, height - length)
+        self._add(seq, Winch(length, rate or None))
 
     def _expect_load(self, seq: int) -> None:
         """Signals and attitude runs swing a load."""
@@ -520,6 +544,7 @@ _STANDARD = frozenset(
         mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
         mavlink.MAV_CMD_DO_CHANGE_ALTITUDE,
         mavlink.MAV_CMD_DO_GRIPPER,
+        mavlink.MAV_CMD_DO_WINCH,
     }
 )
 _PLACES = frozenset(
@@ -537,7 +562,6 @@ _RELIED_ON = frozenset(
         mavlink.MAV_CMD_DO_SET_HOME,
         mavlink.MAV_CMD_DO_FLIGHTTERMINATION,
         mavlink.MAV_CMD_DO_PARACHUTE,
-        mavlink.MAV_CMD_DO_WINCH,
         mavlink.MAV_CMD_DO_REPOSITION,
         mavlink.MAV_CMD_DO_ORBIT,
         mavlink.MAV_CMD_DO_PAUSE_CONTINUE,

@@ -53,7 +53,7 @@ from gcs.sweep.pilot import FUSED_LAWS, Pilot, PilotModel
 from gcs.sweep.plan import simulated
 from gcs.sweep.world import Floats, new_world
 from missions.legs import expected_duration_s
-from missions.model import Mission
+from missions.model import Mission, Winch
 from missions.planning import Limits
 from sitl.hil import HilSimulator
 from sitl.plant.gripper import dropped, without_cable
@@ -111,6 +111,8 @@ class _NoLog:
 
 def boarding(mission: Mission, conditions: Conditions) -> Boarding:
     """When the real ground station would arm and start: from the real dialogue, flown until then."""
+    if any(isinstance(step, Winch) for step in mission.steps):
+        raise ValueError(f"{mission.name} works the winch, which no sweep simulates; fly it by gcs fly")
     times: dict[Phase, int] = {}
 
     def watch(onboard: Onboard, _: HilSimulator) -> bool:

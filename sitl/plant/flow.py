@@ -39,12 +39,14 @@ def _shift(motion: Motion, s: float, rate: Motion) -> Motion:
         axpy(s, rate.cable_dot, motion.cable_dot),
         (p[0] + s * d[0], p[1] + s * d[1], p[2] + s * d[2], p[3] + s * d[3]),
         axpy(s, rate.omega, motion.omega),
+        motion.length + s * rate.length,
+        motion.length_dot + s * rate.length_dot,
     )
 
 
 @kernel
 def stretched(motion: Motion, truth: Truth) -> Motion:
-    """The pair with its distance set to the cable length and no velocity along the cable.
+    """The pair with its distance set to the cable length and no velocity along the cable but the winch's.
 
     Centre of mass and linear momentum stay. After a taut step this takes back the integrator's drift; at the
     instant a slack cable comes taut it is the perfectly inelastic impact.
@@ -52,15 +54,17 @@ def stretched(motion: Motion, truth: Truth) -> Motion:
     length = norm(motion.cable)
     q_cable = scale(1.0 / length, motion.cable)
     share = truth.quad_mass / (truth.quad_mass + truth.load_mass)
-    excess = length - truth.cable_length
-    speed = dot(q_cable, motion.cable_dot)
+    excess = length - motion.length
+    speed = dot(q_cable, motion.cable_dot) - motion.length_dot
     return Motion(
         axpy(-share * excess, q_cable, motion.x_load),
         axpy(-share * speed, q_cable, motion.v_load),
-        scale(truth.cable_length, q_cable),
+        scale(motion.length, q_cable),
         axpy(-speed, q_cable, motion.cable_dot),
         motion.quat,
         motion.omega,
+        motion.length,
+        motion.length_dot,
     )
 
 
@@ -74,7 +78,7 @@ def flow(
         half_decay = decay(0.5 * h / truth.rotor_tau)
     else:
         rotor_force = command
-    nothing = Motion(ZERO, ZERO, ZERO, ZERO, (0.0, 0.0, 0.0, 0.0), ZERO)
+    nothing = Motion(ZERO, ZERO, ZERO, ZERO, (0.0, 0.0, 0.0, 0.0), ZERO, 0.0, 0.0)
     rate, total = nothing, nothing
     force, remainder, tension_before = rotor_force, 1.0, 0.0
     # a loop, so that the equations are compiled once and not five times
@@ -83,7 +87,10 @@ def flow(
             at = _shift(motion, _STAGE_SHIFT[stage] * h, rate)
         else:
             at = _shift(motion, h, total)
-            at = Motion(at.x_load, at.v_load, at.cable, at.cable_dot, quat_normalise(at.quat), at.omega)
+            quat = quat_normalise(at.quat)
+            at = Motion(
+                at.x_load, at.v_load, at.cable, at.cable_dot, quat, at.omega, at.length, at.length_dot
+            )
             if taut > 0.0:
                 at = stretched(at, truth)
         # the stages lie at 0, 1/2, 1/2, 1 and 1 of the step

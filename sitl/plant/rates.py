@@ -11,8 +11,9 @@
 | mu | reduced_mass | kg | m_L m_Q / (m_L + m_Q) |
 
 Let F_L and F_Q be all forces on load and vehicle but that of the cable. Then m_L x_L'' = F_L - T q and
-m_Q x_Q'' = F_Q + T q, and |x_L - x_Q| = L asks for T = mu (q . (F_L/m_L - F_Q/m_Q) + L |q'|^2), which without
-drag and ground is (2-31) and (2-33). Slack is the same with T = 0.
+m_Q x_Q'' = F_Q + T q, and |x_L - x_Q| = L asks for T = mu (q . (F_L/m_L - F_Q/m_Q) + L |q'|^2 - L''), which
+without drag, ground and winch is (2-31) and (2-33). Slack is the same with T = 0. In the cable vector c = L q
+the two last terms are (c'.c' - L'^2) / L - L''.
 
 Assumed: cable massless, inextensible, attached at the vehicle's centre of mass; the load is a point.
 """
@@ -58,7 +59,8 @@ def rates(motion: Motion, rotor_force: Rotors, truth: Truth, wind: Vec3, taut: f
         length = norm(motion.cable)
         q_cable = scale(1.0 / length, motion.cable)
         reduced_mass = truth.load_mass * truth.quad_mass / (truth.load_mass + truth.quad_mass)
-        pull = dot(q_cable, a_cable) + dot(motion.cable_dot, motion.cable_dot) / length
+        turning = dot(motion.cable_dot, motion.cable_dot) - motion.length_dot * motion.length_dot
+        pull = dot(q_cable, a_cable) + turning / length - truth.reel_accel
         tension = reduced_mass * pull
         a_load = axpy(-tension / truth.load_mass, q_cable, a_load)
         a_cable = axpy(-pull, q_cable, a_cable)
@@ -74,6 +76,8 @@ def rates(motion: Motion, rotor_force: Rotors, truth: Truth, wind: Vec3, taut: f
             a_cable,
             quat_derivative(motion.quat, Omega),
             (moment[0] / J[0], moment[1] / J[1], moment[2] / J[2]),
+            motion.length_dot,
+            truth.reel_accel,
         ),
         tension,
         ground_quad[2],

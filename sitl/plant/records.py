@@ -45,6 +45,8 @@ class Truth(NamedTuple):
     contact_damping: float  # damping ratio
     friction: float  # Coulomb coefficient
     slip_rate: float  # 1/s, rate at which friction below the Coulomb limit brakes a slide
+    reel_rate: float = 0.0  # m/s, at which `cable_length` grows at the beginning of a step
+    reel_accel: float = 0.0  # m/s^2, constant along a step
 
 
 class PlantState(NamedTuple):
@@ -78,6 +80,9 @@ class PlantState(NamedTuple):
 class Motion(NamedTuple):
     """What is integrated; also its rate of change, field by field.
 
+    The winch's part, `length` and `length_dot`, is known beforehand; it goes along so that every stage of a
+    step has it.
+
     The pair is written as the load and the cable vector `cable = x_load - x_quad`, in both modes: a linear
     change of the coordinates (x_L, q) of (2-30)-(2-35), under which a Runge-Kutta step is the same step.
     """
@@ -88,6 +93,8 @@ class Motion(NamedTuple):
     cable_dot: Vec3
     quat: Quat
     omega: Vec3
+    length: float  # m, of the cable
+    length_dot: float  # m/s
 
 
 class Rates(NamedTuple):

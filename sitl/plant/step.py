@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import ceil
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, dot, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, axpy, dot, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.geometry.so3 import IDENTITY_QUAT
 from sitl.plant.contact import quad_reach
@@ -59,11 +59,17 @@ def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
 
 
 @kernel
-def _excess(motion: Motion, tension: float, truth: Truth, taut: float) -> float:
+def _excess(motion: Motion, tension: float, taut: float) -> float:
     """Positive when the mode must change: N the cable would push, or m it is longer than it is."""
     if taut > 0.0:
         return -tension - _TENSION_TOLERANCE
-    return norm(motion.cable) - truth.cable_length - _LENGTH_TOLERANCE
+    return norm(motion.cable) - motion.length - _LENGTH_TOLERANCE
+
+
+@kernel
+def _closing(motion: Motion) -> float:
+    """Speed in m/s at which the ends part faster than the cable is let out."""
+    return dot(motion.cable, motion.cable_dot) / norm(motion.cable) - motion.length_dot
 
 
 @kernel
@@ -141,6 +147,9 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
 
     Meant for h up to MAX_STEP; a longer one is divided. A state that leaves the domain of the model (see the
     limits above) is not returned: the one before it is, marked `diverged`, and stays.
+
+    Of a winch at work `truth` says length, rate and acceleration as the step begins; the next step wants
+    them as they are then.
     """
     if state.diverged > 0.0:
         return state
@@ -149,10 +158,21 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
     if taut > 0.0:
         cable = scale(truth.cable_length, state.q_cable)
         cable_dot = scale(truth.cable_length, state.q_cable_dot)
+        if truth.reel_rate != 0.0:
+            cable_dot = axpy(truth.reel_rate, state.q_cable, cable_dot)
     else:
         cable = sub(state.x_load, state.x_quad)
         cable_dot = sub(state.v_load, state.v_quad)
-    motion = Motion(state.x_load, state.v_load, cable, cable_dot, state.quat_wxyz, state.omega_body)
+    motion = Motion(
+        state.x_load,
+        state.v_load,
+        cable,
+        cable_dot,
+        state.quat_wxyz,
+        state.omega_body,
+        truth.cable_length,
+        truth.reel_rate,
+    )
 
     remaining, impacts, snap_speed = h, 0, 0.0
     while True:
@@ -161,14 +181,14 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
         switched = False
         for trial in range(_MAX_SEARCH):
             end = flow(motion, rotor_force, command, truth, wind, taut, t)
-            excess = _excess(end.motion, end.tension, truth, taut)
+            excess = _excess(end.motion, end.tension, taut)
             if trial == 0:
-                low_excess, high_excess = _excess(motion, end.tension_before, truth, taut), excess
+                low_excess, high_excess = _excess(motion, end.tension_before, taut), excess
                 if taut <= 0.0 and impacts >= _MAX_IMPACTS:
                     break
                 if low_excess > 0.0:
                     # overdue: the forces jumped, or the last step had used up its impacts
-                    switched = taut > 0.0 or dot(motion.cable, motion.cable_dot) > 0.0
+                    switched = taut > 0.0 or _closing(motion) > 0.0
                     break
                 if not excess > 0.0:
                     break
@@ -196,8 +216,7 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
             else:
                 taut = 1.0
                 impacts += 1
-                closing = dot(motion.cable, motion.cable_dot) / norm(motion.cable)
-                snap_speed = max(snap_speed, closing)
+                snap_speed = max(snap_speed, _closing(motion))
                 motion = stretched(motion, truth)
         elif not remaining > 0.0:
             break

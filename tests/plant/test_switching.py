@@ -186,6 +186,8 @@ def test_impact_keeps_momentum_and_never_gains_energy(
         tuple(map(float, v_load - v_quad)),
         (1.0, 0.0, 0.0, 0.0),
         CALM,
+        truth.cable_length,
+        0.0,
     )
     after = stretched(motion, truth)
     v_load_after = np.array(after.v_load)

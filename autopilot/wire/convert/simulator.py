@@ -31,8 +31,9 @@ _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 _NAN3: Vec3 = (math.nan, math.nan, math.nan)
-_GRIPPER = 4  # HIL_ACTUATOR_CONTROLS has room for sixteen: behind the rotors
-_NO_CONTROLS = [0.0] * 11
+_GRIPPER, _WINCH = 4, 5  # HIL_ACTUATOR_CONTROLS has room for sixteen: behind the rotors
+_NO_CONTROLS = [0.0] * 10
+REEL_MAX = 2.0  # m/s, of a winch whose control is 1
 
 
 class HilSensor(NamedTuple):
@@ -353,17 +354,24 @@ class HilActuatorControls(NamedTuple):
     armed: bool
     lockstep: bool
     gripper_open: bool = False
+    reel_rate: float = 0.0  # m/s, at which the winch lets the cable out
 
 
 def hil_actuator_controls_message(
-    time_us: int, forces: Forces, armed: bool, lockstep: bool, gripper_open: bool = False
+    time_us: int,
+    forces: Forces,
+    armed: bool,
+    lockstep: bool,
+    gripper_open: bool = False,
+    reel_rate: float = 0.0,
 ) -> Any:
-    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`: controls[i] = force of rotor i+1 / ROTOR_FMAX, and
-    controls[4] = 1 while the gripper that holds the cable is open."""
+    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`: controls[i] = force of rotor i+1 / ROTOR_FMAX,
+    controls[4] = 1 while the gripper that holds the cable is open, controls[5] = winch rate / REEL_MAX.
+    """
     controls = [force / ROTOR_FMAX for force in forces]
     return mavlink.MAVLink_hil_actuator_controls_message(
         time_us,
-        [*controls, 1.0 if gripper_open else 0.0, *_NO_CONTROLS],
+        [*controls, 1.0 if gripper_open else 0.0, reel_rate / REEL_MAX, *_NO_CONTROLS],
         _ARMED | _CUSTOM if armed else _CUSTOM,
         _LOCKSTEP if lockstep else 0,
     )
@@ -378,4 +386,5 @@ def read_hil_actuator_controls(m: Any) -> HilActuatorControls:
         bool(m.mode & _ARMED),
         bool(m.flags & _LOCKSTEP),
         m.controls[_GRIPPER] > 0.5,
+        m.controls[_WINCH] * REEL_MAX,
     )

@@ -1,0 +1,41 @@
+"""The winch: how long the cable is, by the rate at which the drum is told to turn.
+
+The rate follows what is wanted within a tick, or as fast as GREATEST_ACCEL allows: within a tick the length
+is a polynomial of degree two in time. The drum turns whatever pulls at it, and stands firm when it stands.
+"""
+
+from __future__ import annotations
+
+from math import isnan, sqrt
+
+from sitl.plant.records import Truth
+
+GREATEST_RATE = 2.0  # m/s
+GREATEST_ACCEL = 5.0  # m/s^2
+SHORTEST = 0.05  # m, then the drum stops
+_STANDS = 1e-9  # m/s, a rate that is rounding
+
+
+def reeling(truth: Truth, wanted_rate: float, tick_s: float) -> Truth:
+    """The truth of a tick in which the drum goes to `wanted_rate`, m/s, positive: out; NaN: it stops."""
+    if isnan(wanted_rate):
+        wanted_rate = 0.0
+    # inwards no faster than it can stop at the end
+    left = max(truth.cable_length - SHORTEST, 0.0)
+    fastest_in = min(GREATEST_RATE, sqrt(GREATEST_ACCEL * left))
+    wanted_rate = min(GREATEST_RATE, max(-fastest_in, wanted_rate))
+    rate = truth.reel_rate
+    if wanted_rate == 0.0 and abs(rate) < _STANDS:
+        return truth._replace(reel_rate=0.0, reel_accel=0.0)
+    accel = min(GREATEST_ACCEL, max(-GREATEST_ACCEL, (wanted_rate - rate) / tick_s))
+    return truth._replace(reel_accel=accel)
+
+
+def later(truth: Truth, h: float) -> Truth:
+    """The truth h seconds on, within the tick."""
+    rate, accel = truth.reel_rate, truth.reel_accel
+    if rate == 0.0 and accel == 0.0:
+        return truth
+    return truth._replace(
+        cable_length=truth.cable_length + h * (rate + 0.5 * h * accel), reel_rate=rate + h * accel
+    )
