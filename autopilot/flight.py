@@ -273,6 +273,12 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     return fence.complaint(x_load[0], x_load[1])
 
 
+def carries(flight: Flight) -> bool:
+    """Whether the load must be known to go on: not one that is released or lies, the vehicle landing
+    beside it."""
+    return not flight.released and flight.phase != Phase.SET_DOWN
+
+
 def below(x_quad: Vec3, settings: Settings) -> Vec3:
     """Where a load would hang under the vehicle."""
     return (x_quad[0], x_quad[1], x_quad[2] - settings.cable_length_m)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import NamedTuple
 
@@ -15,7 +15,17 @@ from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.parting import parted, untied
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
-from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
+from autopilot.flight import (
+    IN_AIR,
+    Flight,
+    Phase,
+    Report,
+    Settings,
+    View,
+    carries,
+    jet_ahead,
+    leg_time_s,
+)
 from autopilot.following import Posture
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
 from autopilot.geometry.so3 import tilt_angle
@@ -28,13 +38,14 @@ from autopilot.guidance import (
     Catch,
     Leg,
     Swing,
+    least_move_s,
 )
 from autopilot.laws import Law, Memory
 from autopilot.mixer import MixerResult, mix
 from autopilot.observer import Observed, ObserverConstants, nominal, observe
 from autopilot.scheduler import is_due
 from autopilot.supervisor import advance
-from autopilot.winch import as_if_firm, as_reeled, cable_now, lengthened, with_cable, with_reel
+from autopilot.winch import as_if_firm, as_reeled, cable_now, lengthened, with_reel
 
 HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 by the mass of Table 4-1
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
@@ -73,6 +84,23 @@ class FlightState(NamedTuple):
     observed: Observed | None  # of load and wind; None before the first tick
 
 
+def with_cable(setup: Setup, flight: Flight) -> Setup:
+    """The setup of a vehicle whose cable is as the winch has it; the same where that never worked."""
+    length = flight.cable_m
+    if length is None:
+        return setup
+    settings = setup.settings
+    return replace(
+        setup,
+        vehicle=setup.vehicle._replace(cable_length=length),
+        law=setup.law.with_cable(length),
+        tuning=setup.tuning._replace(cable_length=length),
+        settings=replace(
+            settings, cable_length_m=length, least_move_s=least_move_s(length, settings.gravity_m_s2)
+        ),
+    )
+
+
 def initial_state() -> FlightState:
     """A disarmed vehicle that knows nothing."""
     return FlightState(blank_state(), Flight(), None, 0, NO_COMMAND, STOPPED, 0, False, resting(), None)
@@ -84,7 +112,7 @@ def view_of(
     settings: Settings,
     now_us: int,
     pull_n: float = nan,
-    released: bool = False,
+    carrying: bool = True,
 ) -> View:
     """What the supervisor sees."""
     return View(
@@ -95,7 +123,7 @@ def view_of(
         state.v_load,
         estimator.load.taut > 0.0,
         tilt_angle(state.R),
-        complaints(estimator, settings.sensor_age_limit_s, carries=not released),
+        complaints(estimator, settings.sensor_age_limit_s, carries=carrying),
         pull_n,
     )
 
@@ -137,7 +165,7 @@ def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState
     estimator, reel = before.estimator, before.flight
     state = as_reeled(control_state(estimator), estimator, reel.reel_rate)
     pull_n = felt_pull(before, state, setup)
-    view = view_of(estimator, state, setup.settings, now_us, pull_n, before.flight.released)
+    view = view_of(estimator, state, setup.settings, now_us, pull_n, carries(before.flight))
     flight, report = advance(before.flight, view, setup.settings)
 
     taut = view.taut

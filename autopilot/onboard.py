@@ -13,8 +13,8 @@ from autopilot.condition import Condition, battery_constants, follow
 from autopilot.decisions import decide, with_plan
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
-from autopilot.flight import ON_GROUND, Phase, Plan, settings_from
-from autopilot.flight_core import Setup, initial_state, step, view_of
+from autopilot.flight import ON_GROUND, Phase, Plan, carries, settings_from
+from autopilot.flight_core import Setup, initial_state, step, view_of, with_cable
 from autopilot.flight_log import FlightLog, LogChunk, Sample
 from autopilot.laws import (
     believed_actuation,
@@ -45,7 +45,7 @@ from autopilot.services.records import (
 from autopilot.services.requests import ChangeSigningKey, Reboot
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
-from autopilot.winch import as_reeled, commanded_rate, with_cable
+from autopilot.winch import as_reeled, commanded_rate
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
 from autopilot.wire.dialect import plumbline as mavlink
@@ -351,7 +351,7 @@ class Onboard:
         estimator, flight = state.estimator, state.flight
         settings = with_cable(self._setup, flight).settings
         seen = as_reeled(control_state(estimator), estimator, flight.reel_rate)
-        view = view_of(estimator, seen, settings, self.now_us, released=flight.released)
+        view = view_of(estimator, seen, settings, self.now_us, carrying=carries(flight))
         flight, verdict = decide(flight, request, view, settings)
         self._state = state._replace(flight=flight)
         return verdict

@@ -9,7 +9,17 @@ from autopilot.condition import BatteryConstants, Condition, remaining, sensors,
 from autopilot.decisions import arming_complaints
 from autopilot.estimation.filter import control_state
 from autopilot.estimation.records import TRACKER
-from autopilot.flight import CARRYING, IN_AIR, ON_GROUND, Flight, Guide, Phase, Selected, leg_time_s
+from autopilot.flight import (
+    CARRYING,
+    IN_AIR,
+    ON_GROUND,
+    Flight,
+    Guide,
+    Phase,
+    Selected,
+    carries,
+    leg_time_s,
+)
 from autopilot.flight_core import FlightState, Setup, view_of
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.so3 import quat_from_rotation
@@ -160,7 +170,7 @@ def make_snapshot(
     """All that telemetry tells of this instant."""
     flight, estimator, command = state.flight, state.estimator, state.command
     control = as_reeled(control_state(estimator), estimator, flight.reel_rate)
-    view = view_of(estimator, control, setup.settings, now_us, released=flight.released)
+    view = view_of(estimator, control, setup.settings, now_us, carrying=carries(flight))
     ready = not arming_complaints(flight, view, setup.settings)
     present, healthy = sensor_bits(condition, state, ready, fake_gps, now_us)
     tracked = estimator.vehicle.source == TRACKER and healthy & snapshot.TRACKER
@@ -254,6 +264,7 @@ def make_snapshot(
         mission_current=seq,
         mission_total=len(mission.items),
         mission_state=mission_state(flight, len(mission.items)),
+        reel_rate=flight.reel_rate,
     )
 
 

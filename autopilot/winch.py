@@ -14,18 +14,14 @@ up to 1 m/s it is small beside the damping of the cable's loop.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from autopilot.control.records import State
 from autopilot.estimation.filter import Readings
 from autopilot.estimation.records import EstimatorState
 from autopilot.flight import Flight, leg_time_s
 from autopilot.geometry.linear import Vec3, axpy
-from autopilot.guidance import least_move_s, top_of
+from autopilot.guidance import top_of
 from autopilot.observer import Observed
-
-if TYPE_CHECKING:
-    from autopilot.flight_core import Setup
 
 
 def cable_now(flight: Flight, now_us: int) -> Flight:
@@ -51,23 +47,6 @@ def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
     if not flight.legs or top_of(flight.legs[0]) is None:
         return 0.0
     return -flight.legs[0].jet(leg_time_s(flight, now_us) + period_s)[1][2]
-
-
-def with_cable(setup: Setup, flight: Flight) -> Setup:
-    """The setup of a vehicle whose cable is as the winch has it; the same where that never worked."""
-    length = flight.cable_m
-    if length is None:
-        return setup
-    settings = setup.settings
-    return replace(
-        setup,
-        vehicle=setup.vehicle._replace(cable_length=length),
-        law=setup.law.with_cable(length),
-        tuning=setup.tuning._replace(cable_length=length),
-        settings=replace(
-            settings, cable_length_m=length, least_move_s=least_move_s(length, settings.gravity_m_s2)
-        ),
-    )
 
 
 def lengthened(estimator: EstimatorState, grown: float) -> EstimatorState:

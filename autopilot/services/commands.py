@@ -313,7 +313,7 @@ def _winch(call: Call, context: Context) -> Request | Verdict:
         return _refused(f"Winch: param1 = {call.p[0]:g}; there is one, 1")
     action, length, rate = call.p[1], *map(decimal_from_float32, call.p[2:])
     if action == mavlink.WINCH_RELATIVE_LENGTH_CONTROL:
-        if not math.isfinite(length) or math.isinf(rate):
+        if not (math.isfinite(length) and math.isfinite(rate)):
             return _refused(f"Winch: param3 = {length:g} m at param4 = {rate:g} m/s; must be numbers")
         return Winch(length, abs(rate) if rate else None)
     if action == mavlink.WINCH_RATE_CONTROL:

@@ -133,3 +133,4 @@ class Snapshot(NamedTuple):
     mission_current: int = 0
     mission_total: int = 0
     mission_state: int = mavlink.MISSION_STATE_NO_MISSION
+    reel_rate: float = 0.0  # m/s, at which the winch lets the cable out

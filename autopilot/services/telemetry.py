@@ -283,7 +283,7 @@ def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _winch_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (winch_status_message(s.now_us, s.distance, s.tension),)
+    return (winch_status_message(s.now_us, s.distance, s.tension, s.reel_rate),)
 
 
 def _autopilot_version(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

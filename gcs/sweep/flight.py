@@ -18,7 +18,17 @@ from autopilot.estimation.filter import control_state
 from autopilot.estimation.parting import parted, untied
 from autopilot.estimation.records import ImuReading, new_history
 from autopilot.flight import CARRYING as CARRYING_PHASES
-from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, View, jet_ahead, leg_time_s
+from autopilot.flight import (
+    IN_AIR,
+    ON_GROUND,
+    Flight,
+    Phase,
+    Plan,
+    View,
+    carries,
+    jet_ahead,
+    leg_time_s,
+)
 from autopilot.flight_core import FlightState, Setup, control, initial_state, view_of
 from autopilot.geometry.linear import ZERO
 from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Catch, Creep, asked_jet
@@ -317,8 +327,7 @@ class _Flight:
     def _view(self, now_us: int) -> View:
         state = self.state
         control = control_state(state.estimator)
-        released = state.flight.released
-        return view_of(state.estimator, control, self.setup.settings, now_us, released=released)
+        return view_of(state.estimator, control, self.setup.settings, now_us, carrying=carries(state.flight))
 
     # ---- how it ends
 

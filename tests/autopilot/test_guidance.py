@@ -24,6 +24,7 @@ from autopilot.guidance import (
     Hold,
     Leg,
     Pass,
+    Reel,
     Run,
     Slow,
     Swing,
@@ -57,6 +58,7 @@ LEGS: dict[str, Leg] = {
     "pass": Pass(PASSAGE, (0.02, -0.01, 0.0), 1.7),
     "slow": Slow(Run(HERE, unshaped(SIGNALS)), 0.9, 2.4),
     "swing": Swing(HERE, 0.1, 0.2, 1.5, QUAD_ATTITUDE),
+    "reel": Reel(HERE, HERE[2] + 0.7, 0.4, 1.0, 0.6),
     "calm": Calm(HERE, (0.2, 0.1, 0.0), (1.0, -0.5, 0.0), False, 1.2),
 }
 LEAST_S = least_move_s(0.7, 9.81)

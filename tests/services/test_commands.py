@@ -30,6 +30,7 @@ from autopilot.services.requests import (
     StartMission,
     Takeoff,
     Terminate,
+    Winch,
 )
 from autopilot.wire.convert import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
@@ -132,7 +133,21 @@ LONG = [
     (211, (2, 0), None, DENIED),
     (211, (1, 3), None, DENIED),
     (211, (1, NAN), None, DENIED),
-    (42600, (1, 1), None, UNSUPPORTED),
+    (42600, (1, 1, 0.5, 0.2), Winch(0.5, 0.2), OK),
+    (42600, (0, 1, -0.5, -0.2), Winch(-0.5, 0.2), OK),
+    (42600, (NAN, 1, 0.5), Winch(0.5), OK),
+    (42600, (1, 2, 0, 0.1), Winch(math.inf, 0.1), OK),
+    (42600, (1, 2, 0, -0.1), Winch(-math.inf, 0.1), OK),
+    (42600, (1, 2, 0, 0), Winch(0.0), OK),
+    (42600, (1, 5), Winch(0.0), OK),
+    (42600, (1, 6), Winch(-math.inf), OK),
+    (42600, (2, 1, 0.5), None, DENIED),
+    (42600, (1, 1, NAN), None, DENIED),
+    (42600, (1, 1, 0.5, math.inf), None, DENIED),
+    (42600, (1, 1, 0.5, NAN), None, DENIED),
+    (42600, (1, 2, 0, NAN), None, DENIED),
+    (42600, (1, 0), None, UNSUPPORTED),
+    (42600, (1, 4), None, UNSUPPORTED),
     (65535, (), None, UNSUPPORTED),
 ]
 

@@ -231,3 +231,20 @@ def test_the_gripper_opens_at_its_tick_and_closes_on_a_load_within_reach(core) -
     while flown.state.vehicle_on_ground == 0.0:
         flown.tick((0.0,) * 4, gripper_open=False)
     assert not flown.released
+
+
+def test_the_winch_reaches_the_rate_it_is_told_by_the_next_tick(core) -> None:
+    """The length is the integral of a rate that is linear between ticks, whatever sensors cut them."""
+    flown = core(SIM_ACT_DELAY_MS=20.0)
+    rates = [0.3 * np.sin(0.02 * k) ** 2 for k in range(150)]
+    for rate in rates:
+        flown.tick((0.0,) * 4, reel_rate=rate)
+    expected = 0.7 + 0.004 * (sum(rates) - 0.5 * rates[-1])
+    assert flown.cable_length == pytest.approx(expected, abs=1e-13)
+    for _ in range(3):
+        flown.tick((0.0,) * 4)
+    standing = flown.cable_length
+    flown.tick((0.0,) * 4)
+    assert flown.cable_length == standing
+    flown.tick((0.0,) * 4, gripper_open=True, reel_rate=0.3)
+    assert flown.cable_length == standing  # nothing hangs on it

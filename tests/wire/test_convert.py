@@ -104,6 +104,7 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.booleans(),
             st.booleans(),
             st.booleans(),
+            numbers,
         ),
         convert.hil_actuator_controls_message,
         convert.read_hil_actuator_controls,

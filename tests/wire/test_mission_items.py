@@ -42,6 +42,7 @@ from missions.model import (
     Takeoff,
     Term,
     Waypoint,
+    Winch,
 )
 from missions.signals import evaluate, signal_table
 
@@ -95,6 +96,7 @@ def _jet(signals: Signals, t: float) -> Any:
 TERM = item(31010, 0.0, 1.0, 0.5, 0.5, y=-1)
 FACTOR = item(31011, x=3_000_000)
 RUN = item(31012, x=10_000)
+UP = item(22, frame=6, z=5.0)
 
 
 def numbers(value: Any) -> list[Any]:
@@ -145,6 +147,18 @@ def test_decimals_come_back_as_they_were_typed() -> None:
     assert decode_items(encode_steps(sent, HOME), HOME) == sent
 
 
+def test_the_winch_comes_back_and_moves_where_the_load_hangs() -> None:
+    sent = (Takeoff(2.0), Winch(0.5, 0.2), Winch(-0.3))
+    items = encode_steps(sent, HOME)
+    assert [(one.command, one.param2, one.param3, one.param4) for one in items[1:]] == [
+        (42600, 1.0, 0.5, pytest.approx(0.2)),
+        (42600, 1.0, pytest.approx(-0.3), 0.0),
+    ]
+    assert decode_items(items, HOME) == sent
+    with pytest.raises(MissionItemError, match=r"leave the load at 0\.20 m"):
+        decode_items([*items[:2], item(42600, 1.0, 1.0, 1.3)], HOME)
+
+
 def test_axes_are_those_of_ned() -> None:
     for axis, unit in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0))):
         term = Term(axis, 2.0, 0.0, 1.0, None, 0.0)  # type: ignore[arg-type]
@@ -183,7 +197,13 @@ REFUSALS = [
     ([item(211, 1.0, 0.0), item(211, 1.0, 1.0)], 1, "INVALID_PARAM2", "on the ground only"),
     ([item(211, 1.0, 0.0), TERM, RUN], 2, "INVALID", "needs the load"),
     ([item(211, 1.0, 0.0), item(21, frame=6, x=473977420, y=85455940)], 1, "INVALID", "put a waypoint"),
-    ([item(42600, 1.0, 1.0)], 0, "UNSUPPORTED", "command 42600"),
+    ([item(42600, 1.0, 1.0, 0.5)], 0, "INVALID", "how high the load hangs"),
+    ([UP, item(42600, 3.0, 1.0, 0.5)], 1, "INVALID_PARAM1", "winch = 3"),
+    ([UP, item(42600, 1.0, 2.0, 0.5)], 1, "INVALID_PARAM2", "winch action = 2; must be one of 1"),
+    ([UP, item(42600, 1.0, 1.0, math.nan)], 1, "INVALID_PARAM3", "length = nan m"),
+    ([UP, item(42600, 1.0, 1.0, 0.5, 2.0)], 1, "INVALID_PARAM4", "rate = 2 m/s"),
+    ([UP, item(42600, 1.0, 1.0, 4.8)], 1, "INVALID_PARAM3", "leave the load at 0.20 m; least 0.3 m"),
+    ([UP, item(211, 1.0, 0.0), item(42600, 1.0, 1.0, 0.5)], 2, "INVALID", "needs the load"),
     ([item(177, 3.0, 1.0)], 0, "INVALID_PARAM1", "item to jump to = 3; must be 0 ... 0"),
     ([item(93, 1.0), item(177, 0.0, -1.0)], 1, "INVALID_PARAM2", "repetitions = -1; must be 0 ... 1000"),
     ([item(186, 3.0, 3.0)], 0, "INVALID", "nothing before it says"),

@@ -203,15 +203,16 @@ def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thru
     )
 
 
-def winch_status_message(now_us: int, cable_length: float, tension: float) -> Any:
-    """WINCH_STATUS of a cable that is neither reeled in nor out; what a winch would measure is unknown."""
+def winch_status_message(now_us: int, cable_length: float, tension: float, rate: float = 0.0) -> Any:
+    """WINCH_STATUS: `rate` in m/s at which the cable gets longer; voltage and current are unknown."""
+    moving = mavlink.MAV_WINCH_STATUS_MOVING if rate != 0.0 else 0
     return mavlink.MAVLink_winch_status_message(
         now_us,
         cable_length,
-        0.0,
+        rate,
         tension,
         math.nan,
         math.nan,
         0x7FFF,
-        mavlink.MAV_WINCH_STATUS_HEALTHY,
+        mavlink.MAV_WINCH_STATUS_HEALTHY | moving,
     )
