@@ -696,7 +696,7 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight whose load was let go by command: the vehicle goes on alone, a mission is held."""
     if flight.released:
         return flight
-    mission = flight.on_mission
+    mission = flight.on_mission or flight.phase == P.MISSION
     alone = replace(flight, released=True, slack_since_us=-1, still_since_us=-1)
     if flight.phase in ON_GROUND or flight.phase in (P.SET_DOWN, P.FAILSAFE):
         return alone

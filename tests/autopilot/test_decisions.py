@@ -79,6 +79,12 @@ REQUESTS: list[Any] = [
     R.ChangeSpeed(-1.0),
     R.SetHome(None),
     R.SetHome((0.0, 0.0, 0.0)),
+    R.Winch(0.5),
+    R.Winch(-math.inf, 0.1),
+    R.Winch(math.nan),
+    R.Winch(0.0),
+    R.Release(),
+    R.Grab(),
     R.Terminate(),
     R.RunPrearmChecks(),
     R.Reboot(False),
@@ -114,13 +120,16 @@ def test_every_request_is_asked() -> None:
 
 @pytest.mark.parametrize("plan", [PLAN, Plan()], ids=["mission", "no mission"])
 @pytest.mark.parametrize("on_mission", [False, True])
+@pytest.mark.parametrize("released", [False, True])
 @pytest.mark.parametrize("phase", Phase)
 def test_every_request_in_every_phase_gets_a_verdict_and_a_refusal_changes_nothing(
-    phase: Phase, on_mission: bool, plan: Plan
+    phase: Phase, released: bool, on_mission: bool, plan: Plan
 ) -> None:
     for request in REQUESTS:
         before = flight_in(phase, on_mission and bool(plan.steps), plan)
         seen = seen_in(phase)
+        if released:
+            before, _ = decide(before, R.Release(), seen, SETTINGS)
         after, verdict = decide(before, request, seen, SETTINGS)
         if verdict.result != ACCEPTED:
             assert after == before, request
