@@ -348,7 +348,7 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
     go = carry_leg(here, there, speed, settings.accel_m_s2, settings.least_move_s)
-    return replace(held, legs=(*held.legs[:-1], go, Hold(there))), ACCEPTED
+    return replace(held, legs=(*held.legs[:-1], go, Hold(there)), heeds=True), ACCEPTED
 
 
 def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settings: Settings) -> Decision:

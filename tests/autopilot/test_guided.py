@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -25,10 +26,11 @@ from autopilot.services.requests import (
     ReturnHome,
     SetHome,
     SetMode,
+    Takeoff,
 )
 from autopilot.telemetry_view import mode_of
 from autopilot.wire.dialect import plumbline as m
-from missions.model import Takeoff, Waypoint
+from missions import model
 
 from .conftest import ACCEPTED, CABLE_LENGTH, SETTINGS, STEP_US, TICK_S, Craft, Sky
 
@@ -102,9 +104,9 @@ def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: 
     before = transfer_leg((0.0, 0.0, 3.0), (10.0, 0.0, 3.0), 3.0, PACE.accel, LOAD_POSITION)
     wish = Wish(place) if is_place else Wish(velocity=place)
     *jets, _ = led(wish, 3.0, begin_following(before.jet(at_s), PACE.rate))
-    # 300 of them: 1.50 m/s^2 and 5.9 m/s^3; a point begun at the velocity alone made it 14 and 120
+    # 300 of them: 1.50 m/s^2 and 5.9 m/s^3; with a point begun at the velocity alone 1.63 and 16.5
     assert max(norm(jet[2]) for jet in jets) < 1.05 * PACE.accel
-    assert max(norm(jet[3]) for jet in jets) < 9.0
+    assert max(norm(jet[3]) for jet in jets) < 8.0
 
 
 @settings(max_examples=60, deadline=None)
@@ -146,7 +148,7 @@ def test_a_far_place_is_reached_within_speed_and_acceleration_and_not_overshot()
     assert norm(sub(leg.jet(0.0)[0], (12.0, 0.0, 3.0))) < 1e-3
     assert max(norm(jet[1]) for jet in jets) < 1.001 * PACE.speed
     assert max(norm(jet[2]) for jet in jets) < 1.001 * PACE.accel
-    assert max(jet[0][0] for jet in jets) < 12.005  # measured 0.2 mm
+    assert max(jet[0][0] for jet in jets) < 12.001  # measured: 4 um short of it
 
 
 def test_a_velocity_is_reached_and_held_and_stops() -> None:
@@ -349,6 +351,75 @@ def test_the_pace_is_that_of_the_pendulum() -> None:
     assert pace_of(sky.flight, SETTINGS).rate == pytest.approx(3.5 * math.sqrt(9.81 / 0.7))
 
 
+# ---- ArduPilot's GUIDED
+
+ARDUPILOT = replace(SETTINGS, guided_mode=True)
+GUIDED = SetMode(identity.AUTO, identity.AUTO_LOITER, number=4)
+LOITER = SetMode(identity.AUTO, identity.AUTO_LOITER, number=5)
+
+
+def guided() -> Sky:
+    """GUIDED, armed, taken off, as ArduPilot's clients do it; GUIDED is asked for again on the way."""
+    sky = Sky(settings=ARDUPILOT)
+    for request in (GUIDED, Arm(True, False), Takeoff(2.0)):
+        assert sky.ask(request).result == ACCEPTED
+    sky.run(lambda sky: sky.flight.phase == Phase.LIFT)
+    assert sky.ask(GUIDED).result == ACCEPTED
+    assert sky.flight.phase == Phase.LIFT
+    sky.run(lambda sky: sky.flight.phase == Phase.HOLD)
+    return sky
+
+
+def test_one_place_is_enough_in_guided() -> None:
+    sky = guided()
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    sky.wait(12.0)
+    assert sky.flight.phase == Phase.GUIDED
+    assert norm(sub(sky.view.x_load, (2.0, 1.0, 3.0))) < 0.01
+    assert sky.ask(GUIDED).result == ACCEPTED
+    assert sky.flight.phase == Phase.GUIDED
+    assert identity.ARDUPILOT.mode(*mode_of(sky.flight)).name == "GUIDED"  # type: ignore[union-attr]
+
+
+def test_a_velocity_in_guided_ceases_after_its_time() -> None:
+    sky = guided()
+    assert sky.ask(moving(1.0, 0.0, 0.0)).result == ACCEPTED
+    sky.wait(ARDUPILOT.guided_loss_us * 1e-6 - 0.1)
+    assert sky.flight.phase == Phase.GUIDED and sky.view.v_load[0] > 0.9
+    sky.wait(0.2)
+    assert sky.flight.phase == Phase.HOLD
+    sky.wait(5.0)
+    assert norm(sky.view.v_load) < 1e-6
+    assert sky.ask(at(0.0, 0.0, 2.0)).result == ACCEPTED
+    assert sky.flight.phase == Phase.GUIDED
+
+
+@pytest.mark.parametrize("mode", [LOITER, SetMode(identity.AUTO, identity.AUTO_RTL, number=6)])
+def test_setpoints_are_followed_in_guided_only(mode: SetMode) -> None:
+    sky = guided()
+    assert sky.ask(mode).result == ACCEPTED
+    before = sky.flight.phase
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    assert sky.flight.phase == before
+    assert sky.ask(GUIDED).result == ACCEPTED
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    assert sky.flight.phase == Phase.GUIDED
+
+
+def test_a_setpoint_ends_a_circle_in_guided() -> None:
+    sky = guided()
+    assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED
+    sky.wait(3.0)
+    assert sky.ask(at(0.0, 0.0, 2.0)).result == ACCEPTED
+    assert sky.flight.guide == Guide.OFFBOARD
+
+
+def test_with_other_identities_holding_heeds_no_setpoint() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    assert sky.flight.phase == Phase.HOLD
+
+
 # ---- in flight
 
 
@@ -381,8 +452,8 @@ def test_steps_of_an_offboard_stream_in_the_simulator() -> None:
     follow(0.0, 0.0, -2.0, 0.3)
     assert craft.command(m.MAV_CMD_DO_SET_MODE, 1.0, 6.0) == ACCEPTED
     worst = max(follow(2.0, 0.0, -2.0, 4.0), follow(2.0, 3.0, -3.0, 5.0), follow(-1.0, 0.0, -2.0, 6.0))
-    # measured 8 mm on the way; a step that is not smoothed throws the load by decimetres
-    assert worst < 0.03
+    # measured 6 mm on the way and 7 mm in the end; a step that is not smoothed throws the load by decimetres
+    assert worst < 0.02
     assert norm(sub(craft.truth.x_load, (0.0, -1.0, 2.0))) < 0.02
     craft.wait(1.5)
     assert craft.flight.phase == Phase.HOLD
@@ -390,8 +461,8 @@ def test_steps_of_an_offboard_stream_in_the_simulator() -> None:
 
 def test_offboard_hold_and_mission_follow_each_other_in_full_motion() -> None:
     """Each takes the load over while it moves, descends and brakes."""
-    square = tuple(Waypoint(x, y, 2.0) for x, y in ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
-    craft = Craft(Takeoff(2.0), *square)
+    square = tuple(model.Waypoint(x, y, 2.0) for x, y in ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+    craft = Craft(model.Takeoff(2.0), *square)
     craft.wait(1.0)
     assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 3.0) == ACCEPTED
     assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
@@ -424,7 +495,7 @@ def test_offboard_hold_and_mission_follow_each_other_in_full_motion() -> None:
             fly(0.1, (2.5, -1.0, 1.5))  # heard, not followed
     craft.run(lambda craft: craft.flight.step >= 2)  # the first waypoint is passed
     assert not any("given up" in text or "slack" in text for text in craft.texts)
-    # measured 11 mm from the reference and 0.279 m; begun at the velocity alone it turned over at the third
+    # measured 11 mm from the reference and 0.279 m; a stop that coasted on downwards ended on the ground
     assert worst < 0.025
     assert lowest > 0.26
 
