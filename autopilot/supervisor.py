@@ -236,7 +236,7 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
         if isinstance(leg, Follow):
-            leg, t = leg.coasting(t), 0.0
+            return leg.stopped(t, settings.accel_m_s2)
         slow = slow_leg(leg, t, settings.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
     accel, least_s = settings.accel_m_s2, settings.least_move_s
@@ -304,11 +304,14 @@ def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     asked = asked_of(flight)
     if isinstance(asked, Lean):
         return (Posture(asked, asked_motion(flight, view, settings)[0]),)
-    jet = setpoint(flight, view.now_us)
+    jet, rate = setpoint(flight, view.now_us), pace_of(flight, settings).rate
     if jet is None or flight.legs[0].control_mode != position_mode(flight):
         x, v, a = asked_motion(flight, view, settings)
-        jet = (x, v, a, ZERO, ZERO, ZERO, ZERO)
-    return (begin_following(jet, pace_of(flight, settings).rate),)
+        return (begin_following((x, v, a, ZERO, ZERO, ZERO, ZERO), rate),)
+    leg = flight.legs[0]
+    if isinstance(leg, Follow):
+        return (leg.coasting(leg_time_s(flight, view.now_us), rate),)
+    return (begin_following(jet, rate),)
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -545,6 +548,9 @@ def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
 def lost(flight: Flight, now_us: int, settings: Settings) -> bool:
     """Whether nothing is heard any more from the flight's guide."""
     if flight.guide == Guide.OFFBOARD:
+        if settings.guided_mode:
+            stays = isinstance(flight.offboard.asked, Wish) and flight.offboard.asked.is_place
+            return not stays and not flight.offboard.alive(now_us, settings.guided_loss_us)
         return not flight.offboard.alive(now_us, settings.offboard_loss_us)
     return flight.guide == Guide.MANUAL and not flight.manual.alive(now_us, settings.manual_loss_us)
 

@@ -48,6 +48,7 @@ from autopilot.services.requests import (
     FollowSetpoint,
     FollowStick,
     GetMessageInterval,
+    Reposition,
     RequestCapabilities,
     RequestMessage,
     SetMessageInterval,
@@ -349,6 +350,8 @@ class VehicleEndpoint:
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 if isinstance(request, SetMode):
                     self._asked_mode = request.number
+                elif isinstance(request, Reposition):
+                    self._asked_mode = None
                 self.state_changed()
             return verdict
 
