@@ -21,15 +21,6 @@ DEGREE_M = 111_319.5
 NAV_WAYPOINT, RELATIVE = 16, 3
 
 
-class Complaints(logging.Handler):
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.lines: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.lines.append(record.getMessage())
-
-
 def until(what: str, condition: Callable[[], Any]) -> None:
     turn = threading.Event()
     for _ in range(round(LONG_S / 0.1)):
@@ -40,10 +31,7 @@ def until(what: str, condition: Callable[[], Any]) -> None:
 
 
 def main(address: str) -> None:
-    complaints = Complaints()
-    # the texts of the vehicle go to the logger `autopilot` at their own severity
-    for name in ("dronekit", "dronekit.mavlink"):
-        logging.getLogger(name).addHandler(complaints)
+    logging.basicConfig(level=logging.INFO)  # its own words, and those of the vehicle
     vehicle = connect(address, wait_ready=True, heartbeat_timeout=15)
     until("is_armable", lambda: vehicle.is_armable)
     home = vehicle.location.global_frame
@@ -60,6 +48,7 @@ def main(address: str) -> None:
     commands.download()
     commands.wait_ready()
     told["commands"] = commands.count
+    told["places"] = [(command.x, command.y, command.z) for command in commands]
 
     def mode(name: str) -> None:
         vehicle.mode = VehicleMode(name)
@@ -81,7 +70,7 @@ def main(address: str) -> None:
     until("disarmed", lambda: not vehicle.armed)
     assert math.isfinite(vehicle.attitude.roll)
     vehicle.close()
-    print(json.dumps({**told, "complaints": complaints.lines}))
+    print(json.dumps(told))
 
 
 if __name__ == "__main__":
