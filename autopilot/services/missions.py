@@ -12,8 +12,8 @@ Upload, seen from here (one at a time; the old mission stays in force until the 
                ACK from the peer    it has given up                       -> idle
                silence              ask again; after MAX_ASKS: ACK OPERATION_CANCELLED -> idle
 
-The ACK that ends an upload is sent once where no message was lost. Where an item had to be asked for again it is
-repeated, until the peer says anything more about missions: some clients never ask for it.
+The ACK that ends an upload is sent once where no message was lost. Where an item had to be asked for again
+it is repeated, until the peer says anything more about missions: some clients never ask for it.
 
 Fence and rally points are transferred in the same way, one transfer at a time of any kind.
 """
@@ -29,7 +29,7 @@ from autopilot.services.mission_store import MAX_ITEMS, StoredMission
 from autopilot.services.records import Announce, AreasChanged, Decide, MissionChanged, Output, Peer, Say, Send
 from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
-from autopilot.wire.convert import Home, enu_from_geodetic
+from autopilot.wire.convert import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import LocatedStep, MissionItemError, WireItem, located_steps
@@ -92,10 +92,15 @@ class _Ended:
 
 
 class MissionService:
-    """Holds the mission and serves it to any number of links."""
+    """Holds the mission and serves it to any number of links.
 
-    def __init__(self, home: Home, mission: StoredMission) -> None:
+    `home_is_item`: where there is no mission, home is served as its only item. Clients of ArduPilot wait for
+    ever for a mission without items, and begin what they upload with the item 0 that they were served.
+    """
+
+    def __init__(self, home: Home, mission: StoredMission, home_is_item: bool = False) -> None:
         self.home = home
+        self._served_if_empty = (_home_item(home),) if home_is_item else ()
         self.mission = mission
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
@@ -329,7 +334,9 @@ class MissionService:
 
     def _items_of(self, kind: int) -> tuple[WireItem, ...]:
         """All items of a kind; none of a kind that does not exist."""
-        return self.mission.items if kind == _MISSION else self.areas.get(kind, ())
+        if kind == _MISSION:
+            return self.mission.items or self._served_if_empty
+        return self.areas.get(kind, ())
 
     def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_REQUEST_INT: any item in any order, as often as asked."""
@@ -373,6 +380,12 @@ class MissionService:
     def receive_partial(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_WRITE_PARTIAL_LIST and MISSION_REQUEST_PARTIAL_LIST: not served."""
         return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)]
+
+
+def _home_item(home: Home) -> WireItem:
+    x, y, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
+    frame, command = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_CMD_NAV_WAYPOINT
+    return WireItem(frame, command, 1, 1, 0.0, 0.0, 0.0, 0.0, x, y, home.altitude_m)
 
 
 def _ack(peer: Peer, result: int, kind: int = _MISSION) -> Output:

@@ -293,6 +293,8 @@ def test_dronekit_flies_an_ardupilot(clients_of_ardupilot: Callable[[], Ardupilo
     flight = clients_of_ardupilot()
     assert complaints(flight.dronekit.output) == []
     assert flight.dronekit.value["gps"] == 3
+    assert flight.dronekit.value["at first"] == 0
+    assert flight.dronekit.value["commands"] == 2
 
 
 def test_mavproxy_flies_an_ardupilot_by_the_names_of_its_modes(

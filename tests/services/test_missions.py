@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from autopilot.services.identity import ARDUPILOT, Identity
 from autopilot.services.mission_store import MAX_ITEMS
 from autopilot.services.missions import ASK_US, ECHO_US, ECHOES, INT_ASKS, LATE_US, MAX_ASKS
 from autopilot.services.records import MissionChanged, Verdict
@@ -329,6 +330,19 @@ def test_downloads_need_no_order(rig_with, items, as_item):
     asks = [4, 0, 2, 2, 1, 3]
     got = rig.replies(*(m.MAVLink_mission_request_int_message(1, 1, seq) for seq in asks))
     assert [as_item(x) for x in got] == [sent[seq] for seq in asks]
+
+
+def test_for_clients_of_ardupilot_there_is_always_home(rig_with, as_message, as_item, items):
+    rig = rig_with(identity=Identity(flavour=ARDUPILOT))
+    assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1))) == [("MISSION_COUNT", 1)]
+    answers = rig.replies(m.MAVLink_mission_request_int_message(1, 1, 0))
+    (home,) = [as_item(x) for x in answers if x.get_type() == "MISSION_ITEM_INT"]
+    # what is uploaded behind it is the mission, and home is not flown to
+    sent = (home, *items(2))
+    assert upload(rig, sent, as_message) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+    assert rig.endpoint.mission.items == sent
+    assert [step.first for step in rig.endpoint.mission.steps] == [1, 2]
+    assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1))) == [("MISSION_COUNT", 3)]
 
 
 @pytest.mark.parametrize("ask", [m.MAVLink_mission_request_int_message, m.MAVLink_mission_request_message])

@@ -40,6 +40,9 @@ def main(address: str) -> None:
     until("the parameter", lambda: vehicle.parameters["MIS_SPEED"] == 1.25)
 
     commands = vehicle.commands
+    commands.download()
+    commands.wait_ready()
+    told["at first"] = commands.count
     commands.clear()
     for north in (0.6, 1.2):
         place = (home.lat + north / DEGREE_M, home.lon, 1.5)
@@ -64,7 +67,7 @@ def main(address: str) -> None:
     until("the place", lambda: abs(vehicle.location.global_frame.lat - home.lat - 1.0 / DEGREE_M) < 2e-6)
     commands.next = 0
     mode("AUTO")
-    until("the second item", lambda: commands.next == 1)
+    until("the second item", lambda: commands.next == 2)
     mode("LOITER")
     mode("RTL")
     until("disarmed", lambda: not vehicle.armed)
