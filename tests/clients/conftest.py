@@ -86,8 +86,8 @@ class Witness:
                 self.texts.append(message.text)
 
     def nearest(self, place: Place) -> float:
-        """How near the load truly came to a place, m."""
-        return min(dist(place, where) for _, where in self.load)
+        """How near the load truly came to a place, m; between two samples it is taken to go straight."""
+        return min(_beside(place, before, after) for (_, before), (_, after) in pairwise(self.load))
 
     def longest_silence(self, begin: float, end: float) -> float:
         """Of ATTITUDE, s of the wall clock."""
@@ -96,6 +96,15 @@ class Witness:
 
     def close(self) -> None:
         self._over.set()
+
+
+def _beside(place: Place, before: Place, after: Place) -> float:
+    """Distance of a place from a straight way."""
+    way = [b - a for a, b in zip(before, after, strict=True)]
+    to = [b - a for a, b in zip(before, place, strict=True)]
+    length = sum(w * w for w in way)
+    share = min(max(sum(w * t for w, t in zip(way, to, strict=True)) / length, 0.0), 1.0) if length else 0.0
+    return dist(to, [share * w for w in way])
 
 
 def _bound() -> tuple[socket.socket, str]:
