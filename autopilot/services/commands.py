@@ -21,10 +21,12 @@ from autopilot.services.requests import (
     ChangeSpeed,
     Continue,
     GetMessageInterval,
+    Grab,
     Land,
     Orbit,
     Pause,
     Reboot,
+    Release,
     Reposition,
     Request,
     RequestCapabilities,
@@ -52,6 +54,7 @@ FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGround
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
 REPEAT_US = 3_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
+GRIPPERS = (0.0, 1.0)  # by number; 0: all of them
 _NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -294,7 +297,14 @@ def _request_capabilities(call: Call, context: Context) -> Request | Verdict:
 
 
 def _gripper(call: Call, context: Context) -> Request | Verdict:
-    return Verdict(UNSUPPORTED, "Gripper: the load is tied to its cable and cannot be released")
+    if call.p[0] not in GRIPPERS and not math.isnan(call.p[0]):
+        return _refused(f"Gripper: param1 = {call.p[0]:g}; there is one, 1")
+    choice: dict[float, Request | Verdict] = {
+        mavlink.GRIPPER_ACTION_RELEASE: Release(),
+        mavlink.GRIPPER_ACTION_GRAB: Grab(),
+        mavlink.GRIPPER_ACTION_HOLD: Verdict(ACCEPTED),  # it stays as it is
+    }
+    return choice.get(call.p[1]) or _refused(f"Gripper: param2 = {call.p[1]:g}; must be 0, 1 or 2")
 
 
 def _winch(call: Call, context: Context) -> Request | Verdict:

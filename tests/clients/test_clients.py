@@ -122,6 +122,7 @@ def test_mavsdk_flies_a_mission_over_a_link_that_loses_a_third(
     told, witness = mavsdk_over_a_bad_link()
     assert told.value["progress"] == [0, 1, 2, 3]
     assert FAILSAFE not in witness.phases
+    print("AGAIN", told.value.get("again"), complaints(told.output))
     # what MAVSDK says of lost messages is true, they are lost; nothing else may be said
     about_loss = ("timeout", "timed out", "retry", "resend", "lost")
     other = [line for line in complaints(told.output) if not any(word in line.lower() for word in about_loss)]

@@ -178,7 +178,11 @@ REFUSALS = [
     # items, item that is refused, MAV_MISSION_RESULT, what the text speaks of
     ([item(17, frame=2)], 0, "UNSUPPORTED_FRAME", "frame 2"),
     ([item(84, frame=6)], 0, "UNSUPPORTED", "command 84"),
-    ([item(211, 1.0, 0.0)], 0, "UNSUPPORTED", "command 211"),
+    ([item(211, 2.0, 0.0)], 0, "INVALID_PARAM1", "gripper = 2"),
+    ([item(211, 1.0, 3.0)], 0, "INVALID_PARAM2", "gripper action = 3"),
+    ([item(211, 1.0, 0.0), item(211, 1.0, 1.0)], 1, "INVALID_PARAM2", "on the ground only"),
+    ([item(211, 1.0, 0.0), TERM, RUN], 2, "INVALID", "needs the load"),
+    ([item(211, 1.0, 0.0), item(21, frame=6, x=473977420, y=85455940)], 1, "INVALID", "put a waypoint"),
     ([item(42600, 1.0, 1.0)], 0, "UNSUPPORTED", "command 42600"),
     ([item(177, 3.0, 1.0)], 0, "INVALID_PARAM1", "item to jump to = 3; must be 0 ... 0"),
     ([item(93, 1.0), item(177, 0.0, -1.0)], 1, "INVALID_PARAM2", "repetitions = -1; must be 0 ... 1000"),
