@@ -628,6 +628,11 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     flight = replace(flight, step=flight.step + 1, step_anchor=None)
     if following is None:
         rewound = replace(flight, on_mission=False, mission_done=True, step=0)
+        if isinstance(
+            step, ReturnHome
+        ):  # a return that nothing follows ends on the ground, as ordered by mode
+            down = enter(rewound, P.LOWER, view, settings)
+            return down, Report(((INFO, "Mission complete, landing"),), done.reached)
         return enter(rewound, P.HOLD, view, settings), Report(
             ((INFO, "Mission complete, holding"),), done.reached
         )
