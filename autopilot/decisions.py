@@ -23,7 +23,7 @@ from autopilot.flight import (
 )
 from autopilot.following import Circle, Lean, Stream, Wish
 from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
-from autopilot.guidance import Hold, carry_leg, reel_leg
+from autopilot.guidance import Hold, carry_leg, reel_leg, top_of
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
@@ -324,6 +324,8 @@ def _position_control(flight: Flight, request: Any, view: View, settings: Settin
 
 
 def _guide(flight: Flight, guide: Guide, what: str, view: View, settings: Settings) -> Decision:
+    if flight.legs and top_of(flight.legs[0]) is not None:
+        return flight, _later(f"{what} denied while the winch works")
     after = happen(replace(flight, guide=guide, on_mission=False), Event.GUIDE, view, settings)
     return (after, ACCEPTED) if after else (flight, _wrong_phase(flight, what))
 
@@ -346,7 +348,19 @@ def _set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) 
     handler = _MODES.get((main, sub_mode))
     if handler is None:
         return flight, _denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
-    return handler(flight, request, view, settings)
+    heeds = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not _hold
+    if settings.guided_mode and handler is _hold and heeds and _in_guided_mode(flight):
+        return flight, ACCEPTED
+    after, verdict = handler(flight, request, view, settings)
+    return (replace(after, heeds=heeds) if verdict.result == ACCEPTED.result else after), verdict
+
+
+def _in_guided_mode(flight: Flight) -> bool:
+    """Whether what is flown is a part of ArduPilot's GUIDED: a take-off, the way to a place, setpoints."""
+    if flight.on_mission:
+        return False
+    rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (flight.phase == Phase.HOLD and flight.heeds)
+    return rising or (flight.phase == Phase.GUIDED and flight.guide != Guide.MANUAL)
 
 
 def _replace_mission(flight: Flight, request: ReplaceMission, view: View, settings: Settings) -> Decision:
@@ -390,7 +404,8 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
     go = carry_leg(here, there, speed, settings.accel_m_s2, settings.least_move_s)
-    return replace(held, legs=as_flown(held, (*held.legs[:-1], go, Hold(there)))), ACCEPTED
+    legs = as_flown(held, (*held.legs[:-1], go, Hold(there)))
+    return replace(held, legs=legs, heeds=True), ACCEPTED
 
 
 def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settings: Settings) -> Decision:
@@ -402,7 +417,15 @@ def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settin
     if any(abs(value) > FARTHEST_M for value in position):
         return flight, _denied(f"Setpoint refused: more than {FARTHEST_M:g} m away")
     asked = Wish(position, request.velocity, request.accel, view.now_us)
-    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
+    return _heed(replace(flight, offboard=Stream(asked, view.now_us)), view, settings), ACCEPTED
+
+
+def _heed(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight after a setpoint: in ArduPilot's GUIDED a vehicle that holds or circles follows it."""
+    circles = flight.phase == Phase.GUIDED and flight.guide == Guide.ORBIT
+    if not settings.guided_mode or not flight.heeds or not (flight.phase == Phase.HOLD or circles):
+        return flight
+    return _guide(flight, Guide.OFFBOARD, "Setpoint", view, settings)[0]
 
 
 def _follow_attitude(flight: Flight, request: FollowAttitude, view: View, settings: Settings) -> Decision:
@@ -410,7 +433,7 @@ def _follow_attitude(flight: Flight, request: FollowAttitude, view: View, settin
         return flight, _denied("Attitude setpoint refused: the load is released, fly by position")
     thrust = None if request.thrust is None else request.thrust / settings.hover_share * settings.weight_n
     asked = Lean(request.upward, thrust)
-    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
+    return _heed(replace(flight, offboard=Stream(asked, view.now_us)), view, settings), ACCEPTED
 
 
 def _follow_stick(flight: Flight, request: FollowStick, view: View, settings: Settings) -> Decision:

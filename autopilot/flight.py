@@ -37,6 +37,7 @@ class Phase(IntEnum):
     GUIDED = mavlink.PLUMBLINE_PHASE_GUIDED
 
 
+ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
 CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
@@ -123,6 +124,7 @@ class Flight:
     reel_rate: float = 0.0  # m/s, at which it grows now
     reel_accel: float = 0.0  # m/s^2
     reel_to_m: float | None = None  # length that the present mission step asks for
+    heeds: bool = True  # holding, it follows a setpoint at once: ArduPilot's GUIDED, not its LOITER
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +160,8 @@ class Settings:
     reel_speed_m_s: float
     reel_accel_m_s2: float
     reels: bool  # the law can fly another length than it was made for
+    guided_mode: bool  # setpoints as in ArduPilot's GUIDED: heeded while holding, and a place stays asked for
+    guided_loss_us: int  # silence after which other setpoints count as lost there
     guides_vehicle: bool  # position setpoints are for the vehicle, which is kept a cable length over the load
 
 
@@ -214,6 +218,8 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         reel_speed_m_s=table["WNC_SPEED"],
         reel_accel_m_s2=table["WNC_ACCEL"],
         reels=LAWS[int(table["CTL_LAW"])] != "lqr",
+        guided_mode=int(table["MAV_IDENTITY"]) == ARDUPILOT_IDENTITY,
+        guided_loss_us=round(1e6 * table["GUID_TIMEOUT"]),
         guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 

@@ -154,7 +154,7 @@ class Onboard:
 
         None for anything else: garbage, or a tick that is over.
         """
-        tick = read_tick(datagram, self._options.home)
+        tick = read_tick(datagram, self._options.home, self._setup.tuning.imu_age)
         if tick is None:
             return None
         if tick.now_us < self.now_us or (self.tick >= 0 and tick.now_us > self.now_us + LEAP_US):

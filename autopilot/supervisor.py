@@ -240,7 +240,7 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
         if isinstance(leg, Follow):
-            leg, t = leg.coasting(t), 0.0
+            return leg.stopped(t, settings.accel_m_s2)
         slow = slow_leg(leg, t, settings.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
     accel, least_s = settings.accel_m_s2, settings.least_move_s
@@ -308,11 +308,14 @@ def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     asked = asked_of(flight)
     if isinstance(asked, Lean):
         return (Posture(asked, asked_motion(flight, view, settings)[0]),)
-    jet = setpoint(flight, view.now_us)
+    jet, rate = setpoint(flight, view.now_us), pace_of(flight, settings).rate
     if jet is None or flight.legs[0].control_mode != position_mode(flight):
         x, v, a = asked_motion(flight, view, settings)
-        jet = (x, v, a, ZERO, ZERO, ZERO, ZERO)
-    return (begin_following(jet, pace_of(flight, settings).rate),)
+        return (begin_following((x, v, a, ZERO, ZERO, ZERO, ZERO), rate),)
+    leg = flight.legs[0]
+    if isinstance(leg, Follow):
+        return (leg.coasting(leg_time_s(flight, view.now_us), rate),)
+    return (begin_following(jet, rate),)
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -576,6 +579,9 @@ def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
 def lost(flight: Flight, now_us: int, settings: Settings) -> bool:
     """Whether nothing is heard any more from the flight's guide."""
     if flight.guide == Guide.OFFBOARD:
+        if settings.guided_mode:
+            stays = isinstance(flight.offboard.asked, Wish) and flight.offboard.asked.is_place
+            return not stays and not flight.offboard.alive(now_us, settings.guided_loss_us)
         return not flight.offboard.alive(now_us, settings.offboard_loss_us)
     return flight.guide == Guide.MANUAL and not flight.manual.alive(now_us, settings.manual_loss_us)
 
@@ -653,6 +659,11 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     flight = replace(flight, step=flight.step + 1, step_anchor=None, reel_to_m=None)
     if following is None:
         rewound = replace(flight, on_mission=False, mission_done=True, step=0)
+        if isinstance(
+            step, ReturnHome
+        ):  # a return that nothing follows ends on the ground, as ordered by mode
+            down = enter(rewound, P.LOWER, view, settings)
+            return down, Report(((INFO, "Mission complete, landing"),), done.reached)
         return enter(rewound, P.HOLD, view, settings), Report(
             ((INFO, "Mission complete, holding"),), done.reached
         )
@@ -696,7 +707,6 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight whose load was let go by command: the vehicle goes on alone, a mission is held."""
     if flight.released:
         return flight
-    mission = flight.on_mission or flight.phase == P.MISSION
     alone = replace(flight, released=True, slack_since_us=-1, still_since_us=-1)
     if flight.phase in ON_GROUND or flight.phase in (P.SET_DOWN, P.FAILSAFE):
         return alone
@@ -706,7 +716,8 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
     alone = replace(alone, legs=())
     if flight.phase == P.GUIDED and isinstance(asked_of(flight), Lean):
         return enter(replace(alone, offboard=SILENT), P.HOLD, view, settings)
-    return enter(alone, P.HOLD if mission else flight.phase, view, settings)
+    held = flight.on_mission or flight.phase == P.MISSION
+    return enter(alone, P.HOLD if held else flight.phase, view, settings)
 
 
 def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:

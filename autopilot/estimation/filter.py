@@ -70,6 +70,7 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         cable_accel_std=table["EST_CABLE_STD"],
         length_std=table["EST_LEN_STD"],
         gate_sigma=table["EST_GATE"],
+        imu_age=1e-3 * table["VEH_IMU_DELAY"],
         rtk_white=table["EST_RTK_NEW"],
         gnss_white=table["EST_GPS_NEW"],
         gnss_time=table["EST_GPS_TAU"],

@@ -50,6 +50,7 @@ from autopilot.wire.parameters import decimal_from_float32
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED
 UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
+_REFUSED = (DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 
 FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGroundControl, PX4 and MAVSDK
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
@@ -389,6 +390,7 @@ class CommandService:
     def __init__(self, home: Home, flavour: Flavour) -> None:
         self.context = Context(home, flavour)
         self._done: dict[tuple[Peer, int], _Done] = {}
+        self._last: tuple[Peer, int] | None = None
 
     def receive_long(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute COMMAND_LONG."""
@@ -423,13 +425,24 @@ class CommandService:
             return [_ack(call.command, UNSUPPORTED, peer)]
         request = parser(call, self.context)
         verdict = request if isinstance(request, Verdict) else decide(request)
+        if verdict.result in _REFUSED and self._is_repeated(call, peer, now_us):
+            return [_ack(call.command, ACCEPTED, peer)]
         if verdict.result == ACCEPTED and not isinstance(request, Answered):
             self._done = {k: d for k, d in self._done.items() if now_us - d.at_us <= REPEAT_US}
             self._done[peer, call.command] = _Done(repr(call), verdict, now_us)
+            self._last = (peer, call.command)
         outputs = _answer(call.command, verdict, peer)
         if isinstance(request, SetCurrent):
             outputs.append(Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,)))
         return outputs
+
+    def _is_repeated(self, call: Call, peer: Peer, now_us: int) -> bool:
+        """The command that was accepted last, again: its ACK was lost, and some clients never say that they
+        repeat it. What it asked for may be so far under way that it cannot be asked for any more."""
+        done = self._done.get((peer, call.command))
+        if self._last != (peer, call.command) or done is None:
+            return False
+        return done.call == repr(call) and now_us - done.at_us <= REPEAT_US
 
 
 def _said(verdict: Verdict) -> list[Output]:

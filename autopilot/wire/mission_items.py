@@ -11,7 +11,8 @@ Positions are positions of the load. Where a standard command leaves freedom:
 * Item 0 of a list that begins with home itself, as MAVProxy and Mission Planner write it, is not flown.
 * NAV_LOITER_TURNS carries the load to the centre, spirals out in one turn, flies its turns and spirals
   back in one.
-* NAV_LOITER_UNLIM holds for LONGEST_S: a day. NAV_SPLINE_WAYPOINT and NAV_LOITER_TO_ALT are waypoints.
+* NAV_LOITER_UNLIM holds for LONGEST_S: a day. NAV_SPLINE_WAYPOINT, NAV_LOITER_TO_ALT and CONDITION_GATE are
+  waypoints; a gate without a height of its own is at the height of the waypoint before.
 * DO_JUMP is flown by flying its items again; one without end is refused.
 * Commands that point or trigger something (camera, gimbal, region of interest ...) and those above
   MAV_CMD_NAV_LAST that are not known are kept and not flown. Commands whose effect somebody relies on and
@@ -316,6 +317,8 @@ class _Reader:
                 height = self._height(seq, item)
                 self._left_at = (east, north, height)
                 self._add(seq, Waypoint(east, north, height, hold))
+        elif command == mavlink.MAV_CMD_CONDITION_GATE:
+            self._gate(seq, item)
         elif command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
             kind = _choice(seq, 1, "speed type", item.param1, (0, 1, 2, 3))
             if kind in (0, 1) and item.param2 != -1.0:  # -1: no change; 2, 3: climb and descent
@@ -393,6 +396,15 @@ class _Reader:
             for axis, phase in phases
         )
         self._add(seq, Signals((turns + 2.0) * period, terms))
+
+    def _gate(self, seq: int, item: WireItem) -> None:
+        """Where a ground station has a survey begin and end: flown to like a waypoint."""
+        if item.param2 == 0.0 and self._left_at is None:
+            text = "a gate without a height, and nothing before it has one"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+        height = self._left_at[2] if item.param2 == 0.0 and self._left_at else self._height(seq, item)
+        self._left_at = (*self._place(seq, item), height)
+        self._add(seq, Waypoint(*self._left_at))
 
     def _change_altitude(self, seq: int, item: WireItem) -> None:
         frame = _choice(seq, 2, "frame", item.param2, _GLOBAL_FRAMES)
@@ -543,6 +555,7 @@ _STANDARD = frozenset(
         mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
         mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
         mavlink.MAV_CMD_DO_CHANGE_ALTITUDE,
+        mavlink.MAV_CMD_CONDITION_GATE,
         mavlink.MAV_CMD_DO_GRIPPER,
         mavlink.MAV_CMD_DO_WINCH,
     }

@@ -278,7 +278,7 @@ def test_a_step_that_would_be_refused_is_not_sent(step: Step) -> None:
         encode_steps([Takeoff(1.0), step], HOME)
 
 
-KNOWN = [16, 17, 18, 31, 82, 177, 186, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
+KNOWN = [16, 17, 18, 31, 82, 177, 186, 4501, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
 integers = st.integers(-(2**31), 2**31 - 1)
 floats32 = st.floats(width=32)
 
@@ -379,6 +379,20 @@ def test_loitering() -> None:
         assert (step.east_m, step.north_m, step.altitude_m) == pytest.approx(place, abs=PLACE_M)
     up, higher = decode_items([item(22, frame=6, z=3.0), item(186, 6.0, 3.0)], HOME)
     assert (up, higher) == (Takeoff(3.0), Waypoint(0.0, 0.0, 6.0))
+
+
+def test_a_gate_is_flown_to() -> None:
+    latitude, longitude, _ = geodetic_from_enu((12.0, -7.0, 0.0), HOME)
+    there = {"frame": 3, "x": latitude, "y": longitude}
+    up = item(22, frame=6, z=3.0)
+    for own, z, height in ((1.0, 5.0, 5.0), (0.0, 0.0, 3.0)):
+        step = decode_items([up, item(4501, 0.0, own, z=z, **there)], HOME)[1]
+        assert isinstance(step, Waypoint)
+        assert (step.east_m, step.north_m, step.altitude_m) == pytest.approx(
+            (12.0, -7.0, height), abs=PLACE_M
+        )
+    with pytest.raises(MissionItemError, match="a gate without a height"):
+        decode_items([item(4501, 0.0, 0.0, **there)], HOME)
 
 
 @pytest.mark.parametrize("radius", [2.0, -2.0])
