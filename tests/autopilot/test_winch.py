@@ -10,7 +10,7 @@ import pytest
 
 from autopilot.flight import Flight, Phase
 from autopilot.guidance import Hold, Reel, Slow, reel_leg, top_of
-from autopilot.services.requests import Pause, Release, StartMission
+from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor import enter
 from autopilot.winch import cable_now, commanded_rate
@@ -240,3 +240,13 @@ def test_the_length_is_that_of_the_leg_also_while_it_is_stopped() -> None:
     resting = replace(flight, legs=(Hold((0.0, 0.0, 2.0)),))
     assert commanded_rate(resting, 0, 0.004) == 0.0
     assert SETTINGS.longest_m == 3.0
+
+
+def test_while_the_winch_works_no_stream_takes_over() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(WinchRequest(0.8)).result == ACCEPTED
+    sky.wait(2.0)
+    verdict = sky.ask(Orbit(2.0, 1.0, None, None, None))
+    assert (verdict.result, verdict.text) == (LATER, "Orbit denied while the winch works")
+    sky.wait(6.0)
+    assert sky.ask(Orbit(2.0, 1.0, None, None, 2.0)).result == ACCEPTED
