@@ -506,6 +506,8 @@ def _guide(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Repo
     if lost(flight, view.now_us, settings):
         text = f"Nothing heard from {flight.guide.value} any more: holding"
         return _to(flight, E.HOLD, view, settings, (WARNING, text))
+    if flight.guide == Guide.ORBIT and flight.circle is not None and view.now_us >= flight.circle.ends_us:
+        return _to(flight, E.HOLD, view, settings, (INFO, "Circle flown: holding"))
     asked, leg = asked_of(flight), flight.legs[0]
     if isinstance(leg, Posture) and isinstance(asked, Lean):
         return replace(flight, legs=(replace(leg, lean=asked),)), Report()
