@@ -119,6 +119,7 @@ class Flight:
     breach: str = ""  # why load or vehicle may not be where it is, or is about to be
     breaches: int = 0
     breach_us: int = 0  # when the last one began
+    released: bool = False  # the load: what is flown and asked for is the vehicle, by itself
     heeds: bool = True  # holding, it follows a setpoint at once: ArduPilot's GUIDED, not its LOITER
 
 
@@ -262,6 +263,11 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     if settings.fence_height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence_height_m:
         return f"higher than GF_MAX_VER_DIST {settings.fence_height_m:g} m"
     return fence.complaint(x_load[0], x_load[1])
+
+
+def below(x_quad: Vec3, settings: Settings) -> Vec3:
+    """Where a load would hang under the vehicle."""
+    return (x_quad[0], x_quad[1], x_quad[2] - settings.cable_length_m)
 
 
 def leg_time_s(flight: Flight, now_us: int) -> float:

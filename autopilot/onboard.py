@@ -155,7 +155,7 @@ class Onboard:
 
         None for anything else: garbage, or a tick that is over.
         """
-        tick = read_tick(datagram, self._options.home)
+        tick = read_tick(datagram, self._options.home, self._setup.tuning.imu_age)
         if tick is None:
             return None
         if tick.now_us < self.now_us or (self.tick >= 0 and tick.now_us > self.now_us + LEAP_US):
@@ -166,7 +166,11 @@ class Onboard:
             return self._answer
         self._run(tick)
         command = hil_actuator_controls_message(
-            tick.now_us, self._state.mixed.forces, self.armed, self._options.lockstep
+            tick.now_us,
+            self._state.mixed.forces,
+            self.armed,
+            self._options.lockstep,
+            self._state.flight.released,
         )
         aside = self._world.messages(self.now_us)
         if self._reboot:
@@ -352,7 +356,13 @@ class Onboard:
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         state = self._state
-        view = view_of(state.estimator, control_state(state.estimator), self._setup.settings, self.now_us)
+        view = view_of(
+            state.estimator,
+            control_state(state.estimator),
+            self._setup.settings,
+            self.now_us,
+            released=state.flight.released,
+        )
         flight, verdict = decide(state.flight, request, view, self._setup.settings)
         self._state = state._replace(flight=flight)
         return verdict

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from autopilot.estimation.filter import Readings, control_state
+from autopilot.estimation.parting import parted
 from autopilot.estimation.records import ImuReading, LoadReading, PoseReading, new_history
 from autopilot.flight_core import Setup, initial_state, step, track
 from autopilot.geometry.linear import E3, ZERO
@@ -40,6 +41,8 @@ def rehearse(setup: Setup) -> None:
     for tick in range(3):
         state, _ = step(state, history, readings, setup, tick * 4000, tick, 0.004)
     motion = control_state(state.estimator)
+    hanging = state.estimator._replace(load=state.estimator.load._replace(taut=1.0))
+    parted(hanging, history, setup.tuning)
     wave = Signals(
         1.0, (Term("x", 0.01, 0.0, 1.0, None, 0.0, (Sine(1.0),)), Term("x", 0.1, 0.0, 1.0, None, 0.0))
     )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
-    from rich.progress import TaskID
+    from rich.progress import ProgressColumn, TaskID
 
     from gcs.clients.flight import Progress
 
@@ -27,13 +27,36 @@ def is_live() -> bool:
     return sys.stderr.isatty()
 
 
-class FlightDisplay:
+class LiveBars:
+    """Bars on a terminal, drawn when they are told to; they go as the `with` block is left."""
+
+    _bars: Bars | None = None
+
+    def _open(self, *columns: ProgressColumn | str, transient: bool = False) -> Bars:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        self._bars = Progress(*columns, console=Console(stderr=True), auto_refresh=False, transient=transient)
+        self._bars.start()
+        return self._bars
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bars is not None:
+            self._bars.stop()
+            self._bars = None
+
+
+class FlightDisplay(LiveBars):
     """Where the flight is: phase, mission item, load error, rotor use, simulated time and its pace."""
 
     def __init__(self, title: str, quiet: bool) -> None:
         self._title = title
         self._quiet = quiet
-        self._bars: Bars | None = None
         self._task: TaskID | None = None
         self._next_s = 0.0
         self._began: tuple[float, float] | None = (
@@ -81,43 +104,31 @@ class FlightDisplay:
         words.append(fields["pace"])
         return "  ".join(word for word in words if word)
 
-    def __enter__(self) -> FlightDisplay:
+    def __enter__(self) -> Self:
         if not self._quiet and is_live():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn
+            from rich.progress import BarColumn
 
-            self._bars = Progress(
-                TextColumn("[bold]{task.description}"),
+            bars = self._open(
+                "[bold]{task.description}",
                 BarColumn(bar_width=24),
-                TextColumn("{task.percentage:>3.0f}%"),
-                TextColumn("[cyan]{task.fields[phase]}"),
-                TextColumn("{task.fields[item]}"),
-                TextColumn("load {task.fields[error]}"),
-                TextColumn("rotors {task.fields[rotors]}"),
-                TextColumn("{task.fields[clock]} {task.fields[pace]}"),
-                console=Console(stderr=True),
-                auto_refresh=False,
+                "{task.percentage:>3.0f}%",
+                "[cyan]{task.fields[phase]}",
+                "{task.fields[item]}",
+                "load {task.fields[error]}",
+                "rotors {task.fields[rotors]}",
+                "{task.fields[clock]} {task.fields[pace]}",
             )
             blank: dict[str, Any] = dict.fromkeys(("item", "error", "rotors", "clock", "pace"), "")
-            self._task = self._bars.add_task(self._title, total=1.0, phase="starting", **blank)
-            self._bars.start()
+            self._task = bars.add_task(self._title, total=1.0, phase="starting", **blank)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bars is not None:
-            self._bars.stop()
-            self._bars = None
 
-
-class StepDisplay:
+class StepDisplay(LiveBars):
     """A bar for anything else that takes more than a second; `update(done, total)` as it goes."""
 
     def __init__(self, title: str, quiet: bool = False) -> None:
         self._title = title
         self._shown = not quiet and is_live()
-        self._bars: Bars | None = None
         self._task: TaskID | None = None
         self._next_s = time.monotonic() + 0.5  # what is over sooner needs no bar
 
@@ -128,34 +139,16 @@ class StepDisplay:
             return
         self._next_s = now_s + _REFRESH_S
         if self._bars is None:
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
+            from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
 
-            self._bars = Progress(
-                SpinnerColumn(),
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                console=Console(stderr=True),
-                auto_refresh=False,
-                transient=True,
-            )
+            columns = (SpinnerColumn(), "{task.description}", BarColumn(), MofNCompleteColumn())
+            self._bars = self._open(*columns, transient=True)
             self._task = self._bars.add_task(self._title, total=None)
-            self._bars.start()
         if self._task is not None:
             self._bars.update(
                 self._task, completed=done, total=total or None, description=title or self._title
             )
         self._bars.refresh()
-
-    def __enter__(self) -> StepDisplay:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bars is not None:
-            self._bars.stop()
 
 
 def _or_dash(value: float | None, scale: float, unit: str) -> str:

@@ -13,6 +13,7 @@ from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from autopilot.geometry import kernel
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import encode_mission
@@ -43,6 +44,7 @@ from missions.legs import expected_duration_s
 from missions.model import Mission
 
 LAWS = {"thesis": 0, "lqr": 1, "plumbline": 2}  # the value of CTL_LAW
+_LAST_COMPILED = Path(kernel.__file__).parents[1] / "plumbline_tick.py"
 ONBOARD_LOG = "flight.ulg"
 WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 _EXIT = {
@@ -174,6 +176,8 @@ def _log_kept(storage: Path, out: Path) -> Iterator[None]:
 def _start(
     processes: Processes, options: FlightOptions, out: Path, storage: Path, ground: str, truth: str
 ) -> None:
+    if not options.quiet and not kernel.is_compiled(_LAST_COMPILED):
+        say("the first flight compiles the kernels of simulator and autopilot: about a minute")
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
     both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS[options.law]}"]

@@ -125,6 +125,7 @@ class EstimatorTuning(NamedTuple):
     cable_accel_std: float  # rad/s^2, error of the pendulum model while taut
     length_std: float  # m, of the believed length
     gate_sigma: float
+    imu_age: float  # s, of an inertial sample when it comes
     rtk_white: float  # share of a fix's stated deviation that is new in every fix
     gnss_white: float  # the same without carrier phase
     gnss_time: float  # s, in which the rest forgets itself

@@ -60,6 +60,15 @@ def sources_hash(path: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def _folder(path: Path) -> Path:
+    return user_cache_path("plumbline") / "kernels" / sources_hash(path)
+
+
+def is_compiled(path: Path) -> bool:
+    """True if machine code of kernels in this source file is kept from an earlier run, as far as is known."""
+    return _CHOSEN_BY_USER or _folder(path).is_dir()
+
+
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile `function` to machine code with strict IEEE arithmetic and a disk cache.
 
@@ -67,7 +76,7 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     as IEEE 754 says, in place of an exception.
     """
     if not _CHOSEN_BY_USER:
-        folder = user_cache_path("plumbline") / "kernels" / sources_hash(Path(function.__code__.co_filename))
+        folder = _folder(Path(function.__code__.co_filename))
         # read as numba decorates; it is filled from the environment and declares no attributes to a checker
         vars(numba.config)["CACHE_DIR"] = str(folder)
     compiled: Callable[P, T] = numba.njit(cache=True, error_model="numpy")(function)

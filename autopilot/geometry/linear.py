@@ -147,24 +147,6 @@ def mul_transposed(A: Mat3, B: Mat3) -> Mat3:
 
 
 @kernel
-def mat_add(A: Mat3, B: Mat3) -> Mat3:
-    """A + B."""
-    return (add(A[0], B[0]), add(A[1], B[1]), add(A[2], B[2]))
-
-
-@kernel
-def mat_sub(A: Mat3, B: Mat3) -> Mat3:
-    """A - B."""
-    return (sub(A[0], B[0]), sub(A[1], B[1]), sub(A[2], B[2]))
-
-
-@kernel
-def mat_scale(s: float, A: Mat3) -> Mat3:
-    """s A."""
-    return (scale(s, A[0]), scale(s, A[1]), scale(s, A[2]))
-
-
-@kernel
 def trace(A: Mat3) -> float:
     """Sum of the diagonal."""
     return A[0][0] + A[1][1] + A[2][2]

@@ -104,7 +104,7 @@ class VehicleEndpoint:
     ) -> None:
         self.identity = identity
         self._signing = SigningService(signing, boot_unix_us)
-        self._missions = MissionService(home, mission or StoredMission())
+        self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
         self._guided = GuidedService(home, identity.system)

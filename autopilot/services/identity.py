@@ -106,6 +106,11 @@ class Flavour:
         return {mode.custom_mode: mode for mode in reversed(self.modes)}
 
     @property
+    def home_is_item(self) -> bool:
+        """Item 0 of every mission is home, so that there always is one: ArduPilot's habit."""
+        return self.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+
+    @property
     def modes_are_packed(self) -> bool:
         """A mode's number is PX4's pair."""
         return all(mode.custom_mode == mode.sub << 24 | mode.main << 16 for mode in self.modes)

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
-from gcs.display import is_live, say
+from gcs.display import LiveBars, is_live, say
 from gcs.experiments.flights import Status
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import TaskID
 
 
-class ExperimentDisplay:
+class ExperimentDisplay(LiveBars):
     """One bar for the flights, a line for each that is in the air, one bar for the figures."""
 
     def __init__(self, quiet: bool) -> None:
         self._quiet = quiet
-        self._bars: Progress | None = None
         self._tasks: dict[str, TaskID] = {}
         self._told = -1
 
@@ -55,25 +53,10 @@ class ExperimentDisplay:
             self._tasks[name] = self._bars.add_task(name, total=total)
         return self._tasks[name]
 
-    def __enter__(self) -> ExperimentDisplay:
+    def __enter__(self) -> Self:
         if not self._quiet and is_live():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+            from rich.progress import BarColumn, MofNCompleteColumn, TimeElapsedColumn
 
-            self._bars = Progress(
-                BarColumn(bar_width=24),
-                MofNCompleteColumn(),
-                TimeElapsedColumn(),
-                TextColumn("{task.description}"),
-                console=Console(stderr=True),
-                auto_refresh=False,
-            )
-            self._bars.start()
+            columns = (BarColumn(bar_width=24), MofNCompleteColumn(), TimeElapsedColumn())
+            self._open(*columns, "{task.description}")
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bars is not None:
-            self._bars.stop()
-            self._bars = None

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
-from gcs.display import is_live, say
+from gcs.display import LiveBars, is_live, say
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import TaskID
 
 _PLAIN_S = 10.0
 _REFRESH_S = 0.2
 
 
-class SweepDisplay:
+class SweepDisplay(LiveBars):
     """How many flights are flown, what share of them completed, how fast it goes and how long it takes."""
 
     def __init__(self, done: int, total: int, quiet: bool) -> None:
         self._before, self._done, self._total = done, done, total
         self._quiet = quiet
-        self._bars: Progress | None = None
         self._task: TaskID | None = None
         self._began_s = time.monotonic()
         self._next_s = 0.0
@@ -58,22 +57,18 @@ class SweepDisplay:
         minutes = left * self.elapsed_s / max(self.flown, 1) / 60.0
         return f", {minutes:.1f} min left" if left else ""
 
-    def __enter__(self) -> SweepDisplay:
+    def __enter__(self) -> Self:
         self._began_s = time.monotonic()
         if not self._quiet and is_live():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+            from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
-            self._bars = Progress(
+            columns = (
                 BarColumn(bar_width=32),
                 MofNCompleteColumn(),
-                TextColumn("{task.description}"),
+                "{task.description}",
                 TimeRemainingColumn(),
-                console=Console(stderr=True),
-                auto_refresh=False,
             )
-            self._task = self._bars.add_task("starting", total=self._total, completed=self._before)
-            self._bars.start()
+            self._task = self._open(*columns).add_task("starting", total=self._total, completed=self._before)
         return self
 
     def __exit__(
@@ -81,6 +76,4 @@ class SweepDisplay:
     ) -> None:
         self._next_s = 0.0
         self.add(0, 0)
-        if self._bars is not None:
-            self._bars.stop()
-            self._bars = None
+        super().__exit__(kind, error, trace)

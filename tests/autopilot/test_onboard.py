@@ -304,7 +304,7 @@ def test_an_ardupilot_client_flies_without_any_stream() -> None:
     )
     craft.wait(6.0)
     assert craft.flight.phase == Phase.GUIDED
-    print("ARDU", math.dist(craft.truth.x_load, (0.5, 1.0, 1.5)))
+    # measured 1 mm
     assert math.dist(craft.truth.x_load, (0.5, 1.0, 1.5)) < 0.015
     assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
     craft.run(at_phase(Phase.DISARMED))

@@ -75,6 +75,11 @@ def test_same_bits_under_rough_conditions(short: str) -> None:
     flown(short, Conditions(sensors="lab", seed=2, settings={"CTL_LAW": PLUMBLINE, **ROUGH}))
 
 
+def test_same_bits_with_late_sensors(short: str) -> None:
+    settings = {"CTL_LAW": PLUMBLINE, "SIM_SENS_LAT_MS": 26.0, "SIM_ACT_DELAY_MS": 9.0}
+    flown(short, Conditions(sensors="lab", seed=1, settings=settings))
+
+
 def test_same_bits_with_two_ticks_for_each_command(short: str) -> None:
     settings = {"CTL_LAW": PLUMBLINE, "SIM_RATE_HZ": 500.0}
     flown(short, Conditions(sensors="ideal", seed=1, settings=settings))
@@ -87,6 +92,11 @@ def test_same_end_of_a_flight_that_is_lost(short: str) -> None:
 def test_same_bits_with_receiver_and_camera(short: str) -> None:
     gust = {"SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 12.0, "SIM_GUST_FOR_S": 1.0}
     flown(short, Conditions(sensors="rtk", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))
+
+
+@pytest.mark.parametrize("sensors", ["lab", "rtk"])
+def test_same_bits_where_the_load_is_released(delivery: str, sensors: str) -> None:
+    flown(delivery, Conditions(sensors=sensors, seed=1, settings={"SIM_ACT_DELAY_MS": 5.0}))
 
 
 # a half-cosine too steep for the vehicle, and a sine that dies away
