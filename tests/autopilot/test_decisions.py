@@ -79,6 +79,8 @@ REQUESTS: list[Any] = [
     R.ChangeSpeed(-1.0),
     R.SetHome(None),
     R.SetHome((0.0, 0.0, 0.0)),
+    R.Release(),
+    R.Grab(),
     R.Terminate(),
     R.RunPrearmChecks(),
     R.Reboot(False),
