@@ -25,14 +25,16 @@ from math import dist
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from autopilot.wire.codec import decode
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.samples import CARRIED
 from gcs.link import LOOPBACK, free_port
 
 PROGRAMS = Path(__file__).with_name("programs")
-LONG_S = 150.0
+LONG_S = 300.0  # of a busy machine
 END_S = 10.0
 
 # What no client may say, whatever it means by it
@@ -57,7 +59,7 @@ class Witness:
     truth: socket.socket
     ground: socket.socket
     load: list[tuple[float, Place]] = field(default_factory=list)  # vehicle's clock, s; true place, m
-    asked: list[tuple[float, Place]] = field(default_factory=list)  # where the load shall be
+    asked: list[tuple[float, Place]] = field(default_factory=list)  # where the carried load shall be
     phases: list[int] = field(default_factory=list)
     tilt: float = 0.0  # greatest of all, rad
     texts: list[str] = field(default_factory=list)
@@ -76,7 +78,8 @@ class Witness:
             case mavlink.MAVLINK_MSG_ID_LOAD_STATE if message.source == mavlink.PLUMBLINE_SOURCE_TRUTH:
                 self.load.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
             case mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
-                self.asked.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
+                if message.phase in CARRIED:
+                    self.asked.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
                 if self.phases[-1:] != [message.phase]:
                     self.phases.append(message.phase)
             case mavlink.MAVLINK_MSG_ID_ATTITUDE:
@@ -88,6 +91,15 @@ class Witness:
     def nearest(self, place: Place) -> float:
         """How near the load truly came to a place, m; between two samples it is taken to go straight."""
         return min(_beside(place, before, after) for (_, before), (_, after) in pairwise(self.load))
+
+    def worst_error(self) -> float:
+        """Of the carried load, between where it truly was and where it should be, m."""
+        times = np.array([at for at, _ in self.load])
+        tracks = np.array([where for _, where in self.load]).T
+        asked_times = np.array([at for at, _ in self.asked])
+        asked = np.array([where for _, where in self.asked])
+        true = np.stack([np.interp(asked_times, times, track) for track in tracks], axis=1)
+        return float(np.linalg.norm(true - asked, axis=1).max())
 
     def longest_silence(self, begin: float, end: float) -> float:
         """Of ATTITUDE, s of the wall clock."""

@@ -26,7 +26,8 @@ from mavsdk.plugins.offboard import Offboard, PositionNedYaw, VelocityNedYaw
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 
-LONG_S = 60.0
+LONG_S = 120.0  # of a busy machine
+LOST_ON_THE_WAY = ("TIMEOUT", "BUSY", "NOT_RECEIVED_YET")
 DEGREE_M = 111_319.5  # of latitude
 NAN = math.nan
 
@@ -73,7 +74,7 @@ class Pilot:
             try:
                 return act()
             except MavsdkError as error:
-                if not any(word in str(error) for word in ("TIMEOUT", "BUSY")):
+                if not any(word in str(error) for word in LOST_ON_THE_WAY):
                     raise
                 self.told["again"] = self.told.get("again", 0) + 1
                 self._turn.wait(1.0)
@@ -88,7 +89,7 @@ class Pilot:
         assert health.is_global_position_ok
         assert health.is_home_position_ok
         assert health.is_armable
-        version = Info(self.system).get_version()
+        version = self.again(Info(self.system).get_version)
         self.told["version"] = [version.flight_sw_major, version.flight_sw_minor]
 
     def telemetry_seen(self) -> None:
