@@ -1,6 +1,6 @@
 """The programs that people use, in real time against running processes; none of them may complain.
 
-Each flight below is one vehicle with whoever flies it; all are flown at once, most of them twice as fast as
+Each flight below is one vehicle with whoever flies it; three are flown at once, most of them twice as fast as
 the clock, which none of the clients minds. Loss of the link is the vehicle's own, SIM_LOSS_PCT, each way.
 """
 
@@ -70,7 +70,7 @@ def mavsdk_and_two_ground_stations(stage: Stage) -> Watched:
         "upload",
         "take_off",
     )
-    more = ("go_to", "fly_mission", "offboard", "come_back", "log")
+    more = ("go_to", "fly_mission", "offboard", "come_back", "gripper", "log")
     finished = stage.program("mavsdk_flight.py", f"udpin://{LOOPBACK}:{stage.api}", *steps, *more)
     stays.expect("Cable taut, lifting the load")
     vanishes.type("wp list")

@@ -17,6 +17,7 @@ from mavsdk import ComponentType, Configuration, Mavsdk, MavsdkError
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.geofence import Geofence
+from mavsdk.plugins.gripper import Gripper
 from mavsdk.plugins.info import Info
 from mavsdk.plugins.log_files import LogFiles, LogFilesResult
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
@@ -266,6 +267,12 @@ class Pilot:
         """On the ground, before anything is asked."""
         self.again(self.action.disarm)
         self.until("disarmed", lambda: not self.telemetry.armed())
+
+    def gripper(self) -> None:
+        """The load let go of and taken again, on the ground."""
+        gripper = Gripper(self.system)
+        self.again(lambda: gripper.release(1))
+        self.again(lambda: gripper.grab(1))
 
     def log(self) -> None:
         """The log of the flight that is over, by the log protocol; its folder by FTP."""
