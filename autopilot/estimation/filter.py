@@ -68,6 +68,7 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         gyro_bias_walk=table["EST_GYRO_WALK"],
         accel_bias_walk=table["EST_ACC_WALK"],
         cable_accel_std=table["EST_CABLE_STD"],
+        load_drag=table["EST_LOAD_DRAG"],
         length_std=table["EST_LEN_STD"],
         gate_sigma=table["EST_GATE"],
         imu_age=1e-3 * table["VEH_IMU_DELAY"],
