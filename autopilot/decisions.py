@@ -18,6 +18,7 @@ from autopilot.flight import (
     Selected,
     Settings,
     View,
+    below,
     forbidden,
 )
 from autopilot.following import Circle, Lean, Stream, Wish
@@ -33,9 +34,11 @@ from autopilot.services.requests import (
     FollowAttitude,
     FollowSetpoint,
     FollowStick,
+    Grab,
     Land,
     Orbit,
     Pause,
+    Release,
     ReplaceMission,
     Reposition,
     ReturnHome,
@@ -47,7 +50,16 @@ from autopilot.services.requests import (
     Takeoff,
     Terminate,
 )
-from autopilot.supervisor import TRANSITIONS, begin_step, disarmed, happen, load_motion
+from autopilot.supervisor import (
+    RELEASED_TEXT,
+    TRANSITIONS,
+    as_flown,
+    asked_motion,
+    begin_step,
+    disarmed,
+    happen,
+    release,
+)
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
@@ -96,7 +108,8 @@ def arming_complaints(flight: Flight, view: View, settings: Settings) -> tuple[s
         found.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         found.append(f"moving at {norm(view.v_quad):.1f} m/s")
-    where = forbidden(flight.fence, view.x_load, settings) if settings.fence_action else ""
+    place = below(view.x_quad, settings) if flight.released else view.x_load
+    where = forbidden(flight.fence, place, settings) if settings.fence_action else ""
     if where:
         found.append(where)
     return tuple(found)
@@ -173,6 +186,17 @@ def _leaves_fence(
     return ""
 
 
+def _needs_load(flight: Flight) -> str:
+    """Which item that is still to be flown swings a load that is released by then; an empty string: none."""
+    released, plan = flight.released, flight.plan
+    for step, seq in zip(plan.steps[flight.step :], plan.sequence[flight.step :], strict=True):
+        if isinstance(step, model.Release):
+            released = True
+        elif released and isinstance(step, model.Signals | model.AttitudeRun):
+            return f"item {seq} needs the load, which is released"
+    return ""
+
+
 def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     """Start the mission at `flight.step`, from the ground or from the air."""
     before, plan = flight, flight.plan
@@ -183,6 +207,9 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     beyond = _leaves_fence(flight, plan.steps, plan.sequence, settings)
     if beyond:
         return flight, _denied(f"Mission denied: {beyond}")
+    without = _needs_load(flight)
+    if without:
+        return flight, _denied(f"Mission denied: {without}")
     if plan.prepared.refusal:
         return flight, _denied(f"Mission denied: {plan.prepared.refusal}")
     if flight.phase == Phase.DISARMED:
@@ -293,7 +320,19 @@ def _set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) 
     handler = _MODES.get((main, sub_mode))
     if handler is None:
         return flight, _denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
-    return handler(flight, request, view, settings)
+    heeds = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not _hold
+    if settings.guided_mode and handler is _hold and heeds and _in_guided_mode(flight):
+        return flight, ACCEPTED
+    after, verdict = handler(flight, request, view, settings)
+    return (replace(after, heeds=heeds) if verdict.result == ACCEPTED.result else after), verdict
+
+
+def _in_guided_mode(flight: Flight) -> bool:
+    """Whether what is flown is a part of ArduPilot's GUIDED: a take-off, the way to a place, setpoints."""
+    if flight.on_mission:
+        return False
+    rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (flight.phase == Phase.HOLD and flight.heeds)
+    return rising or (flight.phase == Phase.GUIDED and flight.guide != Guide.MANUAL)
 
 
 def _replace_mission(flight: Flight, request: ReplaceMission, view: View, settings: Settings) -> Decision:
@@ -330,31 +369,43 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
         return flight, _denied("Reposition denied: not a place")
     if there[2] < LEAST_ALTITUDE_M:
         return flight, _denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
-    beyond = forbidden(flight.fence, there, settings) if settings.fence_action else ""
+    place = below(there, settings) if flight.released else there
+    beyond = forbidden(flight.fence, place, settings) if settings.fence_action else ""
     if beyond:
         return flight, _denied(f"Reposition denied: {beyond}")
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
     go = carry_leg(here, there, speed, settings.accel_m_s2, settings.least_move_s)
-    return replace(held, legs=(*held.legs[:-1], go, Hold(there))), ACCEPTED
+    legs = as_flown(held, (*held.legs[:-1], go, Hold(there)))
+    return replace(held, legs=legs, heeds=True), ACCEPTED
 
 
 def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settings: Settings) -> Decision:
     position = request.position
     if request.relative:
-        position = add(position, load_motion(flight, view, settings)[0])
-    elif settings.guides_vehicle:
+        position = add(position, asked_motion(flight, view, settings)[0])
+    elif settings.guides_vehicle and not flight.released:
         position = (position[0], position[1], position[2] - settings.cable_length_m)
     if any(abs(value) > FARTHEST_M for value in position):
         return flight, _denied(f"Setpoint refused: more than {FARTHEST_M:g} m away")
     asked = Wish(position, request.velocity, request.accel, view.now_us)
-    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
+    return _heed(replace(flight, offboard=Stream(asked, view.now_us)), view, settings), ACCEPTED
+
+
+def _heed(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight after a setpoint: in ArduPilot's GUIDED a vehicle that holds or circles follows it."""
+    circles = flight.phase == Phase.GUIDED and flight.guide == Guide.ORBIT
+    if not settings.guided_mode or not flight.heeds or not (flight.phase == Phase.HOLD or circles):
+        return flight
+    return _guide(flight, Guide.OFFBOARD, "Setpoint", view, settings)[0]
 
 
 def _follow_attitude(flight: Flight, request: FollowAttitude, view: View, settings: Settings) -> Decision:
+    if flight.released:
+        return flight, _denied("Attitude setpoint refused: the load is released, fly by position")
     thrust = None if request.thrust is None else request.thrust / settings.hover_share * settings.weight_n
     asked = Lean(request.upward, thrust)
-    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
+    return _heed(replace(flight, offboard=Stream(asked, view.now_us)), view, settings), ACCEPTED
 
 
 def _follow_stick(flight: Flight, request: FollowStick, view: View, settings: Settings) -> Decision:
@@ -365,7 +416,7 @@ def _follow_stick(flight: Flight, request: FollowStick, view: View, settings: Se
 def _orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Decision:
     if flight.phase not in CARRYING:
         return flight, _wrong_phase(flight, "Orbit")
-    here = load_motion(flight, view, settings)[0]
+    here = asked_motion(flight, view, settings)[0]
     centre: Vec3 = (
         here[0] if request.east_m is None else request.east_m,
         here[1] if request.north_m is None else request.north_m,
@@ -387,7 +438,8 @@ def _orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> De
     for k in range(CIRCLE_POINTS if settings.fence_action else 0):
         at = 2.0 * math.pi * k / CIRCLE_POINTS
         there = add(centre, (radius * math.cos(at), radius * math.sin(at), 0.0))
-        beyond = forbidden(flight.fence, there, settings)
+        place = below(there, settings) if flight.released else there
+        beyond = forbidden(flight.fence, place, settings)
         if beyond:
             return flight, _denied(f"Orbit denied: {beyond}")
     out = sub(here, centre)
@@ -420,6 +472,27 @@ def _change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Se
     if not SLOWEST_M_S <= request.speed_m_s <= FASTEST_M_S:
         return flight, _denied(f"Speed {request.speed_m_s:.2f} m/s denied; must be 0.05 ... 15")
     return replace(flight, speed_m_s=request.speed_m_s), ACCEPTED
+
+
+def _release(flight: Flight, request: Release, view: View, settings: Settings) -> Decision:
+    if flight.released:
+        return flight, Verdict(mavlink.MAV_RESULT_ACCEPTED, "Gripper: the load is released already")
+    text = RELEASED_TEXT
+    if flight.on_mission and flight.phase not in ON_GROUND:
+        text += ", mission held" if flight.phase != Phase.SET_DOWN else ""
+    return release(flight, view, settings), Verdict(mavlink.MAV_RESULT_ACCEPTED, text)
+
+
+def _grab(flight: Flight, request: Grab, view: View, settings: Settings) -> Decision:
+    if not flight.released:
+        return flight, ACCEPTED
+    if flight.phase not in ON_GROUND:
+        return flight, _denied("Gripper: a load can be taken on the ground only; land beside it")
+    away = norm(sub(view.x_load, view.x_quad))
+    if not away <= settings.cable_length_m:
+        text = f"Gripper: the load lies {away:.1f} m away, the cable reaches {settings.cable_length_m:g} m"
+        return flight, _denied(text)
+    return replace(flight, released=False), Verdict(mavlink.MAV_RESULT_ACCEPTED, "Load taken")
 
 
 def _terminate(flight: Flight, request: Terminate, view: View, settings: Settings) -> Decision:
@@ -457,6 +530,8 @@ _HANDLERS: dict[type, Callable[[Flight, Any, View, Settings], Decision]] = {
     Orbit: _orbit,
     ChangeAltitude: _change_altitude,
     SetHome: _set_home,
+    Release: _release,
+    Grab: _grab,
     ChangeSpeed: _change_speed,
     Terminate: _terminate,
     RunPrearmChecks: _run_checks,

@@ -37,6 +37,7 @@ class Phase(IntEnum):
     GUIDED = mavlink.PLUMBLINE_PHASE_GUIDED
 
 
+ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
 CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
@@ -118,6 +119,8 @@ class Flight:
     breach: str = ""  # why load or vehicle may not be where it is, or is about to be
     breaches: int = 0
     breach_us: int = 0  # when the last one began
+    released: bool = False  # the load: what is flown and asked for is the vehicle, by itself
+    heeds: bool = True  # holding, it follows a setpoint at once: ArduPilot's GUIDED, not its LOITER
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +151,8 @@ class Settings:
     fence_action: int  # GF_ACTION
     fence_radius_m: float  # 0: none
     fence_height_m: float  # 0: none
+    guided_mode: bool  # setpoints as in ArduPilot's GUIDED: heeded while holding, and a place stays asked for
+    guided_loss_us: int  # silence after which other setpoints count as lost there
     guides_vehicle: bool  # position setpoints are for the vehicle, which is kept a cable length over the load
 
 
@@ -199,6 +204,8 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         fence_action=int(table["GF_ACTION"]),
         fence_radius_m=table["GF_MAX_HOR_DIST"],
         fence_height_m=table["GF_MAX_VER_DIST"],
+        guided_mode=int(table["MAV_IDENTITY"]) == ARDUPILOT_IDENTITY,
+        guided_loss_us=round(1e6 * table["GUID_TIMEOUT"]),
         guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 
@@ -256,6 +263,11 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     if settings.fence_height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence_height_m:
         return f"higher than GF_MAX_VER_DIST {settings.fence_height_m:g} m"
     return fence.complaint(x_load[0], x_load[1])
+
+
+def below(x_quad: Vec3, settings: Settings) -> Vec3:
+    """Where a load would hang under the vehicle."""
+    return (x_quad[0], x_quad[1], x_quad[2] - settings.cable_length_m)
 
 
 def leg_time_s(flight: Flight, now_us: int) -> float:

@@ -13,6 +13,7 @@ from autopilot.control.load_motion import Drag, air_force
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
+from autopilot.estimation.parting import parted, untied
 from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
 from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
 from autopilot.following import Posture
@@ -77,7 +78,12 @@ def initial_state() -> FlightState:
 
 
 def view_of(
-    estimator: EstimatorState, state: State, settings: Settings, now_us: int, pull_n: float = nan
+    estimator: EstimatorState,
+    state: State,
+    settings: Settings,
+    now_us: int,
+    pull_n: float = nan,
+    released: bool = False,
 ) -> View:
     """What the supervisor sees."""
     return View(
@@ -88,7 +94,7 @@ def view_of(
         state.v_load,
         estimator.load.taut > 0.0,
         tilt_angle(state.R),
-        complaints(estimator, settings.sensor_age_limit_s),
+        complaints(estimator, settings.sensor_age_limit_s, carries=not released),
         pull_n,
     )
 
@@ -107,7 +113,11 @@ def step(
     before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
 ) -> tuple[FlightState, Report]:
     """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
-    estimator = estimate(before.estimator, history, readings, setup.tuning, dt, before.actuation.thrust)
+    estimator, tuning = before.estimator, setup.tuning
+    if before.flight.released:
+        tuning = untied(tuning)
+        estimator = parted(estimator, history, tuning)
+    estimator = estimate(estimator, history, readings, tuning, dt, before.actuation.thrust)
     before = before._replace(estimator=estimator)
     if not is_due(tick, setup.control_every):
         return before, Report()
@@ -119,11 +129,11 @@ def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState
     estimator = before.estimator
     state = control_state(estimator)
     pull_n = felt_pull(before, state, setup)
-    view = view_of(estimator, state, setup.settings, now_us, pull_n)
+    view = view_of(estimator, state, setup.settings, now_us, pull_n, before.flight.released)
     flight, report = advance(before.flight, view, setup.settings)
 
     taut = view.taut
-    slack_events = before.slack_events + (before.was_taut and not taut)
+    slack_events = before.slack_events + (before.was_taut and not taut and not flight.released)
     observed = before.observed if before.observed is not None else nominal(setup.vehicle)
     observed = observe(
         observed,

@@ -164,7 +164,11 @@ class Onboard:
             return self._answer
         self._run(tick)
         command = hil_actuator_controls_message(
-            tick.now_us, self._state.mixed.forces, self.armed, self._options.lockstep
+            tick.now_us,
+            self._state.mixed.forces,
+            self.armed,
+            self._options.lockstep,
+            self._state.flight.released,
         )
         aside = self._world.messages(self.now_us)
         if self._reboot:
@@ -342,7 +346,13 @@ class Onboard:
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         state = self._state
-        view = view_of(state.estimator, control_state(state.estimator), self._setup.settings, self.now_us)
+        view = view_of(
+            state.estimator,
+            control_state(state.estimator),
+            self._setup.settings,
+            self.now_us,
+            released=state.flight.released,
+        )
         flight, verdict = decide(state.flight, request, view, self._setup.settings)
         self._state = state._replace(flight=flight)
         return verdict

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from autopilot.estimation.filter import Readings, control_state
+from autopilot.estimation.parting import parted
 from autopilot.estimation.records import ImuReading, LoadReading, PoseReading, new_history
 from autopilot.flight_core import Setup, initial_state, step, track
-from autopilot.geometry.linear import ZERO
+from autopilot.geometry.linear import E3, ZERO
+from autopilot.geometry.s2 import tangent
 from autopilot.geometry.so3 import IDENTITY_QUAT
 from autopilot.guidance import (
     LOAD_ATTITUDE,
@@ -39,6 +41,8 @@ def rehearse(setup: Setup) -> None:
     for tick in range(3):
         state, _ = step(state, history, readings, setup, tick * 4000, tick, 0.004)
     motion = control_state(state.estimator)
+    hanging = state.estimator._replace(load=state.estimator.load._replace(taut=1.0))
+    parted(hanging, history, setup.tuning)
     wave = Signals(
         1.0, (Term("x", 0.01, 0.0, 1.0, None, 0.0, (Sine(1.0),)), Term("x", 0.1, 0.0, 1.0, None, 0.0))
     )
@@ -50,6 +54,7 @@ def rehearse(setup: Setup) -> None:
         Swing(load, 0.1, 0.1, 1.0, LOAD_ATTITUDE),
         Swing(load, 0.1, 0.1, 1.0, QUAD_ATTITUDE),
     )
+    tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
     for leg in legs:
         jet = leg.jet(0.5)
         memory = setup.law.start(motion, jet[0], jet[1])

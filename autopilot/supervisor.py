@@ -13,6 +13,7 @@ from math import degrees, dist, isfinite
 from autopilot.flight import (
     CARRYING,
     IN_AIR,
+    ON_GROUND,
     Event,
     Flight,
     Guide,
@@ -21,12 +22,13 @@ from autopilot.flight import (
     Selected,
     Settings,
     View,
+    below,
     forbidden,
     leg_time_s,
     pace_of,
     setpoint,
 )
-from autopilot.following import Asked, Follow, Lean, Posture, Wish, begin_following
+from autopilot.following import SILENT, Asked, Follow, Lean, Posture, Wish, begin_following
 from autopilot.geometry.linear import ZERO, Vec3, axpy, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance import (
@@ -53,6 +55,7 @@ from missions.model import (
     AttitudeRun,
     Delay,
     Land,
+    Release,
     ReturnHome,
     Signals,
     Speed,
@@ -98,6 +101,7 @@ TRANSITIONS: dict[tuple[Phase, Event], Phase] = {
     (P.GUIDED, E.LAND): P.LOWER,
     (P.GUIDED, E.LOAD_DOWN): P.SET_DOWN,
     (P.LOWER, E.LOAD_DOWN): P.SET_DOWN,
+    (P.LOWER, E.VEHICLE_DOWN): P.DISARMED,  # without a load
     (P.LIFT, E.LOAD_DOWN): P.SET_DOWN,
     (P.HOLD, E.LOAD_DOWN): P.SET_DOWN,
     (P.MISSION, E.LOAD_DOWN): P.SET_DOWN,
@@ -131,6 +135,8 @@ STILL_SPEED, STILL_US = 0.05, 200_000
 IDLE_DISARM_US = 10_000_000
 FAILSAFE_DISARM_US = 3_000_000
 SETTLE_S = 3.0  # hold after an attitude run
+RELEASE_S = 2.0  # hold of a mission after the load was released: the vehicle jumps up and comes back
+RELEASED_TEXT = "Load released"
 NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
 SLACK, PULLED = 0.1, 0.3  # weights of the load: less is no pull of the cable, more is one
@@ -159,7 +165,7 @@ def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Fligh
         flight,
         phase=phase,
         phase_start_us=view.now_us,
-        legs=legs,
+        legs=as_flown(flight, legs),
         leg_start_us=view.now_us,
         still_since_us=-1,
         following=(),
@@ -170,14 +176,33 @@ def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Fligh
 def happen(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
     """The flight after an event; None where the table has no room for it."""
     phase = TRANSITIONS.get((flight.phase, event))
+    if phase == P.TAUTEN and flight.released:  # there is no cable to pull taut
+        phase = P.LIFT
     return None if phase is None else enter(flight, phase, view, settings)
 
 
-def load_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, Vec3, Vec3]:
-    """Position, velocity and acceleration asked of the load; those it has if nothing is asked of it."""
-    if flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
+def position_mode(flight: Flight) -> int:
+    """The control mode in which positions are flown: of the load, or of the vehicle that has released it."""
+    return QUAD_POSITION if flight.released else LOAD_POSITION
+
+
+def as_flown(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
+    """The legs, flown by the vehicle alone where the load is released."""
+    if not flight.released:
+        return legs
+    return tuple(
+        replace(leg, control_mode=QUAD_POSITION) if leg.control_mode == LOAD_POSITION else leg for leg in legs
+    )
+
+
+def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, Vec3, Vec3]:
+    """Position, velocity and acceleration asked of the load; those it has if nothing is asked of it. Of the
+    vehicle where the load is released."""
+    if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         jet = flight.legs[0].jet(leg_time_s(flight, view.now_us))
         return jet[0], jet[1], jet[2]
+    if flight.released:
+        return view.x_quad, view.v_quad if flight.phase in CARRYING else ZERO, ZERO
     if flight.phase not in CARRYING:
         return view.x_load, ZERO, ZERO
     # a load that neither rises nor falls is accelerated by as much of its weight as the cable leans
@@ -205,13 +230,13 @@ def _calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
 
 def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
     """Legs that bring the load to rest out of its present motion (none if it rests), and where that is."""
-    x, v, a = load_motion(flight, view, settings)
+    x, v, a = asked_motion(flight, view, settings)
     if norm(v) <= AT_REST and norm(a) <= AT_REST:
         return (), x
-    if flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
+    if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
         if isinstance(leg, Follow):
-            leg, t = leg.coasting(t), 0.0
+            return leg.stopped(t, settings.accel_m_s2)
         slow = slow_leg(leg, t, settings.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
     accel, least_s = settings.accel_m_s2, settings.least_move_s
@@ -236,6 +261,10 @@ def _tauten(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 
 def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
+    if flight.released:
+        legs, here = stop(flight, view, settings)
+        up = (here[0], here[1], flight.takeoff_altitude_m)
+        return (*legs, _carry(here, up, settings.lift_speed_m_s, settings))
     top = (view.x_load[0], view.x_load[1], flight.takeoff_altitude_m)
     return (_carry(view.x_load, top, settings.lift_speed_m_s, settings),)
 
@@ -274,22 +303,45 @@ def asked_of(flight: Flight) -> Asked | None:
 def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     asked = asked_of(flight)
     if isinstance(asked, Lean):
-        return (Posture(asked, load_motion(flight, view, settings)[0]),)
-    jet = setpoint(flight, view.now_us)
-    if jet is None or flight.legs[0].control_mode != LOAD_POSITION:
-        x, v, a = load_motion(flight, view, settings)
-        jet = (x, v, a, ZERO, ZERO, ZERO, ZERO)
-    return (begin_following(jet, pace_of(flight, settings).rate),)
+        return (Posture(asked, asked_motion(flight, view, settings)[0]),)
+    jet, rate = setpoint(flight, view.now_us), pace_of(flight, settings).rate
+    if jet is None or flight.legs[0].control_mode != position_mode(flight):
+        x, v, a = asked_motion(flight, view, settings)
+        return (begin_following((x, v, a, ZERO, ZERO, ZERO, ZERO), rate),)
+    leg = flight.legs[0]
+    if isinstance(leg, Follow):
+        return (leg.coasting(leg_time_s(flight, view.now_us), rate),)
+    return (begin_following(jet, rate),)
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = stop(flight, view, settings)
+    if flight.released:
+        clear = _clear_of_load(here, view, settings)
+        low = (clear[0], clear[1], min(here[2], LEAST_HEIGHT))
+        return (
+            *legs,
+            _carry(here, clear, flight.speed_m_s, settings),
+            _carry(clear, low, settings.lift_speed_m_s, settings),
+            Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
+        )
     low = (here[0], here[1], min(here[2], TOUCH_HEIGHT))
     return (
         *legs,
         _carry(here, low, settings.lift_speed_m_s, settings),
         Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION),
     )
+
+
+def _clear_of_load(here: Vec3, view: View, settings: Settings) -> Vec3:
+    """The place at which the vehicle comes down without landing on the load that it has released."""
+    reach = ASIDE * settings.cable_length_m
+    beside = (here[0] - view.x_load[0], here[1] - view.x_load[1], 0.0)
+    distance = norm(beside)
+    if not distance < reach:
+        return here
+    away = scale(1.0 / distance, beside) if distance > AT_REST else (-1.0, 0.0, 0.0)
+    return (view.x_load[0] + reach * away[0], view.x_load[1] + reach * away[1], here[2])
 
 
 def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -352,6 +404,8 @@ def _step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tu
             return (Swing(here, north, east, duration, mode),)
         case Speed():
             return (Hold(here, 0.0),)
+        case Release():
+            return (Hold(here, RELEASE_S),)
         case Land():
             return ()
     raise AssertionError(step)
@@ -416,7 +470,8 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         return _to(flight, E.DISARM, view, settings, (INFO, "Disarmed: nothing was asked of the vehicle"))
     if flight.phase == P.FAILSAFE and view.now_us - flight.phase_start_us > FAILSAFE_DISARM_US:
         return _to(flight, E.DISARM, view, settings, (WARNING, "Disarmed after failsafe"))
-    if flight.phase in CARRYING:
+    had_load = not flight.released
+    if flight.phase in CARRYING and had_load:
         flight = _note_slack(flight, view, settings)
         caught = _watch_slack(flight, view, settings)
         if caught is not None:
@@ -440,7 +495,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
     if flight.phase in (P.LOWER, P.SET_DOWN):
         flight = _watch_touchdown(flight, view, settings)
         if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= STILL_US:
-            if flight.phase == P.LOWER:
+            if flight.phase == P.LOWER and had_load:
                 return _to(flight, E.LOAD_DOWN, view, settings, (INFO, "Load on the ground"))
             return _landed(flight, view, settings)
     reached: tuple[int, ...] = ()
@@ -461,6 +516,8 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         flight, more = _legs_done(flight, view, settings)
         reached += more.reached
         texts += more.texts
+    if flight.released and had_load:
+        texts += ((INFO, RELEASED_TEXT),)
     return flight, Report(texts, reached)
 
 
@@ -491,6 +548,9 @@ def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
 def lost(flight: Flight, now_us: int, settings: Settings) -> bool:
     """Whether nothing is heard any more from the flight's guide."""
     if flight.guide == Guide.OFFBOARD:
+        if settings.guided_mode:
+            stays = isinstance(flight.offboard.asked, Wish) and flight.offboard.asked.is_place
+            return not stays and not flight.offboard.alive(now_us, settings.guided_loss_us)
         return not flight.offboard.alive(now_us, settings.offboard_loss_us)
     return flight.guide == Guide.MANUAL and not flight.manual.alive(now_us, settings.manual_loss_us)
 
@@ -510,7 +570,7 @@ def _guide(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Repo
     if isinstance(leg, Follow) and asked is not None and not isinstance(asked, Lean):
         t = leg_time_s(flight, view.now_us)
         led = leg.onward(t, asked, pace_of(flight, settings), view.now_us)
-        return replace(flight, legs=(led,), leg_start_us=view.now_us), Report()
+        return replace(flight, legs=as_flown(flight, (led,)), leg_start_us=view.now_us), Report()
     return flight, Report()
 
 
@@ -534,7 +594,7 @@ def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     """The last leg of the present phase is over."""
     calm = flight.legs[0] if flight.legs else None
     if isinstance(calm, Calm) and not calm.ends_step:  # now the phase can begin
-        legs = _ENTRY[flight.phase](flight, view, settings)
+        legs = as_flown(flight, _ENTRY[flight.phase](flight, view, settings))
         return replace(flight, legs=legs, leg_start_us=view.now_us), Report()
     if flight.on_mission and flight.phase in (P.LIFT, P.MISSION):
         return _step_done(flight, view, settings)
@@ -545,7 +605,8 @@ def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     after = happen(flight, E.DONE, view, settings)
     if after is None:  # a phase whose last leg has no end
         legs, here = stop(flight, view, settings)
-        return replace(flight, legs=(*legs, Hold(here)), leg_start_us=view.now_us), Report()
+        legs = as_flown(flight, (*legs, Hold(here)))
+        return replace(flight, legs=legs, leg_start_us=view.now_us), Report()
     return after, Report()
 
 
@@ -567,6 +628,11 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     flight = replace(flight, step=flight.step + 1, step_anchor=None)
     if following is None:
         rewound = replace(flight, on_mission=False, mission_done=True, step=0)
+        if isinstance(
+            step, ReturnHome
+        ):  # a return that nothing follows ends on the ground, as ordered by mode
+            down = enter(rewound, P.LOWER, view, settings)
+            return down, Report(((INFO, "Mission complete, landing"),), done.reached)
         return enter(rewound, P.HOLD, view, settings), Report(
             ((INFO, "Mission complete, holding"),), done.reached
         )
@@ -579,7 +645,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
             there = (following.east_m, following.north_m, following.altitude_m)
             legs += (Hold(there, max(following.hold_s - _borrowed(flight), 0.0)),)
         passed = flight.leg_start_us + round(swung.duration_s * 1e6)
-        gone = replace(flight, legs=legs, leg_start_us=passed)
+        gone = replace(flight, legs=as_flown(flight, legs), leg_start_us=passed)
         return replace(gone, following=_following(gone, settings)), done
     if isinstance(swung, Swing):
         # the next run takes the motion over as it is; only the height is still that of the first
@@ -596,9 +662,28 @@ def begin_step(flight: Flight, view: View, settings: Settings) -> Flight:
         flight = replace(flight, speed_m_s=step.speed_m_s)
     if isinstance(step, Land):
         return enter(flight, P.LOWER, view, settings)
+    if isinstance(step, Release) and not flight.released:
+        flight = replace(flight, released=True, legs=(), slack_since_us=-1)
     if flight.step_anchor is None and not (flight.legs and _swings(flight.legs[0])):
         flight = replace(flight, step_anchor=stop(flight, view, settings)[1])
     return enter(flight, P.MISSION, view, settings)
+
+
+def release(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight whose load was let go by command: the vehicle goes on alone, a mission is held."""
+    if flight.released:
+        return flight
+    mission = flight.on_mission
+    alone = replace(flight, released=True, slack_since_us=-1, still_since_us=-1)
+    if flight.phase in ON_GROUND or flight.phase in (P.SET_DOWN, P.FAILSAFE):
+        return alone
+    alone = replace(alone, on_mission=False)
+    if flight.phase == P.TAUTEN:
+        return enter(alone, P.LIFT, view, settings)
+    alone = replace(alone, legs=())
+    if flight.phase == P.GUIDED and isinstance(asked_of(flight), Lean):
+        return enter(replace(alone, offboard=SILENT), P.HOLD, view, settings)
+    return enter(alone, P.HOLD if mission else flight.phase, view, settings)
 
 
 def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
@@ -701,11 +786,12 @@ def _watch_fence(flight: Flight, view: View, settings: Settings) -> Flight | tup
     limited = flight.fence.zones or settings.fence_radius_m > 0.0 or settings.fence_height_m > 0.0
     if settings.fence_action == NO_ACTION or not limited or isinstance(flight.legs[0], Catch):
         return flight
-    over = sub(view.x_quad, (0.0, 0.0, settings.cable_length_m))
-    places = [view.x_load, over]
+    over = below(view.x_quad, settings)
+    places = [over] if flight.released else [view.x_load, over]
     if not _swings(flight.legs[0]):
-        here, end = load_motion(flight, view, settings)[0], stop(flight, view, settings)[1]
-        places += [here, axpy(STOP_MARGIN, sub(end, here), end)]
+        here, end = asked_motion(flight, view, settings)[0], stop(flight, view, settings)[1]
+        ahead = [here, axpy(STOP_MARGIN, sub(end, here), end)]
+        places += [below(place, settings) for place in ahead] if flight.released else ahead
     why = next(filter(None, (forbidden(flight.fence, place, settings) for place in places)), "")
     if bool(why) == bool(flight.breach):
         return flight
@@ -738,11 +824,12 @@ def _trouble(flight: Flight, view: View, settings: Settings) -> str:
     if view.tilt_rad > settings.tilt_limit_rad:
         limit = degrees(settings.tilt_limit_rad)
         return f"tilt {degrees(view.tilt_rad):.0f} deg exceeds FS_TILT_DEG {limit:.0f}"
-    if flight.phase in CARRYING and flight.legs and flight.legs[0].control_mode == LOAD_POSITION:
+    if flight.phase in CARRYING and flight.legs and flight.legs[0].control_mode == position_mode(flight):
         jet = setpoint(flight, view.now_us)
-        error = norm(sub(view.x_load, jet[0])) if jet is not None else 0.0
+        what, place = ("vehicle", view.x_quad) if flight.released else ("load", view.x_load)
+        error = norm(sub(place, jet[0])) if jet is not None else 0.0
         if not error <= settings.load_error_limit_m:
-            return f"load error {error:.1f} m exceeds FS_LOAD_ERR {settings.load_error_limit_m:.1f} m"
+            return f"{what} error {error:.1f} m exceeds FS_LOAD_ERR {settings.load_error_limit_m:.1f} m"
     return ""
 
 

@@ -159,7 +159,7 @@ def make_snapshot(
     """All that telemetry tells of this instant."""
     flight, estimator, command = state.flight, state.estimator, state.command
     control = control_state(estimator)
-    view = view_of(estimator, control, setup.settings, now_us)
+    view = view_of(estimator, control, setup.settings, now_us, released=flight.released)
     ready = not arming_complaints(flight, view, setup.settings)
     present, healthy = sensor_bits(condition, state, ready, fake_gps, now_us)
     tracked = estimator.vehicle.source == TRACKER and healthy & snapshot.TRACKER

@@ -122,6 +122,8 @@ def _order_problems(kinds: Sequence[str], where: str) -> list[str]:
             problems.append(at + 'must be "land": a mission ends on the ground')
         elif index < last and kind == "land":
             problems.append(at + "only the last item may be a landing")
+        if kind in ("signals", "attitude") and "release" in kinds[:index]:
+            problems.append(at + "swings the load, which an item before it has released")
     return problems
 
 

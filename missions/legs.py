@@ -12,6 +12,7 @@ from missions.model import (
     Delay,
     Land,
     Mission,
+    Release,
     ReturnHome,
     Signals,
     Speed,
@@ -27,6 +28,7 @@ from missions.transfer import transfer_duration
 TAUTEN_S = 10.0
 SET_DOWN_S = 10.0
 VERTICAL_SPEED_M_S = 0.8
+RELEASE_S = 2.0  # held when the load is released
 # of transfers, for a vehicle as delivered (MIS_SPEED, MIS_ACCEL)
 SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
 
@@ -67,6 +69,8 @@ def legs(mission: Mission, speed: float, accel: float) -> Iterator[Leg]:
                 waiting, pace = SET_DOWN_S, min(speed, VERTICAL_SPEED_M_S)
             case Speed():
                 speed = step.speed_m_s
+            case Release():
+                waiting = RELEASE_S
             case Delay() | AttitudeRun():
                 waiting = step.duration_s
             case Signals():

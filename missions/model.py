@@ -55,6 +55,11 @@ class Land:
 
 
 @dataclass(frozen=True, slots=True)
+class Release:
+    """Let the load go. What the items after it say of the load is said of the vehicle, which flies alone."""
+
+
+@dataclass(frozen=True, slots=True)
 class Sine:
     """sin(2 pi (t - start_s) / period_s + phase_rad), t in seconds since the signals began."""
 
@@ -107,7 +112,7 @@ class AttitudeRun:
     duration_s: float
 
 
-Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Signals | AttitudeRun
+Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Signals | AttitudeRun
 
 
 @dataclass(frozen=True, slots=True)

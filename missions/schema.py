@@ -82,6 +82,11 @@ class LandItem(Item):
         return model.Land()
 
 
+class ReleaseItem(Item):
+    def step(self) -> model.Step:
+        return model.Release()
+
+
 class SineSpec(Spec):
     period_s: float = Field(ge=0.1, le=2000.0, description="period of the sine")
     phase_deg: float = Field(0.0, ge=-360.0, le=360.0, description="phase at start_s")
@@ -159,6 +164,7 @@ ITEMS: dict[str, type[Item]] = {
     "signals": SignalsItem,
     "attitude": AttitudeItem,
     "return": ReturnItem,
+    "release": ReleaseItem,
     "land": LandItem,
 }
 

@@ -152,11 +152,23 @@ def meet(link: Link, simulator: HilSimulator, stop: StopRequest) -> None:
             link.take(*arrived, simulator)
 
 
-def run_lockstep(link: Link, simulator: HilSimulator, stop: StopRequest, say: Callable[[str], None]) -> None:
-    """Tick for ever, each tick as soon as the one before is answered."""
+def run_lockstep(
+    link: Link,
+    simulator: HilSimulator,
+    stop: StopRequest,
+    say: Callable[[str], None],
+    speed: float | None = None,
+) -> None:
+    """Tick for ever, each tick as soon as the one before is answered, but no faster than `speed`."""
     watch = Watch(say)
+    period_ns = round(simulator.tick_us * 1000 / speed) if speed else 0
+    due = time.perf_counter_ns()
     while True:
         stop.check()
+        if period_ns:
+            # what was waited for is not caught up with
+            due = max(due, time.perf_counter_ns() - _STALL_NS) + period_ns
+            _sleep_until(due)
         link.send_truth(simulator)
         link.send(simulator)
         began = sent = time.monotonic()
@@ -253,11 +265,11 @@ def _run_on(cpu: int) -> None:
 @click.option(
     "--seed", default=1, show_default=True, type=click.IntRange(0, 2**63 - 1), help="Seed of all noise."
 )
-@click.option("--lockstep", is_flag=True, help="As fast as it goes: wait for the answer to every tick.")
+@click.option("--lockstep", is_flag=True, help="Wait for the answer to every tick; as fast as it goes.")
 @click.option(
     "--speed",
     type=click.FloatRange(0.0, 1000.0, min_open=True),
-    help="Simulated seconds per second.  [default: 1]",
+    help="Simulated seconds per second, with --lockstep at most.  [default: 1; with --lockstep: no limit]",
 )
 @click.option(
     "--listen",
@@ -313,8 +325,6 @@ def main(
 
     Waits for an autopilot, sends it sensor readings and takes rotor commands back, by MAVLink over UDP.
     """
-    if lockstep and speed is not None:
-        raise click.UsageError("--lockstep goes as fast as it can; leave --speed out")
 
     def say(text: str) -> None:
         if not quiet:
@@ -340,7 +350,9 @@ def main(
         if cpu is not None:
             _run_on(cpu)
         be_punctual()
-        mode = "in lockstep" if lockstep else f"at {factor:g} x real time"
+        mode = f"at {factor:g} x real time"
+        if lockstep:
+            mode = "in lockstep" if speed is None else f"in lockstep, at most {mode[3:]}"
         say(
             f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
             f"waiting for an autopilot on {shown(listen)}"
@@ -349,7 +361,7 @@ def main(
             meet(link, simulator, stop)
             began = time.monotonic()
             if lockstep:
-                run_lockstep(link, simulator, stop, say)
+                run_lockstep(link, simulator, stop, say, speed)
             else:
                 run_real_time(link, simulator, factor, pacing, stop, say)
     except ValueError as error:

@@ -109,6 +109,7 @@ class HilSimulator:
         self._core = core
         self._stated = stated_of(self._profile, settings.noise_scale)
         self._command: Rotors = STOPPED
+        self._gripper_open = False
         self._command_us = -1  # the tick that the last command answers
         self._inertial = ImuReading(_ZERO, _ZERO)
         self._field = _ZERO
@@ -201,6 +202,7 @@ class HilSimulator:
                 self._command = answer.forces if answer.armed else STOPPED
             else:
                 self.rejected += 1
+            self._gripper_open = answer.gripper_open
             self._command_us = answer.time_us
             self.answered = self.answered or current
         if self.answered and not was_answered:  # a repeated datagram changes nothing
@@ -233,7 +235,7 @@ class HilSimulator:
             if self._core.now_us - self._command_us > COMMAND_TIMEOUT_US:
                 self._command = STOPPED
         self.answered = False
-        self._sensors = self._sensor_frames(self._core.tick(self._command))
+        self._sensors = self._sensor_frames(self._core.tick(self._command, self._gripper_open))
         self._truth_made = False
 
     def _sensor_frames(self, readings: Readings) -> bytes:

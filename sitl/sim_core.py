@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import ZERO, Vec3, add
 from autopilot.wire.parameters import ParameterError, ParameterTable
+from sitl.plant.gripper import dropped, takes_hold, without_cable
 from sitl.plant.records import PlantState, Rotors, Truth
 from sitl.plant.step import advance, initial_state
 from sitl.plant.wind import gust
@@ -119,6 +120,8 @@ class SimCore:
         self.now_us = 0
         self.command = STOPPED  # in force, N
         self.wind = settings.wind  # ENU, m/s
+        self.released = False  # the gripper has let the cable go
+        self._plant_truth = truth  # what the plant is told: without the cable while it is released
         self.snap_speed = 0.0  # m/s, at which the cable came taut in the last tick; 0: it did not
         self._pulse_at_us = settings.pulse_at_us
         self._commands: deque[tuple[int, Rotors]] = deque()  # (takes effect at, forces)
@@ -139,16 +142,20 @@ class SimCore:
         later_us = settings.actuator_delay_us - self.settings.actuator_delay_us
         self._commands = deque((effect_us + later_us, command) for effect_us, command in self._commands)
         self.truth = truth
+        self._plant_truth = without_cable(truth) if self.released else truth
         self.settings = settings
         for stream, channel in zip(CHANNEL_STREAMS, self._channels, strict=True):
             if channel is not None:
                 channel.retune(self._noise(stream), self._extra_loss(stream))
 
-    def tick(self, command: Rotors) -> Readings:
+    def tick(self, command: Rotors, gripper_open: bool = False) -> Readings:
         """Integrate to the next tick; `command` (N) is the one that answers the present tick.
 
-        It takes effect after the actuator delay; before the first one the rotors stand still.
+        It takes effect after the actuator delay; before the first one the rotors stand still. A gripper that
+        opens lets go at once; one that closes takes hold as soon as the load lies within reach.
         """
+        if gripper_open != self.released:
+            self._move_gripper(gripper_open)
         now_us = self.now_us
         end_us = now_us + self.settings.tick_us
         commands = self._commands
@@ -163,7 +170,9 @@ class SimCore:
                 stop_us = commands[0][0]
             for channel in self._fitted:
                 stop_us = min(stop_us, channel.due_us)
-            self.state = advance(self.state, self.truth, self.command, wind, (stop_us - now_us) / SECOND_US)
+            self.state = advance(
+                self.state, self._plant_truth, self.command, wind, (stop_us - now_us) / SECOND_US
+            )
             snap_speed = max(snap_speed, self.state.snap_speed)
             now_us = stop_us
             self._measure(now_us)
@@ -172,6 +181,14 @@ class SimCore:
         self.tick_count += 1
         self.readings = self._collect()
         return self.readings
+
+    def _move_gripper(self, gripper_open: bool) -> None:
+        if gripper_open:
+            self.state = dropped(self.state)
+        elif not takes_hold(self.state, self.truth):
+            return
+        self.released = gripper_open
+        self._plant_truth = without_cable(self.truth) if gripper_open else self.truth
 
     @property
     def pulse(self) -> Vec3:

@@ -143,9 +143,13 @@ def control_state(state: EstimatorState) -> State:
     )
 
 
-def complaints(state: EstimatorState, oldest_s: float) -> tuple[str, ...]:
-    """What keeps the estimate from being flown on, in words for the operator; empty if nothing does."""
-    return (*_of_vehicle(state, oldest_s), *_of_load(state, oldest_s))
+def complaints(state: EstimatorState, oldest_s: float, carries: bool = True) -> tuple[str, ...]:
+    """What keeps the estimate from being flown on, in words for the operator; empty if nothing does.
+
+    Where nothing is carried the load need not be known.
+    """
+    of_load = _of_load(state, oldest_s) if carries else ()
+    return (*_of_vehicle(state, oldest_s), *of_load)
 
 
 def _of_vehicle(state: EstimatorState, oldest_s: float) -> tuple[str, ...]:

@@ -21,10 +21,12 @@ from autopilot.services.requests import (
     ChangeSpeed,
     Continue,
     GetMessageInterval,
+    Grab,
     Land,
     Orbit,
     Pause,
     Reboot,
+    Release,
     Reposition,
     Request,
     RequestCapabilities,
@@ -46,11 +48,13 @@ from autopilot.wire.dialect import plumbline as mavlink
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED
 UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
+_REFUSED = (DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 
 FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGroundControl, PX4 and MAVSDK
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
 REPEAT_US = 3_000_000
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
+GRIPPERS = (0.0, 1.0)  # by number; 0: all of them
 _NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
 
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -293,7 +297,14 @@ def _request_capabilities(call: Call, context: Context) -> Request | Verdict:
 
 
 def _gripper(call: Call, context: Context) -> Request | Verdict:
-    return Verdict(UNSUPPORTED, "Gripper: the load is tied to its cable and cannot be released")
+    if call.p[0] not in GRIPPERS and not math.isnan(call.p[0]):
+        return _refused(f"Gripper: param1 = {call.p[0]:g}; there is one, 1")
+    choice: dict[float, Request | Verdict] = {
+        mavlink.GRIPPER_ACTION_RELEASE: Release(),
+        mavlink.GRIPPER_ACTION_GRAB: Grab(),
+        mavlink.GRIPPER_ACTION_HOLD: Verdict(ACCEPTED),  # it stays as it is
+    }
+    return choice.get(call.p[1]) or _refused(f"Gripper: param2 = {call.p[1]:g}; must be 0, 1 or 2")
 
 
 def _winch(call: Call, context: Context) -> Request | Verdict:
@@ -362,6 +373,7 @@ class CommandService:
     def __init__(self, home: Home, flavour: Flavour) -> None:
         self.context = Context(home, flavour)
         self._done: dict[tuple[Peer, int], _Done] = {}
+        self._last: tuple[Peer, int] | None = None
 
     def receive_long(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute COMMAND_LONG."""
@@ -396,13 +408,24 @@ class CommandService:
             return [_ack(call.command, UNSUPPORTED, peer)]
         request = parser(call, self.context)
         verdict = request if isinstance(request, Verdict) else decide(request)
+        if verdict.result in _REFUSED and self._is_repeated(call, peer, now_us):
+            return [_ack(call.command, ACCEPTED, peer)]
         if verdict.result == ACCEPTED and not isinstance(request, Answered):
             self._done = {k: d for k, d in self._done.items() if now_us - d.at_us <= REPEAT_US}
             self._done[peer, call.command] = _Done(repr(call), verdict, now_us)
+            self._last = (peer, call.command)
         outputs = _answer(call.command, verdict, peer)
         if isinstance(request, SetCurrent):
             outputs.append(Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,)))
         return outputs
+
+    def _is_repeated(self, call: Call, peer: Peer, now_us: int) -> bool:
+        """The command that was accepted last, again: its ACK was lost, and some clients never say that they
+        repeat it. What it asked for may be so far under way that it cannot be asked for any more."""
+        done = self._done.get((peer, call.command))
+        if self._last != (peer, call.command) or done is None:
+            return False
+        return done.call == repr(call) and now_us - done.at_us <= REPEAT_US
 
 
 def _said(verdict: Verdict) -> list[Output]:

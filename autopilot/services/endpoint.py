@@ -48,6 +48,7 @@ from autopilot.services.requests import (
     FollowSetpoint,
     FollowStick,
     GetMessageInterval,
+    Reposition,
     RequestCapabilities,
     RequestMessage,
     SetMessageInterval,
@@ -100,7 +101,7 @@ class VehicleEndpoint:
     ) -> None:
         self.identity = identity
         self._signing = SigningService(signing, boot_unix_us)
-        self._missions = MissionService(home, mission or StoredMission())
+        self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
         self._guided = GuidedService(home, identity.system)
@@ -349,6 +350,8 @@ class VehicleEndpoint:
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 if isinstance(request, SetMode):
                     self._asked_mode = request.number
+                elif isinstance(request, Reposition):
+                    self._asked_mode = None
                 self.state_changed()
             return verdict
 

@@ -12,6 +12,9 @@ Upload, seen from here (one at a time; the old mission stays in force until the 
                ACK from the peer    it has given up                       -> idle
                silence              ask again; after MAX_ASKS: ACK OPERATION_CANCELLED -> idle
 
+The ACK that ends an upload is sent once where no message was lost. Where an item had to be asked for again
+it is repeated, until the peer says anything more about missions: some clients never ask for it.
+
 Fence and rally points are transferred in the same way, one transfer at a time of any kind.
 """
 
@@ -19,14 +22,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from autopilot.services.mission_store import MAX_ITEMS, StoredMission
 from autopilot.services.records import Announce, AreasChanged, Decide, MissionChanged, Output, Peer, Say, Send
 from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
-from autopilot.wire.convert import Home, enu_from_geodetic
+from autopilot.wire.convert import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import LocatedStep, MissionItemError, WireItem, located_steps
@@ -36,6 +39,8 @@ MAX_ASKS = 6  # times that one item is asked for: once, and five times more
 # Times that the first item is asked for as MISSION_ITEM_INT, before a client that knows only MISSION_ITEM
 # (DroneKit) is taken to be there. Never asked the other way round: MAVSDK cancels on a MISSION_REQUEST.
 INT_ASKS = 3
+ECHOES = 3  # repetitions of the last ACK on a link that loses messages
+ECHO_US = 600_000  # between two of them
 LATE_US = 5_000_000  # a last item repeated within this time after the end means that our ACK was lost
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
@@ -68,6 +73,7 @@ class _Upload:
     ask_again_us: int
     kind: int = _MISSION
     asks: int = 1  # times that the next item was asked for
+    lossy: bool = False  # an item had to be asked for again
     as_float: bool = False  # the client speaks MISSION_ITEM
     items: list[WireItem] = field(default_factory=list)
 
@@ -81,13 +87,20 @@ class _Ended:
     result: int
     at_us: int
     kind: int
+    echoes: int = 0  # times that its ACK is still to be sent
+    echo_us: int = NEVER_US
 
 
 class MissionService:
-    """Holds the mission and serves it to any number of links."""
+    """Holds the mission and serves it to any number of links.
 
-    def __init__(self, home: Home, mission: StoredMission) -> None:
+    `home_is_item`: where there is no mission, home is served as its only item. Clients of ArduPilot wait for
+    ever for a mission without items, and begin what they upload with the item 0 that they were served.
+    """
+
+    def __init__(self, home: Home, mission: StoredMission, home_is_item: bool = False) -> None:
         self.home = home
+        self._served_if_empty = (_home_item(home),) if home_is_item else ()
         self.mission = mission
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
@@ -97,6 +110,7 @@ class MissionService:
 
     def receive_count(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_COUNT: a client wants to upload."""
+        self._hush(peer)
         kind, count = message.mission_type, message.count
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
@@ -131,11 +145,17 @@ class MissionService:
 
     def next_timer(self) -> int:
         """When `poll` has something to do, in us."""
-        return self._upload.ask_again_us if self._upload else NEVER_US
+        if self._upload:
+            return self._upload.ask_again_us
+        return self._ended.echo_us if self._ended else NEVER_US
 
     def poll(self, now_us: int) -> list[Output]:
-        """Ask again for an item that has not come, or give the upload up."""
-        upload = self._upload
+        """Ask again for an item that has not come, or give the upload up; say again that it has ended."""
+        upload, ended = self._upload, self._ended
+        if upload is None and ended and now_us >= ended.echo_us:
+            left = ended.echoes - 1
+            self._ended = replace(ended, echoes=left, echo_us=now_us + ECHO_US if left else NEVER_US)
+            return [_ack(ended.peer, ended.result, ended.kind)]
         if upload is None or now_us < upload.ask_again_us:
             return []
         if upload.asks == MAX_ASKS:
@@ -146,6 +166,7 @@ class MissionService:
         if not upload.items and upload.asks >= INT_ASKS:
             upload.as_float = True
         upload.asks += 1
+        upload.lossy = True
         upload.ask_again_us = now_us + ASK_US
         return [self._ask()]
 
@@ -228,9 +249,17 @@ class MissionService:
         return []
 
     def _end(self, result: int, now_us: int) -> None:
-        if self._upload:
-            self._ended = _Ended(self._upload.peer, self._upload.count, result, now_us, self._upload.kind)
-        self._upload = None
+        upload, self._upload = self._upload, None
+        if upload is None:
+            return
+        self._ended = _Ended(upload.peer, upload.count, result, now_us, upload.kind)
+        if upload.lossy and result != mavlink.MAV_MISSION_OPERATION_CANCELLED:
+            self._ended = replace(self._ended, echoes=ECHOES, echo_us=now_us + ECHO_US)
+
+    def _hush(self, peer: Peer) -> None:
+        """The peer goes on: it need not be told again how its upload ended."""
+        if self._ended and self._ended.peer == peer:
+            self._ended = replace(self._ended, echoes=0, echo_us=NEVER_US)
 
     def _ask(self) -> Output:
         upload = self._upload
@@ -247,6 +276,7 @@ class MissionService:
 
     def receive_clear_all(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_CLEAR_ALL."""
+        self._hush(peer)
         kind = message.mission_type
         if kind not in (_MISSION, _ALL, *_AREAS):
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
@@ -294,6 +324,7 @@ class MissionService:
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_REQUEST_LIST: how many items there are, told to the asker alone."""
+        self._hush(peer)
         kind = message.mission_type
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
@@ -303,7 +334,9 @@ class MissionService:
 
     def _items_of(self, kind: int) -> tuple[WireItem, ...]:
         """All items of a kind; none of a kind that does not exist."""
-        return self.mission.items if kind == _MISSION else self.areas.get(kind, ())
+        if kind == _MISSION:
+            return self.mission.items or self._served_if_empty
+        return self.areas.get(kind, ())
 
     def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_REQUEST_INT: any item in any order, as often as asked."""
@@ -314,6 +347,7 @@ class MissionService:
         return self._download(message, peer, mavlink.MAVLink_mission_item_message, _coordinates_as_float)
 
     def _download(self, message: Any, peer: Peer, answer: Any, coordinates: Any) -> list[Output]:
+        self._hush(peer)
         kind, seq = message.mission_type, message.seq
         items = self._items_of(kind)
         if seq >= len(items):
@@ -346,6 +380,12 @@ class MissionService:
     def receive_partial(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """MISSION_WRITE_PARTIAL_LIST and MISSION_REQUEST_PARTIAL_LIST: not served."""
         return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type)]
+
+
+def _home_item(home: Home) -> WireItem:
+    x, y, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
+    frame, command = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_CMD_NAV_WAYPOINT
+    return WireItem(frame, command, 1, 1, 0.0, 0.0, 0.0, 0.0, x, y, home.altitude_m)
 
 
 def _ack(peer: Peer, result: int, kind: int = _MISSION) -> Output:

@@ -150,6 +150,16 @@ class SetHome:
 
 
 @dataclass(frozen=True, slots=True)
+class Release:
+    """Let the load go, wherever it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grab:
+    """Take hold of the cable of a load that lies within reach; nothing where it was never let go."""
+
+
+@dataclass(frozen=True, slots=True)
 class Terminate:
     """Stop the rotors at once, wherever the vehicle is."""
 
@@ -223,6 +233,8 @@ Decided = (
     | ChangeAltitude
     | ChangeSpeed
     | SetHome
+    | Release
+    | Grab
     | Terminate
     | RunPrearmChecks
     | Reboot

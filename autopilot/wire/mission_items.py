@@ -11,11 +11,12 @@ Positions are positions of the load. Where a standard command leaves freedom:
 * Item 0 of a list that begins with home itself, as MAVProxy and Mission Planner write it, is not flown.
 * NAV_LOITER_TURNS carries the load to the centre, spirals out in one turn, flies its turns and spirals
   back in one.
-* NAV_LOITER_UNLIM holds for LONGEST_S: a day. NAV_SPLINE_WAYPOINT and NAV_LOITER_TO_ALT are waypoints.
+* NAV_LOITER_UNLIM holds for LONGEST_S: a day. NAV_SPLINE_WAYPOINT, NAV_LOITER_TO_ALT and CONDITION_GATE are
+  waypoints; a gate without a height of its own is at the height of the waypoint before.
 * DO_JUMP is flown by flying its items again; one without end is refused.
 * Commands that point or trigger something (camera, gimbal, region of interest ...) and those above
   MAV_CMD_NAV_LAST that are not known are kept and not flown. Commands whose effect somebody relies on and
-  that this vehicle has not (gripper, winch, parachute, termination, change of mode or home) are refused.
+  that this vehicle has not (winch, parachute, termination, change of mode or home) are refused.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from missions.model import (
     Delay,
     Land,
     Mission,
+    Release,
     ReturnHome,
     Signals,
     Sine,
@@ -149,6 +151,8 @@ def _items(step: Step, home: Home, seq: int) -> Iterator[WireItem]:
             yield _item(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed_m_s, -1.0)
         case Delay(duration_s):
             yield _item(mavlink.MAV_CMD_NAV_DELAY, duration_s, -1.0, -1.0, -1.0)
+        case Release():
+            yield _item(mavlink.MAV_CMD_DO_GRIPPER, 1.0, mavlink.GRIPPER_ACTION_RELEASE)
         case ReturnHome():
             yield _item(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
         case Land():
@@ -257,6 +261,7 @@ class _Reader:
         self._terms: list[Term] = []
         self._first_term = 0
         self._speed = TURN_SPEED_M_S
+        self._released = False
         self._left_at: Vec3 | None = None  # where the load hangs after the steps so far, if that is known
 
     def read(self, seq: int, item: WireItem) -> None:
@@ -306,11 +311,15 @@ class _Reader:
                 height = self._height(seq, item)
                 self._left_at = (east, north, height)
                 self._add(seq, Waypoint(east, north, height, hold))
+        elif command == mavlink.MAV_CMD_CONDITION_GATE:
+            self._gate(seq, item)
         elif command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
             kind = _choice(seq, 1, "speed type", item.param1, (0, 1, 2, 3))
             if kind in (0, 1) and item.param2 != -1.0:  # -1: no change; 2, 3: climb and descent
                 self._speed = _check(seq, 2, "speed", item.param2, "m/s", 0.01, FASTEST_M_S)
                 self._add(seq, Speed(self._speed))
+        elif command == mavlink.MAV_CMD_DO_GRIPPER:
+            self._gripper(seq, item)
         elif command == mavlink.MAV_CMD_DO_CHANGE_ALTITUDE:
             self._change_altitude(seq, item)
         elif command in (mavlink.MAV_CMD_NAV_DELAY, mavlink.MAV_CMD_CONDITION_DELAY):
@@ -324,6 +333,24 @@ class _Reader:
         else:
             self._attitude_run(seq, item)
 
+    def _gripper(self, seq: int, item: WireItem) -> None:
+        """Releasing is a step; taking hold of what is held, as some planners have it, is none."""
+        _choice(seq, 1, "gripper", item.param1, (0, 1))
+        action = _choice(seq, 2, "gripper action", item.param2, (0, 1, 2))
+        if action == mavlink.GRIPPER_ACTION_RELEASE:
+            self._released = True
+            self._left_at = None
+            self._add(seq, Release())
+        elif action == mavlink.GRIPPER_ACTION_GRAB and self._released:
+            text = "the load, released before, can be taken on the ground only and not by a mission"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM2)
+
+    def _expect_load(self, seq: int) -> None:
+        """Signals and attitude runs swing a load."""
+        if self._released:
+            text = "needs the load, which an item before it has released"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+
     def _turns(self, seq: int, item: WireItem) -> None:
         """A spiral out, turns, a spiral in: an amplitude that rises and falls, times sine and cosine."""
         turns = _check(seq, 1, "turns", item.param1, "", 0.0, MOST_TURNS)
@@ -334,6 +361,7 @@ class _Reader:
         self._add(seq, Waypoint(east, north, height))
         if radius == 0.0 or turns == 0.0:
             return
+        self._expect_load(seq)
         speed = min(self._speed, math.sqrt(TURN_ACCEL_M_S2 * abs(radius)))
         period = max(2.0 * math.pi * abs(radius) / speed, SHORTEST_PERIOD_S)
         quarter = 0.5 * math.pi
@@ -344,6 +372,15 @@ class _Reader:
             for axis, phase in phases
         )
         self._add(seq, Signals((turns + 2.0) * period, terms))
+
+    def _gate(self, seq: int, item: WireItem) -> None:
+        """Where a ground station has a survey begin and end: flown to like a waypoint."""
+        if item.param2 == 0.0 and self._left_at is None:
+            text = "a gate without a height, and nothing before it has one"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+        height = self._left_at[2] if item.param2 == 0.0 and self._left_at else self._height(seq, item)
+        self._left_at = (*self._place(seq, item), height)
+        self._add(seq, Waypoint(*self._left_at))
 
     def _change_altitude(self, seq: int, item: WireItem) -> None:
         frame = _choice(seq, 2, "frame", item.param2, _GLOBAL_FRAMES)
@@ -356,7 +393,11 @@ class _Reader:
         self._add(seq, Waypoint(*self._left_at))
 
     def _land(self, seq: int, item: WireItem) -> None:
-        if item.frame in _PLACE_FRAMES and (item.x, item.y) != (0, 0) and self._left_at is not None:
+        placed = item.frame in _PLACE_FRAMES and (item.x, item.y) != (0, 0)
+        if placed and self._released and self._left_at is None:
+            text = "nothing between it and the release says how high the vehicle flies; put a waypoint there"
+            raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+        if placed and self._left_at is not None:
             east, north = self._place(seq, item)
             height = self._left_at[2]
             if math.dist((east, north, height), self._left_at) > _HOME_ROW_M:
@@ -448,6 +489,7 @@ class _Reader:
         if not self._terms:
             text = "a run (31012) must follow a term (31010)"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+        self._expect_load(seq)
         duration = _check(seq, 5, "duration", item.x / 1e3, "s", 1e-3, LONGEST_S)
         self.steps.append(LocatedStep(self._first_term, seq, Signals(duration, tuple(self._terms))))
         self._terms = []
@@ -455,6 +497,7 @@ class _Reader:
 
     def _attitude_run(self, seq: int, item: WireItem) -> None:
         _expect_mission_frame(seq, item)
+        self._expect_load(seq)
         mode = _choice(
             seq,
             1,
@@ -488,6 +531,8 @@ _STANDARD = frozenset(
         mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
         mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
         mavlink.MAV_CMD_DO_CHANGE_ALTITUDE,
+        mavlink.MAV_CMD_CONDITION_GATE,
+        mavlink.MAV_CMD_DO_GRIPPER,
     }
 )
 _PLACES = frozenset(
@@ -505,7 +550,6 @@ _RELIED_ON = frozenset(
         mavlink.MAV_CMD_DO_SET_HOME,
         mavlink.MAV_CMD_DO_FLIGHTTERMINATION,
         mavlink.MAV_CMD_DO_PARACHUTE,
-        mavlink.MAV_CMD_DO_GRIPPER,
         mavlink.MAV_CMD_DO_WINCH,
         mavlink.MAV_CMD_DO_REPOSITION,
         mavlink.MAV_CMD_DO_ORBIT,

@@ -13,6 +13,7 @@ RETRY_US = 300_000
 SENDS = 12  # of one message; with 20 % lost each way all twelve fail once in two hundred thousand
 RESTARTS = 3  # of a whole upload
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+_NAMES = {mavlink.MAV_MISSION_TYPE_FENCE: "fence", mavlink.MAV_MISSION_TYPE_RALLY: "rally points"}
 
 
 def _result_text(result: int) -> str:
@@ -22,8 +23,8 @@ def _result_text(result: int) -> str:
     return str(entry.name).removeprefix("MAV_MISSION_").replace("_", " ").lower()
 
 
-def _ours(message: Any) -> bool:
-    return addressed(message, GROUND) and getattr(message, "mission_type", _MISSION) == _MISSION
+def _ours(message: Any, kind: int = _MISSION) -> bool:
+    return addressed(message, GROUND) and getattr(message, "mission_type", _MISSION) == kind
 
 
 class MissionUpload:
@@ -33,10 +34,12 @@ class MissionUpload:
     item was asked for, with the last item asked for later on, and from the start when that is of no use.
     """
 
-    def __init__(self, target: Target, items: Sequence[WireItem]) -> None:
+    def __init__(self, target: Target, items: Sequence[WireItem], kind: int = _MISSION) -> None:
         self.result: Result | None = None
         self._target = target
         self._items = tuple(items)
+        self._kind = kind  # MAV_MISSION_TYPE
+        self._name = _NAMES.get(kind, "upload")
         self._asked: list[tuple[int, bool]] = []  # requests not yet answered: (seq, with integers)
         self._last: tuple[int, bool] | None = None
         self._next = 0  # items 0 ... next-1 were asked for
@@ -48,7 +51,7 @@ class MissionUpload:
         return self._next, len(self._items)
 
     def receive(self, message: Any, now_us: int) -> None:
-        if self.result is not None or not self._retry.sent or not _ours(message):
+        if self.result is not None or not self._retry.sent or not _ours(message, self._kind):
             return
         kind = message.get_msgId()
         if kind in (mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST):
@@ -64,14 +67,14 @@ class MissionUpload:
     def _acknowledged(self, result: int) -> None:
         if result == mavlink.MAV_MISSION_ACCEPTED:
             if self._next == len(self._items):  # else it belongs to an older transfer
-                self.result = Result(Status.DONE, f"upload: {len(self._items)} items accepted")
+                self.result = Result(Status.DONE, f"{self._name}: {len(self._items)} items accepted")
         elif result == mavlink.MAV_MISSION_INVALID_SEQUENCE:
             return  # an item that came twice or too late; the vehicle asks again for what it lacks
         elif result == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._restart()
         else:
             where = f"item {self._next - 1}" if self._next else "the mission"
-            self.result = Result(Status.REFUSED, f"upload: {where} refused: {_result_text(result)}")
+            self.result = Result(Status.REFUSED, f"{self._name}: {where} refused: {_result_text(result)}")
 
     def _restart(self) -> None:
         self._restarts += 1
@@ -93,13 +96,13 @@ class MissionUpload:
             return []
         if self._retry.exhausted:
             if self._last is None or self._restarts >= RESTARTS:
-                text = f"upload: no answer at item {self._next} of {len(self._items)}"
+                text = f"{self._name}: no answer at item {self._next} of {len(self._items)}"
                 self.result = Result(Status.UNANSWERED, text)
                 return []
             self._restart()
         self._retry.asked(now_us)
         if self._last is None:
-            return [mavlink.MAVLink_mission_count_message(*self._target, len(self._items), _MISSION)]
+            return [mavlink.MAVLink_mission_count_message(*self._target, len(self._items), self._kind)]
         return [self._item(*self._last)]
 
     def _item(self, seq: int, integers: bool) -> Any:
@@ -108,11 +111,11 @@ class MissionUpload:
         parameters = (item.param1, item.param2, item.param3, item.param4)
         if integers:
             return mavlink.MAVLink_mission_item_int_message(
-                *shared, *parameters, item.x, item.y, item.z, _MISSION
+                *shared, *parameters, item.x, item.y, item.z, self._kind
             )
         scale = 1e-7 if item.frame in _GLOBAL_FRAMES else 1.0
         return mavlink.MAVLink_mission_item_message(
-            *shared, *parameters, item.x * scale, item.y * scale, item.z, _MISSION
+            *shared, *parameters, item.x * scale, item.y * scale, item.z, self._kind
         )
 
 
@@ -127,9 +130,10 @@ _GLOBAL_FRAMES = {
 class MissionDownload:
     """Fetch the mission: REQUEST_LIST, COUNT, one REQUEST_INT for each item, our ACK. `items` when done."""
 
-    def __init__(self, target: Target) -> None:
+    def __init__(self, target: Target, kind: int = _MISSION) -> None:
         self.result: Result | None = None
         self.items: list[WireItem] = []
+        self._kind = kind  # MAV_MISSION_TYPE
         self._target = target
         self._count: int | None = None
         self._retry = Retry(RETRY_US, SENDS)
@@ -140,7 +144,7 @@ class MissionDownload:
         return len(self.items), self._count or 0
 
     def receive(self, message: Any, now_us: int) -> None:
-        if self.result is not None or not self._retry.sent or not _ours(message):
+        if self.result is not None or not self._retry.sent or not _ours(message, self._kind):
             return
         kind = message.get_msgId()
         if kind == mavlink.MAVLINK_MSG_ID_MISSION_COUNT and self._count is None:
@@ -178,7 +182,7 @@ class MissionDownload:
         if self._acknowledge:
             self._acknowledge = False
             return [
-                mavlink.MAVLink_mission_ack_message(*self._target, mavlink.MAV_MISSION_ACCEPTED, _MISSION)
+                mavlink.MAVLink_mission_ack_message(*self._target, mavlink.MAV_MISSION_ACCEPTED, self._kind)
             ]
         if self.result is not None or not self._retry.due(now_us):
             return []
@@ -188,8 +192,8 @@ class MissionDownload:
             return []
         self._retry.asked(now_us)
         if self._count is None:
-            return [mavlink.MAVLink_mission_request_list_message(*self._target, _MISSION)]
-        return [mavlink.MAVLink_mission_request_int_message(*self._target, len(self.items), _MISSION)]
+            return [mavlink.MAVLink_mission_request_list_message(*self._target, self._kind)]
+        return [mavlink.MAVLink_mission_request_int_message(*self._target, len(self.items), self._kind)]
 
 
 class MissionClear:

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import WireItem, encode_mission
 from gcs.clients.missions import MissionClear, MissionDownload, MissionUpload
 from gcs.commands.options import connect_option, json_option, print_json, print_table
@@ -16,10 +17,14 @@ from gcs.display import say
 from gcs.errors import GcsError
 from gcs.flying import vehicle_home
 from gcs.formats.items import command_name
-from gcs.formats.missions import Judged, is_foreign, judge, read_foreign, write_foreign
+from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
 from gcs.link import Address
 from gcs.missions_checked import check_items, load_checked
 from gcs.session import Session
+
+_MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+_FENCE = mavlink.MAV_MISSION_TYPE_FENCE
+_RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 
 
 @click.command("upload")
@@ -34,7 +39,8 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
     """Put a mission on the vehicle.
 
     MISSION is a shipped name, the path of a mission file, or a .plan or .waypoints file of another ground
-    station. The old mission stays in force until the new one is there whole.
+    station. The old mission stays in force until the new one is there whole. A .plan replaces fence and rally
+    points too, as it does from QGroundControl.
     """
     path = Path(mission)
     if is_foreign(path):
@@ -44,6 +50,12 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
             items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
             if not force:
                 check_items(path.name, items, home, vehicle)
+            # the fence first: the vehicle judges the mission by it
+            for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
+                if area is not None:
+                    text = session.run(MissionUpload(target, area, kind)).text
+                    if area:
+                        click.echo(text)
             click.echo(session.run(MissionUpload(target, items), "upload").text)
         return
     loaded = load_checked(mission, vehicle, force)
@@ -54,11 +66,11 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
 
 
 def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
-    """The items to upload; what is not flown is told, and is an error unless it may be skipped."""
-    for line in judged.unflown:
+    """The items to upload; what is not done is told, and what is left out is an error unless it may be."""
+    for line in (*judged.kept, *judged.left_out):
         say(f"{path}: {line}")
-    if judged.unflown and not skip:
-        count = len(judged.unflown)
+    if judged.left_out and not skip:
+        count = len(judged.left_out)
         raise GcsError(
             f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip goes on"
         )
@@ -75,17 +87,22 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
     """Fetch the mission from the vehicle.
 
     Each line is one mission item as it travels; null and - stand for values that are not given. With FILE,
-    which ends in .plan or .waypoints, it is written for other ground stations.
+    which ends in .plan or .waypoints, it is written for other ground stations, a .plan with fence and rally
+    points.
     """
     if file is not None and not is_foreign(file):
         raise click.BadParameter(f"{file}; must end in .plan or .waypoints", param_hint="FILE")
     with Session(address) as session:
-        operation = MissionDownload(session.find())
-        session.run(operation, "download")
-        items = operation.items
+        target = session.find()
+        items, fence, rally = (
+            _fetched(session, MissionDownload(target, kind))
+            if kind == _MISSION or (file is not None and file.suffix.lower() == PLAN_ENDING)
+            else []
+            for kind in (_MISSION, _FENCE, _RALLY)
+        )
         home = vehicle_home(session) if file is not None else Home()
     if file is not None:
-        write_foreign(file, items, home)
+        write_foreign(file, items, home, fence, rally)
         if not as_json:
             click.echo(f"{len(items)} items written to {file}")
             return
@@ -94,6 +111,11 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
         return
     header = ("seq", "command", "frame", "p1", "p2", "p3", "p4", "x", "y", "z")
     print_table([_row(seq, item) for seq, item in enumerate(items)], header)
+
+
+def _fetched(session: Session, operation: MissionDownload) -> list[WireItem]:
+    session.run(operation, "download")
+    return operation.items
 
 
 @click.command("clear")

@@ -18,10 +18,12 @@ WAYPOINT_ENDINGS = (".waypoints", ".wpl", ".txt", ".mission")
 
 
 class Judged(NamedTuple):
-    """What can be sent to the vehicle of a file, and what of it is not flown, a line each."""
+    """What can be sent to the vehicle of a file; a line for each thing that must be left out, and for what
+    the vehicle keeps without doing it."""
 
     items: tuple[WireItem, ...]
-    unflown: list[str]
+    left_out: list[str]
+    kept: list[str]
 
 
 def is_foreign(path: Path) -> bool:
@@ -45,12 +47,20 @@ def read_foreign(path: Path) -> Plan:
         raise FormatError(f"{path}: {error}") from None
 
 
-def write_foreign(path: Path, items: Sequence[WireItem], home: Home) -> None:
-    """Write the items as the ending says; what was there is replaced once the new file is whole."""
+def write_foreign(
+    path: Path,
+    items: Sequence[WireItem],
+    home: Home,
+    fence: Sequence[WireItem] = (),
+    rally: Sequence[WireItem] = (),
+) -> None:
+    """Write the items as the ending says; what was there is replaced once the new file is whole. Fence and
+    rally points have a place in a .plan only."""
     if not is_foreign(path):
         endings = ", ".join((PLAN_ENDING, *WAYPOINT_ENDINGS))
         raise FormatError(f"{path}: ending {path.suffix!r}; must be one of {endings}")
-    text = write_plan(items, home) if path.suffix.lower() == PLAN_ENDING else write_waypoints(items)
+    in_plan = path.suffix.lower() == PLAN_ENDING
+    text = write_plan(items, home, fence, rally) if in_plan else write_waypoints(items)
     partial = path.with_name(path.name + ".part")
     try:
         partial.write_text(text, encoding="utf-8")
@@ -60,21 +70,22 @@ def write_foreign(path: Path, items: Sequence[WireItem], home: Home) -> None:
 
 
 def judge(plan: Plan, home: Home) -> Judged:
-    """What the vehicle would take of a plan, and all that it would not fly.
+    """What the vehicle would take of a plan, and all that it would not do of it.
 
     Commands that the vehicle keeps and passes over (camera, gimbal ...) stay among the items; those that it
-    would refuse are left out. Both are told.
+    would refuse are left out.
     """
     left = list(plan.items)
     numbers = list(range(len(left)))
     told: list[tuple[int, str]] = []
+    passed: dict[int, list[int]] = {}
     if _is_row_of_another_home(plan, home):
         numbers.pop(0)
         _, where = left.pop(0)
         told.append((0, f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"))
-    for number, (item, where) in zip(numbers, left, strict=True):
+    for number, (item, _) in zip(numbers, left, strict=True):
         if item.command > mavlink.MAV_CMD_NAV_LAST and item.command not in FLOWN_COMMANDS:
-            told.append((number, f"{_named(number, item, where)}: kept on the vehicle but not done"))
+            passed.setdefault(item.command, []).append(number)
     while True:
         try:
             located_steps([one.item for one in left], home)
@@ -84,7 +95,12 @@ def judge(plan: Plan, home: Home) -> Judged:
             number, (item, where) = numbers.pop(place), left.pop(place)
             told.append((number, f"{_named(number, item, where)}: {_advice(item, error.text)}"))
     told.sort()
-    return Judged(tuple(one.item for one in left), [*(line for _, line in told), *plan.lost])
+    kept = [
+        f"item{'' if len(found) == 1 else 's'} {', '.join(map(str, found))}, {_command_too(command)}: "
+        "kept on the vehicle but not done"
+        for command, found in passed.items()
+    ]
+    return Judged(tuple(one.item for one in left), [*(line for _, line in told), *plan.lost], kept)
 
 
 def _is_row_of_another_home(plan: Plan, home: Home) -> bool:
@@ -110,9 +126,12 @@ def _is_no_home(item: WireItem, home: Home) -> bool:
 
 
 def _named(number: int, item: WireItem, where: str) -> str:
-    name = command_name(item.command)
-    number_too = "" if name == str(item.command) else f" ({item.command})"
-    return f"item {number} ({where}), {name}{number_too}"
+    return f"item {number} ({where}), {_command_too(item.command)}"
+
+
+def _command_too(command: int) -> str:
+    name = command_name(command)
+    return name if name == str(command) else f"{name} ({command})"
 
 
 def _advice(item: WireItem, text: str) -> str:

@@ -14,13 +14,24 @@ from gcs.formats.items import FileItem, FormatError, item_of, params_of
 
 _TRANSECT = "TransectStyleComplexItem"  # surveys and corridors hold the items they stand for
 _PARAMS = 7
+_ON_SEA, _ABOVE_HOME = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+_INSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+_OUTSIDE_POLYGON = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+_INSIDE_CIRCLE = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
+_OUTSIDE_CIRCLE = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
+_RETURN = mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT
 
 
 class Plan(NamedTuple):
-    """What is in a file; `lost` are the parts for which there are no mission items, a line each."""
+    """What is in a file; `lost` are the parts for which there are no mission items, a line each.
+
+    Fence and rally points are None where the file does not speak of them.
+    """
 
     items: list[FileItem]
     lost: list[str]
+    fence: tuple[WireItem, ...] | None = None
+    rally: tuple[WireItem, ...] | None = None
 
 
 def read_plan(text: str) -> Plan:
@@ -44,12 +55,13 @@ def read_plan(text: str) -> Plan:
             items.append(_simple(entry, where))
         else:
             raise FormatError(f"{where}.type: {entry['type']!r}; must be SimpleItem or ComplexItem")
-    lost += _outside(record)
-    return Plan(items, lost)
+    return Plan(items, lost, _fence(record), _rally(record))
 
 
-def write_plan(items: Sequence[WireItem], home: Home) -> str:
-    """The plan of the items, all of them simple."""
+def write_plan(
+    items: Sequence[WireItem], home: Home, fence: Sequence[WireItem] = (), rally: Sequence[WireItem] = ()
+) -> str:
+    """The plan of the items, all of them simple, with fence and rally points."""
     place = [home.latitude_deg, home.longitude_deg, home.altitude_m]
     entries = [
         {
@@ -76,8 +88,8 @@ def write_plan(items: Sequence[WireItem], home: Home) -> str:
             "plannedHomePosition": place,
             "items": entries,
         },
-        "geoFence": {"version": 2, "circles": [], "polygons": []},
-        "rallyPoints": {"version": 2, "points": []},
+        "geoFence": _fence_record(fence),
+        "rallyPoints": {"version": 2, "points": [params_of(item)[4:] for item in rally]},
     }
     return json.dumps(record, indent=4, allow_nan=False) + "\n"
 
@@ -112,20 +124,91 @@ def _complex(entry: dict[str, Any], where: str, lost: list[str]) -> Iterator[Fil
         yield _simple(inner, place)
 
 
-def _outside(record: dict[str, Any]) -> list[str]:
-    """Fence and rally points, which the vehicle does not keep."""
-    lost = []
-    fence, rally = record.get("geoFence"), record.get("rallyPoints")
-    if isinstance(fence, dict):
-        for kind in ("polygons", "circles"):
-            count = len(fence.get(kind) or ())
-            if count:
-                lost.append(f"geoFence.{kind}: {count}; the vehicle keeps no fence")
-        if fence.get("breachReturn"):
-            lost.append("geoFence.breachReturn: the vehicle keeps no fence")
-    if isinstance(rally, dict) and rally.get("points"):
-        lost.append(f"rallyPoints.points: {len(rally['points'])}; the vehicle keeps no rally points")
-    return lost
+def _fence(record: dict[str, Any]) -> tuple[WireItem, ...] | None:
+    """The items of the fence, as QGroundControl makes them."""
+    if "geoFence" not in record:
+        return None
+    fence = _member(record, "geoFence", dict, "geoFence")
+    items: list[WireItem] = []
+    for number, entry in enumerate(_listed(fence, "polygons", "geoFence")):
+        where = f"geoFence.polygons[{number}]"
+        corners = _member(_object(entry, where), "polygon", list, f"{where}.polygon")
+        command = _INSIDE_POLYGON if entry.get("inclusion", True) else _OUTSIDE_POLYGON
+        for corner, spot in enumerate(corners):
+            place = f"{where}.polygon[{corner}]"
+            items.append(_area_item(_ON_SEA, command, len(corners), (*_spot(spot, 2, place), 0.0), place))
+    for number, entry in enumerate(_listed(fence, "circles", "geoFence")):
+        where = f"geoFence.circles[{number}]"
+        circle = _member(_object(entry, where), "circle", dict, f"{where}.circle")
+        command = _INSIDE_CIRCLE if entry.get("inclusion", True) else _OUTSIDE_CIRCLE
+        radius = _number(circle.get("radius"), f"{where}.circle.radius")
+        centre = _spot(circle.get("center"), 2, f"{where}.circle.center")
+        items.append(_area_item(_ON_SEA, command, radius, (*centre, 0.0), where))
+    if fence.get("breachReturn"):
+        back = _spot(fence["breachReturn"], 3, "geoFence.breachReturn")
+        items.append(_area_item(_ABOVE_HOME, _RETURN, 0.0, back, "geoFence.breachReturn"))
+    return tuple(items)
+
+
+def _fence_record(items: Sequence[WireItem]) -> dict[str, Any]:
+    record: dict[str, Any] = {"version": 2, "circles": [], "polygons": []}
+    left = list(items)
+    while left:
+        item = left[0]
+        spot = params_of(item)[4:6]
+        taken = 1
+        if item.command in (_INSIDE_POLYGON, _OUTSIDE_POLYGON):
+            taken = max(int(item.param1), 1)
+            corners = [params_of(one)[4:6] for one in left[:taken]]
+            inclusion = item.command == _INSIDE_POLYGON
+            record["polygons"].append({"version": 1, "inclusion": inclusion, "polygon": corners})
+        elif item.command in (_INSIDE_CIRCLE, _OUTSIDE_CIRCLE):
+            circle = {"center": spot, "radius": params_of(item)[0]}
+            inclusion = item.command == _INSIDE_CIRCLE
+            record["circles"].append({"version": 1, "inclusion": inclusion, "circle": circle})
+        elif item.command == _RETURN:
+            record["breachReturn"] = params_of(item)[4:]
+        del left[:taken]
+    return record
+
+
+def _rally(record: dict[str, Any]) -> tuple[WireItem, ...] | None:
+    if "rallyPoints" not in record:
+        return None
+    points = _listed(_member(record, "rallyPoints", dict, "rallyPoints"), "points", "rallyPoints")
+    items = []
+    for number, point in enumerate(points):
+        where = f"rallyPoints.points[{number}]"
+        items.append(
+            _area_item(_ABOVE_HOME, mavlink.MAV_CMD_NAV_RALLY_POINT, 0.0, _spot(point, 3, where), where)
+        )
+    return tuple(items)
+
+
+def _area_item(frame: int, command: int, first: float, place: Sequence[float], where: str) -> WireItem:
+    return item_of(frame, command, 0, 0, [first, 0.0, 0.0, 0.0, *place], where)
+
+
+def _spot(value: Any, size: int, where: str) -> list[float]:
+    """Latitude, longitude and, of three, height."""
+    if not isinstance(value, list) or len(value) != size:
+        raise FormatError(f"{where}: must be a list of {size} numbers")
+    numbers = [_number(one, where) for one in value]
+    if any(math.isnan(one) for one in numbers):
+        raise FormatError(f"{where}: must be a list of {size} numbers")
+    return numbers
+
+
+def _listed(record: dict[str, Any], name: str, where: str) -> list[Any]:
+    """A list that need not be there."""
+    value: list[Any] = _member(record, name, list, f"{where}.{name}") if name in record else []
+    return value
+
+
+def _object(value: Any, where: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise FormatError(f"{where}: must be an object")
+    return value
 
 
 def _member(record: dict[str, Any], name: str, kind: type, where: str) -> Any:

@@ -15,6 +15,7 @@ import numpy as np
 
 from autopilot.decisions import arming_complaints, decide, with_plan
 from autopilot.estimation.filter import control_state
+from autopilot.estimation.parting import parted, untied
 from autopilot.estimation.records import ImuReading, new_history
 from autopilot.flight import CARRYING as CARRYING_PHASES
 from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, View, jet_ahead, leg_time_s
@@ -55,6 +56,7 @@ from missions.legs import expected_duration_s
 from missions.model import Mission
 from missions.planning import Limits
 from sitl.hil import HilSimulator
+from sitl.plant.gripper import dropped, without_cable
 from sitl.sensors.files import load_profile
 from sitl.sensors.profile import Profile
 from sitl.sim_core import settings_of
@@ -261,6 +263,8 @@ class _Flight:
             phase = self.state.flight.phase
             self.state, report = control(self.state, self.setup, now_us)
             self._hear(report.texts, phase)
+            if self.state.flight.released:
+                self._let_go()
             flight = self.state.flight
             if self._counts(flight):
                 t = leg_time_s(flight, now_us)
@@ -274,6 +278,16 @@ class _Flight:
                 )
         self._ground_turn(now_us)
         self._judge(now_us)
+
+    def _let_go(self) -> None:
+        """The gripper is open: in the world from this tick on, in the estimate from the next."""
+        tuning = untied(self.setup.tuning)
+        estimator = parted(self.state.estimator, self.history, tuning)
+        self.state = self.state._replace(estimator=estimator)
+        self.model = self.model._replace(tuning=tuning)
+        if self.world_model.truth.cable_length != inf:
+            self.world = self.world._replace(plant=dropped(self.world.plant))
+            self.world_model = self.world_model._replace(truth=without_cable(self.world_model.truth))
 
     # ---- what the ground station does
 
@@ -300,7 +314,9 @@ class _Flight:
 
     def _view(self, now_us: int) -> View:
         state = self.state
-        return view_of(state.estimator, control_state(state.estimator), self.setup.settings, now_us)
+        control = control_state(state.estimator)
+        released = state.flight.released
+        return view_of(state.estimator, control, self.setup.settings, now_us, released=released)
 
     # ---- how it ends
 
@@ -366,6 +382,7 @@ class _Flight:
             or leg.control_mode != self.state.control_mode
             or isinstance(leg, Catch)
             or flight.slack_since_us >= 0
+            or flight.released
         ):
             return self._on_ground(here + 1)
         carries = leg.control_mode == LOAD_POSITION

@@ -163,6 +163,15 @@ def test_a_mission_without_landing_holds_in_the_end() -> None:
     assert sky.reached == [0, 1]
 
 
+def test_a_mission_that_ends_with_a_return_lands() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.ReturnHome())
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.flight.mission_done
+    assert "Mission complete, landing" in sky.texts
+    assert sky.reached == [0, 1, 2]
+    assert norm(sub(sky.view.x_load, (0.0, 0.0, 0.02))) < 0.03
+
+
 def test_a_mission_that_does_not_begin_with_a_takeoff_is_lifted_all_the_same() -> None:
     sky = start(Waypoint(1.0, 0.0, 2.0), model.Land())
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)

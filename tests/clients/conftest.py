@@ -1,113 +1,129 @@
-"""A vehicle in real time, and the programs that people fly it with; all are gone when their test is over."""
+"""Vehicles in real time, and the programs that people fly them with; all are gone when the tests are over.
+
+A flight in real time takes its time, so those that the collected tests ask for are all begun with the first
+of them and flown at once; each test then judges what one of them left. See `staged`.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import select
+import shutil
+import socket
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import dist
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
+from autopilot.wire.codec import decode
+from autopilot.wire.dialect import plumbline as mavlink
 from gcs.link import LOOPBACK, free_port
 
 PROGRAMS = Path(__file__).with_name("programs")
 LONG_S = 150.0
 END_S = 10.0
 
-
-class Vehicle(NamedTuple):
-    """Where a vehicle speaks."""
-
-    gcs: str  # port
-    second_gcs: str
-    api: str
-    tcp: str
-    directory: Path
+# What no client may say, whatever it means by it
+COMPLAINT = re.compile(
+    r"(?i:warn|error|fail|time(d )?-?out|breach|traceback|exception|no such|unknown|denied|reject|lost)"
+    r"|refused|UNSUPPORTED"
+)
 
 
-class Programs:
-    """Programs that are stopped at the end, the last first."""
-
-    def __init__(self, directory: Path) -> None:
-        self.directory = directory
-        self.running: list[subprocess.Popen[bytes]] = []
-
-    def begin(self, name: str, *arguments: str) -> tuple[subprocess.Popen[bytes], Path]:
-        log = self.directory / f"{name}.log"
-        with log.open("wb") as output:
-            process = subprocess.Popen(
-                [sys.executable, "-m", name, *arguments],
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                cwd=self.directory,
-            )
-        self.running.append(process)
-        return process, log
-
-    def stop(self) -> None:
-        for process in reversed(self.running):
-            if process.poll() is None:
-                process.terminate()
-                try:
-                    process.wait(END_S)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait(END_S)
+def complaints(text: str) -> list[str]:
+    """The lines of a client's output with which it complains."""
+    return [line for line in text.splitlines() if COMPLAINT.search(line)]
 
 
-@pytest.fixture
-def vehicle(tmp_path: Path) -> Iterator[Callable[..., Vehicle]]:
-    """Start a vehicle with such options, wait until it flies with its simulator."""
-    programs = Programs(tmp_path)
-
-    def begin(*options: str) -> Vehicle:
-        sim, truth, gcs, second, api, tcp = (str(free_port()) for _ in range(6))
-        at = f"{LOOPBACK}:".__add__
-        programs.begin("sitl", "--listen", at(sim), "--truth", at(truth), "--sensors", "lab")
-        where = ("--gcs", at(gcs), "--gcs", at(second), "--api", at(api), "--tcp", at(tcp))
-        storage = ("--storage", str(tmp_path / "storage"))
-        process, log = programs.begin("autopilot", "--sim", at(sim), *where, *storage, *options)
-        while b"flying with the simulator" not in log.read_bytes():
-            try:
-                code = process.wait(0.2)
-            except subprocess.TimeoutExpired:
-                continue
-            raise AssertionError(f"autopilot ended with {code}: {log.read_text()}")
-        return Vehicle(gcs, second, api, tcp, tmp_path)
-
-    yield begin
-    programs.stop()
+Place = tuple[float, float, float]  # east, north, up
 
 
-def told_by(program: str, *arguments: str) -> Any:
-    """Run one of our programs that use a client library to its end; the JSON of its last line."""
-    done = subprocess.run(
-        [sys.executable, str(PROGRAMS / program), *arguments],
-        capture_output=True,
-        text=True,
-        timeout=LONG_S,
-        check=False,
-    )
-    assert done.returncode == 0, (done.stdout + done.stderr)[-4000:]
-    return json.loads(done.stdout.splitlines()[-1])
+@dataclass
+class Witness:
+    """What is said at two ports: by the simulated world, and by the vehicle to a station that is silent."""
+
+    truth: socket.socket
+    ground: socket.socket
+    load: list[tuple[float, Place]] = field(default_factory=list)  # vehicle's clock, s; true place, m
+    asked: list[tuple[float, Place]] = field(default_factory=list)  # where the load shall be
+    phases: list[int] = field(default_factory=list)
+    tilt: float = 0.0  # greatest of all, rad
+    texts: list[str] = field(default_factory=list)
+    attitudes: list[float] = field(default_factory=list)  # wall clock at which ATTITUDE came, s
+    _over: threading.Event = field(default_factory=threading.Event)
+
+    def watch(self) -> None:
+        """Until the end."""
+        while not self._over.is_set():
+            for sock in select.select([self.truth, self.ground], [], [], 0.2)[0]:
+                for one in decode(sock.recv(65535))[0]:
+                    self._take(one.message)
+
+    def _take(self, message: Any) -> None:
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_LOAD_STATE if message.source == mavlink.PLUMBLINE_SOURCE_TRUTH:
+                self.load.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
+            case mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
+                self.asked.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
+                if self.phases[-1:] != [message.phase]:
+                    self.phases.append(message.phase)
+            case mavlink.MAVLINK_MSG_ID_ATTITUDE:
+                self.attitudes.append(time.monotonic())
+                self.tilt = max(self.tilt, abs(message.roll), abs(message.pitch))
+            case mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+                self.texts.append(message.text)
+
+    def nearest(self, place: Place) -> float:
+        """How near the load truly came to a place, m; between two samples it is taken to go straight."""
+        return min(_beside(place, before, after) for (_, before), (_, after) in pairwise(self.load))
+
+    def longest_silence(self, begin: float, end: float) -> float:
+        """Of ATTITUDE, s of the wall clock."""
+        times = [begin, *(t for t in self.attitudes if begin < t < end), end]
+        return max(after - before for before, after in pairwise(times))
+
+    def close(self) -> None:
+        self._over.set()
+
+
+def _beside(place: Place, before: Place, after: Place) -> float:
+    """Distance of a place from a straight way."""
+    way = [b - a for a, b in zip(before, after, strict=True)]
+    to = [b - a for a, b in zip(before, place, strict=True)]
+    length = sum(w * w for w in way)
+    share = min(max(sum(w * t for w, t in zip(way, to, strict=True)) / length, 0.0), 1.0) if length else 0.0
+    return dist(to, [share * w for w in way])
+
+
+def _bound() -> tuple[socket.socket, str]:
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 * 1024 * 1024)
+    sock.bind((LOOPBACK, 0))
+    return sock, f"{LOOPBACK}:{sock.getsockname()[1]}"
 
 
 class Mavproxy:
-    """MAVProxy without a screen: lines in, text out."""
+    """MAVProxy as it is started by hand, without a screen: lines in, text out."""
 
     def __init__(self, master: str, directory: Path) -> None:
         directory.mkdir()
+        self.directory = directory
         self.process = subprocess.Popen(
             [
                 str(Path(sys.executable).with_name("mavproxy.py")),
                 f"--master={master}",
-                "--default-modules=link,param,wp,arm,mode,cmdlong,misc,battery,fence,rally,ftp,output",
                 f"--state-basedir={directory}",
             ],
             cwd=directory,
@@ -125,32 +141,201 @@ class Mavproxy:
 
     def expect(self, text: str, timeout_s: float = 60.0) -> None:
         """Wait until it has said `text`; what was said until then is forgotten."""
-        assert self.process.stdout is not None
         until = time.monotonic() + timeout_s
         while text not in self.text:
-            left = until - time.monotonic()
-            ready = select.select([self.process.stdout], [], [], max(left, 0.0))[0]
-            data = os.read(self.process.stdout.fileno(), 65536) if ready else b""
-            assert data, f"MAVProxy did not say {text!r} but {self.all[-2000:]!r}"
-            self.text += data.decode(errors="replace")
-            self.all += data.decode(errors="replace")
+            assert self._read(until - time.monotonic()), (
+                f"MAVProxy did not say {text!r} but {self.all[-2000:]!r}"
+            )
         self.text = self.text.partition(text)[2]
 
-    def end(self) -> None:
-        """As when its window is closed."""
+    def _read(self, timeout_s: float) -> bool:
+        assert self.process.stdout is not None
+        ready = select.select([self.process.stdout], [], [], max(timeout_s, 0.0))[0]
+        data = os.read(self.process.stdout.fileno(), 65536) if ready else b""
+        self.text += data.decode(errors="replace")
+        self.all += data.decode(errors="replace")
+        return bool(data)
+
+    def end(self) -> str:
+        """As when its window is closed; all that it said."""
         self.process.kill()
-        self.process.communicate()
+        while self._read(END_S):
+            continue
+        self.process.wait(END_S)
+        return self.all
 
 
-@pytest.fixture
-def mavproxy(tmp_path: Path) -> Iterator[Callable[[str], Mavproxy]]:
-    """Start MAVProxy: mavproxy("udpin:127.0.0.1:14550")."""
-    running: list[Mavproxy] = []
+@dataclass
+class Told:
+    """What a program of `programs` said: JSON in its last line, and everything before."""
 
-    def begin(master: str) -> Mavproxy:
-        running.append(Mavproxy(master, tmp_path / f"mavproxy-{len(running)}"))
-        return running[-1]
+    value: dict[str, Any]
+    output: str
 
-    yield begin
-    for program in running:
-        program.end()
+
+class Stage:
+    """One vehicle with its simulator, and who speaks with it."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self.storage = directory / "storage"
+        self.gcs, self.second_gcs, self.api, self.tcp = (str(free_port()) for _ in range(4))
+        self.witness: Witness
+        self._running: list[subprocess.Popen[Any]] = []
+        self._mavproxies: list[Mavproxy] = []
+
+    def begin(self, *options: str, speed: float = 1.0) -> None:
+        """Start the vehicle with such options, wait until it flies with its simulator."""
+        (truth, truth_at), (ground, ground_at) = _bound(), _bound()
+        self.witness = Witness(truth, ground)
+        threading.Thread(target=self.witness.watch, daemon=True).start()
+        sim = f"{LOOPBACK}:{free_port()}"
+        at = f"{LOOPBACK}:".__add__
+        world = ("--listen", sim, "--truth", truth_at, "--truth-every", "5", "--sensors", "lab")
+        # in lockstep a busy machine makes it slower, and nothing else
+        self._start("sitl", *world, "--lockstep", "--speed", str(speed))
+        where = ("--gcs", at(self.gcs), "--gcs", at(self.second_gcs), "--gcs", ground_at)
+        more = ("--api", at(self.api), "--tcp", at(self.tcp), "--storage", str(self.storage))
+        process, log = self._start("autopilot", "--sim", sim, *where, *more, *options)
+        while b"flying with the simulator" not in log.read_bytes():
+            try:
+                code = process.wait(0.1)
+            except subprocess.TimeoutExpired:
+                continue
+            raise AssertionError(f"autopilot ended with {code}: {log.read_text()}")
+
+    def _start(self, name: str, *arguments: str) -> tuple[subprocess.Popen[bytes], Path]:
+        log = self.directory / f"{name}.log"
+        with log.open("wb") as output:
+            process = subprocess.Popen(
+                [sys.executable, "-m", name, *arguments],
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                cwd=self.directory,
+            )
+        self._running.append(process)
+        return process, log
+
+    def program(self, name: str, *arguments: str) -> Callable[[], Told]:
+        """Begin one of our programs that use a client library; call what is returned to wait for its end."""
+        log = self.directory / f"{name}-{len(self._running)}.log"
+        with log.open("wb") as output:
+            process = subprocess.Popen(
+                [sys.executable, "-u", str(PROGRAMS / name), *arguments],
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                cwd=self.directory,
+            )
+        self._running.append(process)
+
+        def told() -> Told:
+            code = process.wait(LONG_S)
+            lines = log.read_text(errors="replace").splitlines()
+            assert code == 0, "\n".join([*lines[-40:], *self.witness.texts])
+            return Told(json.loads(lines[-1]), "\n".join(lines[:-1]))
+
+        return told
+
+    def run_gcs(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """A gcs command at the second ground station's port, to its end."""
+        return subprocess.run(
+            [sys.executable, "-m", "gcs", *arguments, "--connect", self.second_gcs],
+            capture_output=True,
+            text=True,
+            timeout=LONG_S,
+            cwd=self.directory,
+            check=False,
+        )
+
+    def mavproxy(self, master: str) -> Mavproxy:
+        """Start MAVProxy: mavproxy("udpin:127.0.0.1:14550")."""
+        self._mavproxies.append(Mavproxy(master, self.directory / f"mavproxy-{len(self._mavproxies)}"))
+        return self._mavproxies[-1]
+
+    def wait_for(self, text: str, timeout_s: float = 90.0) -> None:
+        """Until the vehicle has said so to everybody."""
+        self.wait_until(lambda: text in self.witness.texts, timeout_s)
+
+    def wait_until(self, condition: Callable[[], bool], timeout_s: float = 60.0) -> None:
+        """Until the witness has seen it."""
+        turn = threading.Event()
+        for _ in range(round(timeout_s / 0.05)):
+            if condition():
+                return
+            turn.wait(0.05)
+        raise AssertionError(f"in vain waited; the vehicle said {self.witness.texts}")
+
+    def end(self) -> None:
+        for program in self._mavproxies:
+            if program.process.poll() is None:
+                program.process.kill()
+                program.process.communicate()
+        for process in reversed(self._running):
+            if process.poll() is None:
+                process.terminate()
+                try:
+                    process.wait(END_S)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait(END_S)
+        if hasattr(self, "witness"):
+            self.witness.close()
+
+
+class Stages:
+    """All flights that are asked for, at once."""
+
+    def __init__(self) -> None:
+        self._directory = Path(tempfile.mkdtemp(prefix="clients-"))
+        self._pool = ThreadPoolExecutor()
+        self._begun: list[Stage] = []
+        self._flown: dict[str, Future[Any]] = {}
+
+    def begin(self, name: str, play: Callable[[Stage], Any]) -> None:
+        directory = self._directory / name
+        directory.mkdir()
+        stage = Stage(directory)
+        self._begun.append(stage)
+
+        def flown() -> Any:
+            try:
+                return play(stage)
+            finally:
+                stage.end()
+
+        self._flown[name] = self._pool.submit(flown)
+
+    def result(self, name: str) -> Any:
+        return self._flown[name].result()
+
+    def end(self) -> None:
+        for stage in self._begun:
+            stage.end()
+        self._pool.shutdown()
+        shutil.rmtree(self._directory, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def stages(request: pytest.FixtureRequest) -> Iterator[Stages]:
+    all_of_them = Stages()
+    wanted = {name for item in request.session.items for name in getattr(item, "fixturenames", ())}
+    plays = {name: play for name, play in PLAYS.items() if name in wanted}
+    for name, play in plays.items():
+        all_of_them.begin(name, play)
+    yield all_of_them
+    all_of_them.end()
+
+
+PLAYS: dict[str, Callable[[Stage], Any]] = {}
+
+
+def staged(play: Callable[[Stage], Any]) -> Any:
+    """A flight as a fixture: called, it is what the flight left, or what went wrong in it."""
+    name = play.__name__
+    PLAYS[name] = play
+
+    @pytest.fixture(scope="session", name=name)
+    def flown(stages: Stages) -> Callable[[], Any]:
+        return lambda: stages.result(name)
+
+    return flown

@@ -52,7 +52,9 @@ class ScriptedVehicle:
         self.phase = mavlink.PLUMBLINE_PHASE_DISARMED
         self.item = 0
         self.mission_state = mavlink.MISSION_STATE_NOT_STARTED
+        self.areas: dict[int, list[WireItem]] = {}  # fence and rally points by MAV_MISSION_TYPE
         self._upload: list[WireItem] | None = None
+        self._kind = 0
         self._upload_count = 0
         self._asked_us = 0
         self._next_heartbeat_us = 0
@@ -181,8 +183,11 @@ class ScriptedVehicle:
             )
         )
 
+    def _items(self, kind: int) -> list[WireItem]:
+        return self.areas.get(kind, []) if kind else self.mission
+
     def _on_mission_count(self, message: Any) -> None:
-        self._upload, self._upload_count = [], message.count
+        self._upload, self._upload_count, self._kind = [], message.count, message.mission_type
         self._asked_us = self.now_us
         self._ask()
 
@@ -190,17 +195,22 @@ class ScriptedVehicle:
         assert self._upload is not None
         self._asked_us = self.now_us
         if len(self._upload) == self._upload_count:
-            self.mission, self._upload = self._upload, None
+            if self._kind:
+                self.areas[self._kind] = self._upload
+            else:
+                self.mission = self._upload
+            self._upload = None
             self._acknowledge(mavlink.MAV_MISSION_ACCEPTED)
         else:
-            self.send(mavlink.MAVLink_mission_request_int_message(255, 190, len(self._upload), 0))
+            seq = len(self._upload)
+            self.send(mavlink.MAVLink_mission_request_int_message(255, 190, seq, self._kind))
 
     def _acknowledge(self, result: int) -> None:
-        self.send(mavlink.MAVLink_mission_ack_message(255, 190, result, 0))
+        self.send(mavlink.MAVLink_mission_ack_message(255, 190, result, self._kind))
 
     def _on_mission_item_int(self, message: Any) -> None:
         if self._upload is None:
-            if message.seq == len(self.mission) - 1:
+            if message.seq == len(self._items(self._kind)) - 1:
                 self._acknowledge(mavlink.MAV_MISSION_ACCEPTED)
             return
         if message.seq == self.refuse_item:
@@ -211,16 +221,16 @@ class ScriptedVehicle:
             self._ask()
 
     def _on_mission_request_list(self, message: Any) -> None:
-        self.send(mavlink.MAVLink_mission_count_message(255, 190, len(self.mission), 0))
+        kind = message.mission_type
+        self.send(mavlink.MAVLink_mission_count_message(255, 190, len(self._items(kind)), kind))
 
     def _on_mission_request_int(self, message: Any) -> None:
-        self.send(
-            mavlink.MAVLink_mission_item_int_message(
-                255, 190, message.seq, *self.mission[message.seq], mission_type=0
-            )
-        )
+        kind = message.mission_type
+        item = self._items(kind)[message.seq]
+        self.send(mavlink.MAVLink_mission_item_int_message(255, 190, message.seq, *item, mission_type=kind))
 
     def _on_mission_clear_all(self, message: Any) -> None:
+        self._kind = 0
         self.mission = []
         self._acknowledge(mavlink.MAV_MISSION_ACCEPTED)
 

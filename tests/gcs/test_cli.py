@@ -352,19 +352,27 @@ def test_what_of_a_plan_is_not_flown_is_told_and_skipped_only_if_asked(live, tmp
     file = tmp_path / "in.plan"
     take_off = (22, [0, 0, 0, None, 47.397742, 8.545594, 2.5])
     plan = plan_of(take_off, (84, [2, 0, 0, 0, 47.397745, 8.5455941, 3]), (2000, [0] * 7))
-    plan["geoFence"]["circles"] = [{}]
+    plan["geoFence"]["circles"] = [
+        {"version": 1, "inclusion": True, "circle": {"center": [47.3977, 8.5456], "radius": 9.5}}
+    ]
     file.write_text(json.dumps(plan))
     result = run("upload", str(file), "--connect", port)
     assert result.exit_code == EXIT_ERROR
     lines = result.stderr.splitlines()
-    assert len(lines) == 4
-    assert "NAV_VTOL_TAKEOFF (84)" in lines[0]
-    assert "IMAGE_START_CAPTURE (2000)" in lines[1]
-    assert "geoFence.circles: 1" in lines[2]
-    assert "--skip" in lines[3]
+    assert len(lines) == 3
+    assert "IMAGE_START_CAPTURE (2000): kept on the vehicle but not done" in lines[0]
+    assert "NAV_VTOL_TAKEOFF (84)" in lines[1]
+    assert "--skip" in lines[2]
     assert vehicle.mission == []
-    assert run("upload", str(file), "--skip", "--connect", port).exit_code == EXIT_DONE
+    assert vehicle.areas == {}
+    result = run("upload", str(file), "--skip", "--connect", port)
+    assert result.exit_code == EXIT_DONE
+    assert "fence: 1 items accepted" in result.stdout
     assert [item.command for item in vehicle.mission] == [22, 2000]
+    assert [item.command for item in vehicle.areas[1]] == [5003]
+    back = tmp_path / "back.plan"
+    assert run("download", str(back), "--connect", port).exit_code == EXIT_DONE
+    assert json.loads(back.read_text())["geoFence"] == plan["geoFence"]
 
 
 def test_a_plan_beyond_the_vehicle_is_refused_unless_forced(live, tmp_path):

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from pymavlink import mavwp
 
 from autopilot.wire.convert import Home
+from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import WireItem, encode_mission
 from autopilot.wire.parameters import parse_text
 from gcs.clients.operation import Target
@@ -82,14 +83,38 @@ def test_a_survey_is_taken_apart_in_its_order() -> None:
 
 
 def test_what_is_no_item_is_told() -> None:
-    fence = {"version": 2, "circles": [{}], "polygons": [{}, {}], "breachReturn": [1, 2, 3]}
     structure = {"type": "ComplexItem", "complexItemType": "StructureScan", "Layers": 2}
-    text = plan_text(structure, geoFence=fence, rallyPoints={"version": 2, "points": [[47.0, 8.0, 3.0]]})
-    lost = read_plan(text).lost
-    assert len(lost) == 5
+    lost = read_plan(plan_text(structure)).lost
+    assert len(lost) == 1
     assert "mission.items[0]: StructureScan" in lost[0]
-    assert any("geoFence.polygons: 2" in line for line in lost)
-    assert any("rallyPoints.points: 1" in line for line in lost)
+
+
+TRIANGLE = [[47.3979, 8.5457], [47.3979, 8.5462], [47.3974, 8.5462]]
+FENCE = {
+    "version": 2,
+    "polygons": [
+        {"version": 1, "inclusion": True, "polygon": TRIANGLE},
+        {"version": 1, "inclusion": False, "polygon": TRIANGLE},
+    ],
+    "circles": [{"version": 1, "inclusion": True, "circle": {"center": [47.3, 8.5], "radius": 12.5}}],
+    "breachReturn": [47.3977, 8.5456, 3.0],
+}
+RALLY = {"version": 2, "points": [[47.3, 8.5, 3.0], [47.3001, 8.5, 4.0]]}
+
+
+def test_fence_and_rally_points_become_items_and_come_back() -> None:
+    plan = read_plan(plan_text(TAKEOFF, geoFence=FENCE, rallyPoints=RALLY))
+    assert plan.fence is not None and plan.rally is not None
+    assert [item.command for item in plan.fence] == [5001] * 3 + [5002] * 3 + [5003, 5000]
+    assert [item.param1 for item in plan.fence] == [3.0] * 6 + [12.5, 0.0]
+    assert [item.command for item in plan.rally] == [5100, 5100]
+    assert len(read_fence(plan.fence, HOME).zones) == 3
+    assert len(read_rally(plan.rally, HOME)) == 2
+    back = json.loads(write_plan([], HOME, plan.fence, plan.rally))
+    assert back["geoFence"] == FENCE
+    assert back["rallyPoints"] == RALLY
+    bare = json.dumps({"fileType": "Plan", "mission": {"items": []}})
+    assert (read_plan(bare).fence, read_plan(bare).rally) == (None, None)
 
 
 def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
@@ -97,19 +122,22 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
         TAKEOFF, simple(84), TRIGGER, WAYPOINTS[0], simple(16, 10), simple(31004), simple(201, 2)
     )
     judged = judge(read_plan(text), HOME)
-    lines = judged.unflown
-    assert [line.partition(" (")[0] for line in lines] == ["item 1", "item 2", "item 4", "item 5", "item 6"]
+    lines = judged.left_out
+    assert [line.partition(" (")[0] for line in lines] == ["item 1", "item 4"]
     assert "NAV_VTOL_TAKEOFF (84)" in lines[0]
     assert "use NAV_TAKEOFF" in lines[0]
-    assert "DO_SET_CAM_TRIGG_DIST (206): kept on the vehicle but not done" in lines[1]
-    assert "frame 10" in lines[2]
-    assert "DO_SET_ROI (201)" in lines[4]
+    assert "frame 10" in lines[1]
+    assert judged.kept == [
+        "item 2, DO_SET_CAM_TRIGG_DIST (206): kept on the vehicle but not done",
+        "item 5, WAYPOINT_USER_5 (31004): kept on the vehicle but not done",
+        "item 6, DO_SET_ROI (201): kept on the vehicle but not done",
+    ]
     assert [item.command for item in judged.items] == [22, 206, 16, 31004, 201]
 
 
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:
     judged = judge(read_plan(plan_text(TAKEOFF, *WAYPOINTS, simple(21))), HOME)
-    assert judged.unflown == []
+    assert judged.left_out == judged.kept == []
     assert [item.command for item in judged.items] == [22, 16, 16, 16, 21]
 
 
@@ -120,7 +148,7 @@ def test_shipped_missions_pass_through_files_unchanged(name: str, ending: str, t
     path = tmp_path / f"mission{ending}"
     write_foreign(path, items, HOME)
     judged = judge(read_foreign(path), HOME)
-    assert judged.unflown == []
+    assert judged.left_out == judged.kept == []
     assert judged.items == items
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
@@ -185,11 +213,11 @@ def test_a_home_row_of_another_place_is_not_flown() -> None:
         return Plan(read_waypoints(text + "1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t2\t1\n"), [])
 
     at_home = judge(rows(47.397742), HOME)
-    assert at_home.unflown == []
+    assert at_home.left_out == []
     assert len(at_home.items) == 2
     elsewhere = judge(rows(47.39), HOME)
-    assert len(elsewhere.unflown) == 1
-    assert "home row" in elsewhere.unflown[0]
+    assert len(elsewhere.left_out) == 1
+    assert "home row" in elsewhere.left_out[0]
     assert [item.command for item in elsewhere.items] == [22]
 
 
@@ -210,6 +238,16 @@ BAD_PLANS = [
     (plan_text(simple(16, -1)), "frame -1"),
     (plan_text(simple(16) | {"command": "x"}), "mission.items[0].command"),
     (plan_text(survey(3)), "Items[0]: must be an object"),
+    (plan_text(geoFence=3), "geoFence: must be an object"),
+    (plan_text(geoFence={"circles": 3}), "geoFence.circles: must be a list"),
+    (plan_text(geoFence={"polygons": [3]}), "geoFence.polygons[0]: must be an object"),
+    (
+        plan_text(geoFence={"polygons": [{"polygon": [[1]]}]}),
+        "geoFence.polygons[0].polygon[0]: must be a list",
+    ),
+    (plan_text(geoFence={"circles": [{"circle": {"radius": "x"}}]}), "geoFence.circles[0].circle.radius"),
+    (plan_text(geoFence={"breachReturn": [1, 2]}), "geoFence.breachReturn: must be a list of 3"),
+    (plan_text(rallyPoints={"points": [[1, 2, None]]}), "rallyPoints.points[0]: must be a list of 3"),
 ]
 
 

@@ -30,7 +30,7 @@ FRAME = 'title = "T"\n[[items]]\ntype = "takeoff"\naltitude_m = 2\n{}\n[[items]]
 WAYPOINT = '[[items]]\ntype = "waypoint"\neast_m = 1.0\nnorth_m = -2.0\naltitude_m = 3.0\n'
 SIGNALS = '[[items]]\ntype = "signals"\nduration_s = 9.0\n'
 TERM = '[[items.terms]]\naxis = "z"\namplitude_m = 0.2\nrise_s = 2.0\n'
-KINDS = "takeoff, waypoint, speed, delay, signals, attitude, return, land"
+KINDS = "takeoff, waypoint, speed, delay, signals, attitude, return, release, land"
 FACTOR = "[[items.terms.factors]]\nperiod_s = 1.5\n"
 
 
@@ -221,7 +221,7 @@ def test_a_file_is_named_after_its_stem(tmp_path: Path) -> None:
 
 def test_the_shipped_missions_load_and_state_their_assumptions() -> None:
     names = {"case-a", "case-b", "case-b-extended", "case-c", "hover", "square"}
-    assert names | {"quad-attitude", "load-attitude"} == set(shipped())
+    assert names | {"quad-attitude", "load-attitude", "delivery"} == set(shipped())
     for name in shipped():
         mission = load_mission(name)
         assert mission.name == name

@@ -15,10 +15,12 @@ from autopilot.services.requests import (
     ChangeAltitude,
     ChangeSpeed,
     Continue,
+    Grab,
     Land,
     Orbit,
     Pause,
     Reboot,
+    Release,
     Reposition,
     ReturnHome,
     RunPrearmChecks,
@@ -122,7 +124,14 @@ LONG = [
     (511, (0, -1), None, DENIED),
     (510, (30,), None, OK),
     (510, (1e9,), None, UNSUPPORTED),
-    (211, (1, 1), None, UNSUPPORTED),
+    (211, (1, 0), Release(), OK),
+    (211, (0, 0), Release(), OK),
+    (211, (NAN, 0), Release(), OK),
+    (211, (1, 1), Grab(), OK),
+    (211, (1, 2), None, OK),
+    (211, (2, 0), None, DENIED),
+    (211, (1, 3), None, DENIED),
+    (211, (1, NAN), None, DENIED),
     (42600, (1, 1), None, UNSUPPORTED),
     (65535, (), None, UNSUPPORTED),
 ]
@@ -248,6 +257,25 @@ def test_a_repeated_command_is_acknowledged_but_done_once(rig):
     rig.verdict = lambda request: Verdict(DENIED, "already flying")
     assert acks(rig.replies(long(22, (NAN,) * 7, confirmation=1))) == [(22, OK)]
     assert len(rig.asked) == 1
+
+
+def test_a_command_that_comes_again_because_its_ack_was_lost_is_not_refused(rig):
+    """As MAVSDK repeats: with no mark of it."""
+    take_off = (NAN,) * 7
+    rig.replies(long(22, take_off))
+    rig.verdict = lambda request: Verdict(DENIED, "already flying")
+    assert acks(rig.replies(long(22, take_off))) == [(22, OK)]
+    assert acks(rig.replies(long(22, (*take_off[:6], 3.0)))) == [(22, DENIED)]
+    assert acks(rig.replies(long(22, take_off), system=245)) == [(22, DENIED)]
+    rig.now_us += REPEAT_US + 1
+    assert acks(rig.replies(long(22, take_off))) == [(22, DENIED)]
+
+
+def test_a_command_after_another_one_is_no_repetition(rig):
+    rig.replies(long(22, (NAN,) * 7))
+    rig.replies(long(193, (0,)))
+    rig.verdict = lambda request: Verdict(DENIED, "already flying")
+    assert acks(rig.replies(long(22, (NAN,) * 7))) == [(22, DENIED)]
 
 
 def test_a_command_said_twice_is_done_twice(rig):

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from autopilot.services.identity import ARDUPILOT, Identity
 from autopilot.services.mission_store import MAX_ITEMS
-from autopilot.services.missions import ASK_US, INT_ASKS, LATE_US, MAX_ASKS
+from autopilot.services.missions import ASK_US, ECHO_US, ECHOES, INT_ASKS, LATE_US, MAX_ASKS
 from autopilot.services.records import MissionChanged, Verdict
 from autopilot.services.requests import ReplaceMission
 from autopilot.wire.dialect import plumbline as m
@@ -101,6 +102,24 @@ def test_an_answer_after_most_of_the_tries_is_still_good(rig, items, as_message)
         silence(rig, ASK_US * 2)
         rig.send(as_message(seq, item))
     assert silence(rig, ASK_US) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+
+
+def test_the_last_ack_is_repeated_where_messages_are_lost(rig, items, as_message):
+    sent = items(2)
+    rig.send(count(2))
+    rig.send(as_message(0, sent[0]))
+    silence(rig, ASK_US)  # item 1 is asked for twice
+    accepted = (ACK, m.MAV_MISSION_ACCEPTED)
+    assert said(rig.replies(as_message(1, sent[1])))[-1] == accepted
+    assert silence(rig, 10 * ECHO_US) == [accepted] * ECHOES
+    # what the peer does next shows that it knows
+    rig.send(count(2))
+    rig.send(as_message(0, sent[0]))
+    silence(rig, ASK_US)
+    assert said(rig.replies(as_message(1, sent[1])))[-1] == accepted
+    assert silence(rig, 3 * ECHO_US // 2) == [accepted]
+    assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1, 0))) == [("MISSION_COUNT", 2)]
+    assert silence(rig, 10 * ECHO_US) == []
 
 
 # ---- order
@@ -311,6 +330,19 @@ def test_downloads_need_no_order(rig_with, items, as_item):
     asks = [4, 0, 2, 2, 1, 3]
     got = rig.replies(*(m.MAVLink_mission_request_int_message(1, 1, seq) for seq in asks))
     assert [as_item(x) for x in got] == [sent[seq] for seq in asks]
+
+
+def test_for_clients_of_ardupilot_there_is_always_home(rig_with, as_message, as_item, items):
+    rig = rig_with(identity=Identity(flavour=ARDUPILOT))
+    assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1))) == [("MISSION_COUNT", 1)]
+    answers = rig.replies(m.MAVLink_mission_request_int_message(1, 1, 0))
+    (home,) = [as_item(x) for x in answers if x.get_type() == "MISSION_ITEM_INT"]
+    # what is uploaded behind it is the mission, and home is not flown to
+    sent = (home, *items(2))
+    assert upload(rig, sent, as_message) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+    assert rig.endpoint.mission.items == sent
+    assert [step.first for step in rig.endpoint.mission.steps] == [1, 2]
+    assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1))) == [("MISSION_COUNT", 3)]
 
 
 @pytest.mark.parametrize("ask", [m.MAVLink_mission_request_int_message, m.MAVLink_mission_request_message])

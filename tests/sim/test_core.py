@@ -213,3 +213,21 @@ def test_a_gust_pulse_under_way_follows_its_strength_and_no_change_of_its_time(c
 def test_rates_that_do_not_divide_are_refused(core, rate: int) -> None:
     with pytest.raises(ParameterError, match=rf"SIM_RATE_HZ = {rate} Hz; .*1000000 us / {rate} is not"):
         core("ideal", SIM_RATE_HZ=rate)
+
+
+def test_the_gripper_opens_at_its_tick_and_closes_on_a_load_within_reach(core) -> None:
+    """Let go on the ground the load stays there; from afar it is not taken, from near it is."""
+    flown = core(SIM_ACT_DELAY_MS=20.0)
+    assert not flown.released
+    flown.tick((0.0,) * 4, gripper_open=True)
+    assert flown.released
+    assert flown.truth.cable_length < 1.0
+    for _ in range(200):  # up and away: nothing holds the vehicle back
+        flown.tick((1.5,) * 4, gripper_open=True)
+    assert flown.state.x_quad[2] > 1.0
+    assert (flown.state.taut, flown.state.tension, flown.state.load_on_ground) == (0.0, 0.0, 1.0)
+    flown.tick((1.5,) * 4, gripper_open=False)
+    assert flown.released  # out of reach
+    while flown.state.vehicle_on_ground == 0.0:
+        flown.tick((0.0,) * 4, gripper_open=False)
+    assert not flown.released

@@ -36,6 +36,14 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(path)
 
 
+@pytest.fixture(scope="session")
+def delivery(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path: Path = tmp_path_factory.mktemp("missions") / "delivery.toml"
+    land = '[[items]]\ntype = "land"\n'
+    path.write_text(SHORT.replace(land, '[[items]]\ntype = "release"\n\n' + land), encoding="utf-8")
+    return str(path)
+
+
 @pytest.fixture
 def plan(short: str) -> Plan:
     """Six flights, of which those with the long delay are lost."""

@@ -94,6 +94,11 @@ def test_same_bits_with_receiver_and_camera(short: str) -> None:
     flown(short, Conditions(sensors="rtk", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))
 
 
+@pytest.mark.parametrize("sensors", ["lab", "rtk"])
+def test_same_bits_where_the_load_is_released(delivery: str, sensors: str) -> None:
+    flown(delivery, Conditions(sensors=sensors, seed=1, settings={"SIM_ACT_DELAY_MS": 5.0}))
+
+
 # a half-cosine too steep for the vehicle, and a sine that dies away
 TERMS = (Term("y", 0.25, 1.0, 0.79, None, 0.0, ()), Term("x", 0.1, 0.0, 1.0, 2.0, 1.0, (Sine(2.0),)))
 SIGNALS = Signals(5.0, TERMS)

@@ -103,6 +103,7 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.tuples(numbers, numbers, numbers, numbers),
             st.booleans(),
             st.booleans(),
+            st.booleans(),
         ),
         convert.hil_actuator_controls_message,
         convert.read_hil_actuator_controls,

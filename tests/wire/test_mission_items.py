@@ -178,7 +178,11 @@ REFUSALS = [
     # items, item that is refused, MAV_MISSION_RESULT, what the text speaks of
     ([item(17, frame=2)], 0, "UNSUPPORTED_FRAME", "frame 2"),
     ([item(84, frame=6)], 0, "UNSUPPORTED", "command 84"),
-    ([item(211, 1.0, 0.0)], 0, "UNSUPPORTED", "command 211"),
+    ([item(211, 2.0, 0.0)], 0, "INVALID_PARAM1", "gripper = 2"),
+    ([item(211, 1.0, 3.0)], 0, "INVALID_PARAM2", "gripper action = 3"),
+    ([item(211, 1.0, 0.0), item(211, 1.0, 1.0)], 1, "INVALID_PARAM2", "on the ground only"),
+    ([item(211, 1.0, 0.0), TERM, RUN], 2, "INVALID", "needs the load"),
+    ([item(211, 1.0, 0.0), item(21, frame=6, x=473977420, y=85455940)], 1, "INVALID", "put a waypoint"),
     ([item(42600, 1.0, 1.0)], 0, "UNSUPPORTED", "command 42600"),
     ([item(177, 3.0, 1.0)], 0, "INVALID_PARAM1", "item to jump to = 3; must be 0 ... 0"),
     ([item(93, 1.0), item(177, 0.0, -1.0)], 1, "INVALID_PARAM2", "repetitions = -1; must be 0 ... 1000"),
@@ -254,7 +258,7 @@ def test_a_step_that_would_be_refused_is_not_sent(step: Step) -> None:
         encode_steps([Takeoff(1.0), step], HOME)
 
 
-KNOWN = [16, 17, 18, 31, 82, 177, 186, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
+KNOWN = [16, 17, 18, 31, 82, 177, 186, 4501, 19, 20, 21, 22, 93, 112, 178, 203, 31010, 31011, 31012, 31013]
 integers = st.integers(-(2**31), 2**31 - 1)
 floats32 = st.floats(width=32)
 
@@ -355,6 +359,20 @@ def test_loitering() -> None:
         assert (step.east_m, step.north_m, step.altitude_m) == pytest.approx(place, abs=PLACE_M)
     up, higher = decode_items([item(22, frame=6, z=3.0), item(186, 6.0, 3.0)], HOME)
     assert (up, higher) == (Takeoff(3.0), Waypoint(0.0, 0.0, 6.0))
+
+
+def test_a_gate_is_flown_to() -> None:
+    latitude, longitude, _ = geodetic_from_enu((12.0, -7.0, 0.0), HOME)
+    there = {"frame": 3, "x": latitude, "y": longitude}
+    up = item(22, frame=6, z=3.0)
+    for own, z, height in ((1.0, 5.0, 5.0), (0.0, 0.0, 3.0)):
+        step = decode_items([up, item(4501, 0.0, own, z=z, **there)], HOME)[1]
+        assert isinstance(step, Waypoint)
+        assert (step.east_m, step.north_m, step.altitude_m) == pytest.approx(
+            (12.0, -7.0, height), abs=PLACE_M
+        )
+    with pytest.raises(MissionItemError, match="a gate without a height"):
+        decode_items([item(4501, 0.0, 0.0, **there)], HOME)
 
 
 @pytest.mark.parametrize("radius", [2.0, -2.0])

@@ -31,7 +31,8 @@ _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 _NAN3: Vec3 = (math.nan, math.nan, math.nan)
-_NO_CONTROLS = [0.0] * 12  # HIL_ACTUATOR_CONTROLS has room for sixteen
+_GRIPPER = 4  # HIL_ACTUATOR_CONTROLS has room for sixteen: behind the rotors
+_NO_CONTROLS = [0.0] * 11
 
 
 class HilSensor(NamedTuple):
@@ -351,14 +352,18 @@ class HilActuatorControls(NamedTuple):
     forces: Forces  # N, of rotors 1 ... 4
     armed: bool
     lockstep: bool
+    gripper_open: bool = False
 
 
-def hil_actuator_controls_message(time_us: int, forces: Forces, armed: bool, lockstep: bool) -> Any:
-    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`: controls[i] = force of rotor i+1 / ROTOR_FMAX."""
-    f1, f2, f3, f4 = forces
+def hil_actuator_controls_message(
+    time_us: int, forces: Forces, armed: bool, lockstep: bool, gripper_open: bool = False
+) -> Any:
+    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`: controls[i] = force of rotor i+1 / ROTOR_FMAX, and
+    controls[4] = 1 while the gripper that holds the cable is open."""
+    controls = [force / ROTOR_FMAX for force in forces]
     return mavlink.MAVLink_hil_actuator_controls_message(
         time_us,
-        [f1 / ROTOR_FMAX, f2 / ROTOR_FMAX, f3 / ROTOR_FMAX, f4 / ROTOR_FMAX, *_NO_CONTROLS],
+        [*controls, 1.0 if gripper_open else 0.0, *_NO_CONTROLS],
         _ARMED | _CUSTOM if armed else _CUSTOM,
         _LOCKSTEP if lockstep else 0,
     )
@@ -372,4 +377,5 @@ def read_hil_actuator_controls(m: Any) -> HilActuatorControls:
         (f1 * ROTOR_FMAX, f2 * ROTOR_FMAX, f3 * ROTOR_FMAX, f4 * ROTOR_FMAX),
         bool(m.mode & _ARMED),
         bool(m.flags & _LOCKSTEP),
+        m.controls[_GRIPPER] > 0.5,
     )

@@ -1,7 +1,6 @@
-"""What an application does with MAVSDK: `python mavsdk_flight.py PORT STEP...`; what it saw, as JSON.
+"""What an application does with MAVSDK: `python mavsdk_flight.py ADDRESS STEP...`; what it saw, as JSON.
 
-Steps are done in their order: connect is always the first. Whatever MAVSDK itself warns of is told as
-`complaints`.
+Steps are done in their order. MAVSDK's own log goes where it goes by default, to standard output.
 """
 
 from __future__ import annotations
@@ -11,11 +10,15 @@ import math
 import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from mavsdk import ComponentType, Configuration, LogLevel, Mavsdk, MavsdkError, log_subscribe
+from mavsdk import ComponentType, Configuration, Mavsdk, MavsdkError
 from mavsdk.plugins.action import Action
+from mavsdk.plugins.ftp import Ftp
+from mavsdk.plugins.geofence import Geofence
 from mavsdk.plugins.info import Info
+from mavsdk.plugins.log_files import LogFiles, LogFilesResult
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
 from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.mission_raw import MissionRaw
@@ -26,13 +29,6 @@ from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 LONG_S = 60.0
 DEGREE_M = 111_319.5  # of latitude
 NAN = math.nan
-complaints: list[str] = []
-
-
-def hear(level: LogLevel, message: str, *_: Any) -> bool:
-    if level.name.startswith(("WARN", "ERR")):
-        complaints.append(f"{level.name}: {message}")
-    return True
 
 
 class Pilot:
@@ -71,17 +67,17 @@ class Pilot:
         home = self.telemetry.home()
         return round(home.latitude_deg * 1e7), round(home.longitude_deg * 1e7)
 
-    def again(self, act: Callable[[], Any]) -> None:
-        """A command that was lost is given again, as a pilot does."""
+    def again(self, act: Callable[[], Any]) -> Any:
+        """What was lost on the way is done again, as a pilot does; how often is told."""
         for _ in range(5):
             try:
-                act()
+                return act()
             except MavsdkError as error:
-                if "TIMEOUT" not in str(error):
+                if not any(word in str(error) for word in ("TIMEOUT", "BUSY")):
                     raise
-            else:
-                return
-        act()
+                self.told["again"] = self.told.get("again", 0) + 1
+                self._turn.wait(1.0)
+        return act()
 
     # ---- steps
 
@@ -172,8 +168,7 @@ class Pilot:
         rally = [RawItem(0, 3, 5100, 0, 1, 0.0, 0.0, 0.0, 0.0, *home, 2.0, 2)]
         raw.upload_rally_points(rally)
         assert [(i.x, i.y) for i in raw.download_rallypoints()] == [home]
-        raw.upload_geofence([])
-        raw.upload_rally_points([])
+        Geofence(self.system).clear_geofence()
 
     def take_off(self) -> None:
         self.again(self.action.arm)
@@ -212,8 +207,8 @@ class Pilot:
 
         plan = MissionPlan([item(1.0, 0.0), item(1.0, 1.5, fly_through=False), item(0.0, 1.5)])
         self.mission = Mission(self.system)
-        self.mission.upload_mission(plan)
-        back = self.mission.download_mission().mission_items
+        self.again(lambda: self.mission.upload_mission(plan))
+        back = self.again(lambda: self.mission.download_mission().mission_items)
         assert len(back) == 3
         for ours, theirs in zip(plan.mission_items, back, strict=True):
             assert abs(ours.latitude_deg - theirs.latitude_deg) < 1e-7
@@ -255,7 +250,7 @@ class Pilot:
         self.mode("HOLD")
 
     def come_back(self) -> None:
-        self.action.return_to_launch()
+        self.again(self.action.return_to_launch)
         self.mode("RETURN_TO_LAUNCH")
         self.until("disarmed", lambda: not self.telemetry.armed())
         self.landed(LandedState.ON_GROUND)
@@ -266,20 +261,45 @@ class Pilot:
         self.until("disarmed", lambda: not self.telemetry.armed())
         self.landed(LandedState.ON_GROUND)
 
+    def disarm(self) -> None:
+        """On the ground, before anything is asked."""
+        self.again(self.action.disarm)
+        self.until("disarmed", lambda: not self.telemetry.armed())
+
+    def log(self) -> None:
+        """The log of the flight that is over, by the log protocol; its folder by FTP."""
+        names = [entry.name for entry in Ftp(self.system).list_directory("/fs/microsd/log").entries]
+        logs = LogFiles(self.system)
+        sizes = [-1, 0]
+        while sizes[-1] != sizes[-2]:  # it is written for a second after disarming
+            self._turn.wait(1.0)
+            entry = logs.get_entries()[-1]
+            sizes.append(entry.size_bytes)
+        over, results = threading.Event(), []
+
+        def hear(result: Any, *_: Any) -> None:
+            if result != LogFilesResult.NEXT:
+                results.append(result.name)
+                over.set()
+
+        path = Path("downloaded.ulg").absolute()
+        logs.download_log_file_async(entry, str(path), hear)
+        assert over.wait(LONG_S), "no end of the log"
+        self.told["log"] = [results[0], entry.size_bytes, str(path), names[-1]]
+
 
 def main(address: str, steps: list[str]) -> None:
-    log_subscribe(hear)
     with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
         mavsdk.add_any_connection(address)
         pilot = Pilot(mavsdk.first_autopilot(LONG_S))
         for step in steps:
-            print(step, flush=True)
+            print(f"== {step}", flush=True)
             try:
                 getattr(pilot, step)()
             except Exception as error:
-                sys.exit(f"{step}: {str(error)[:300]}\n{pilot.texts}\n{complaints}")
+                sys.exit(f"{step}: {type(error).__name__} {error}\n{pilot.texts}")
         told = {**pilot.told, "texts": pilot.texts, "modes": pilot.modes}
-    print(json.dumps({**told, "complaints": complaints}))
+    print(json.dumps(told))
 
 
 if __name__ == "__main__":
