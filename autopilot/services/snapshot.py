@@ -134,3 +134,4 @@ class Snapshot(NamedTuple):
     mission_total: int = 0
     mission_state: int = mavlink.MISSION_STATE_NO_MISSION
     reel_rate: float = 0.0  # m/s, at which the winch lets the cable out
+    plan_ids: tuple[int, int, int] = (0, 0, 0)  # of mission, fence, rally points; 0: there is none
