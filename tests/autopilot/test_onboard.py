@@ -263,3 +263,16 @@ def test_a_vehicle_whose_sensors_are_silent_still_says_that_it_is_there() -> Non
     (received,), _ = decode(craft.onboard.stranded_heartbeat(GCS))
     assert received.message.system_status == mavlink.MAV_STATE_EMERGENCY
     assert received.message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+@pytest.mark.parametrize(("given", "believed"), [({}, 30.0), ({"VEH_IMU_DELAY": 20.0}, 20.0)])
+def test_latency_of_the_sensors_is_believed_unless_a_belief_is_given(
+    given: dict[str, float], believed: float
+) -> None:
+    onboard = build_onboard(Conditions(settings={"SIM_SENS_LAT_MS": 30.0, **given}), Home())
+    assert onboard.parameters["VEH_IMU_DELAY"] == believed
+
+
+def test_no_more_latency_is_believed_than_may_be() -> None:
+    onboard = build_onboard(Conditions(settings={"SIM_SENS_LAT_MS": 300.0}), Home())
+    assert onboard.parameters["VEH_IMU_DELAY"] == onboard.parameters.describe("VEH_IMU_DELAY").high
