@@ -21,7 +21,7 @@ from autopilot.flight import (
     below,
     forbidden,
 )
-from autopilot.following import Circle, Lean, Stream, Wish
+from autopilot.following import NEVER_US, Circle, Lean, Stream, Wish
 from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
 from autopilot.guidance import Hold, carry_leg
 from autopilot.services import identity
@@ -74,6 +74,7 @@ RAMP_SHARE = 4.0  # a circle is begun with a quarter of the acceleration along i
 STREAM_US = 500_000  # a stream is there where its last setpoint is no older: two a second
 LEVEL_HOME_M = 1.0
 CIRCLE_POINTS = 72
+LONGEST_CIRCLE_S = 1e9
 WAY_M, MOST_PIECES = 0.25, 4000  # at which a way between waypoints is looked at
 SLOWEST_M_S, FASTEST_M_S = 0.05, 15.0
 
@@ -203,7 +204,7 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     if not plan.steps:
         return flight, _denied("Mission denied: there is none")
     if plan.prepared.pending:
-        return flight, _later("Mission not ready: its paths are being prepared; try again")
+        return flight, Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "Mission begins when its paths are prepared")
     beyond = _leaves_fence(flight, plan.steps, plan.sequence, settings)
     if beyond:
         return flight, _denied(f"Mission denied: {beyond}")
@@ -444,14 +445,12 @@ def _orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> De
             return flight, _denied(f"Orbit denied: {beyond}")
     out = sub(here, centre)
     phase = math.atan2(out[1], out[0]) if math.hypot(out[0], out[1]) > 0.0 else 0.0
-    circle = Circle(
-        centre,
-        radius,
-        -speed / request.radius_m,
-        phase,
-        view.now_us,
-        RAMP_SHARE * abs(speed) / settings.accel_m_s2,
-    )
+    rate, ramp_s = -speed / request.radius_m, RAMP_SHARE * abs(speed) / settings.accel_m_s2
+    ends_us = NEVER_US
+    if request.turns is not None:
+        turning_s = min(2.0 * math.pi * request.turns / abs(rate) + 0.5 * ramp_s, LONGEST_CIRCLE_S)
+        ends_us = view.now_us + round(1e6 * turning_s)
+    circle = Circle(centre, radius, rate, phase, view.now_us, ramp_s, ends_us)
     return _guide(replace(flight, circle=circle), Guide.ORBIT, "Orbit", view, settings)
 
 

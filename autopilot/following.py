@@ -43,6 +43,7 @@ FLOOR_M = 0.3  # height over home below which no setpoint takes the load
 _BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(ORDER))
 _OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, but for the last
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0)
+NEVER_US = 2**62
 NOWHERE: Vec3 = (nan, nan, nan)
 Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
 
@@ -68,7 +69,7 @@ class Wish:
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A level circle flown for ever at `rate` (rad/s, positive counter-clockwise seen from above)."""
+    """A level circle flown at `rate` (rad/s, positive counter-clockwise seen from above)."""
 
     centre: Vec3
     radius: float
@@ -76,6 +77,7 @@ class Circle:
     phase: float  # angle from east at which it begins
     since_us: int
     ramp_s: float  # in which the rate is reached
+    ends_us: int = NEVER_US  # when it has been flown
 
     def seen(self, now_us: int, rate: float) -> tuple[Vec3, Vec3, Vec3]:
         """Position, velocity and acceleration that a smoother of this rate turns into the circle."""

@@ -6,6 +6,7 @@ waits until the shell hands it over, between two ticks.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -41,8 +42,9 @@ from autopilot.services.records import (
     SigningChanged,
     TimesyncAnswered,
     Verdict,
+    WorldSaved,
 )
-from autopilot.services.requests import ChangeSigningKey, Reboot
+from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
@@ -213,7 +215,8 @@ class Onboard:
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
-            self.endpoint.item_reached(seq)
+            last = self._state.flight.mission_done and seq == report.reached[-1]
+            self.endpoint.item_reached(seq, last)
         if self._log is not None:
             rate_hz = self.parameters["LOG_RATE_HZ"]
             self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self._log_sample)
@@ -295,7 +298,7 @@ class Onboard:
                     self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered() | SigningChanged():
+                case TimesyncAnswered() | SigningChanged() | WorldSaved():
                     pass  # the shell waits for the one and stores the other
         return [event for event in events if not self._world.owns(event)]
 
@@ -319,6 +322,10 @@ class Onboard:
         self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
         return self.endpoint.datagram(link, mavlink.MAVLink_timesync_message(0, self.now_us * 1000))
 
+    def restore_world(self, values: Mapping[str, float]) -> None:
+        """What the simulator's parameters were saved as; it is told when it is there."""
+        self._world.restore(values)
+
     def stranded_heartbeat(self, link: Link) -> bytes:
         """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
         snapshot = self._snapshot()._replace(system_status=mavlink.MAV_STATE_CRITICAL)
@@ -336,6 +343,10 @@ class Onboard:
         if isinstance(request, ChangeSigningKey):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, ResetParameters):
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "Reset of parameters denied: armed")
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if isinstance(request, Reboot) and not request.shutdown:
             if self.armed:

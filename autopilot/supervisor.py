@@ -562,6 +562,8 @@ def _guide(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Repo
     if lost(flight, view.now_us, settings):
         text = f"Nothing heard from {flight.guide.value} any more: holding"
         return _to(flight, E.HOLD, view, settings, (WARNING, text))
+    if flight.guide == Guide.ORBIT and flight.circle is not None and view.now_us >= flight.circle.ends_us:
+        return _to(flight, E.HOLD, view, settings, (INFO, "Circle flown: holding"))
     asked, leg = asked_of(flight), flight.legs[0]
     if isinstance(leg, Posture) and isinstance(asked, Lean):
         return replace(flight, legs=(replace(leg, lean=asked),)), Report()
@@ -675,7 +677,6 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight whose load was let go by command: the vehicle goes on alone, a mission is held."""
     if flight.released:
         return flight
-    mission = flight.on_mission
     alone = replace(flight, released=True, slack_since_us=-1, still_since_us=-1)
     if flight.phase in ON_GROUND or flight.phase in (P.SET_DOWN, P.FAILSAFE):
         return alone
@@ -685,7 +686,8 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
     alone = replace(alone, legs=())
     if flight.phase == P.GUIDED and isinstance(asked_of(flight), Lean):
         return enter(replace(alone, offboard=SILENT), P.HOLD, view, settings)
-    return enter(alone, P.HOLD if mission else flight.phase, view, settings)
+    held = flight.on_mission or flight.phase == P.MISSION
+    return enter(alone, P.HOLD if held else flight.phase, view, settings)
 
 
 def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
