@@ -186,7 +186,7 @@ class VehicleEndpoint:
         self._do([Say(severity, text)], [])
 
     def item_reached(self, seq: int, last: bool = False) -> None:
-        """The mission came to the end of an item. Of the last one this is said a few times: some clients learn
+        """The mission came to the end of an item. Of the last one it is said a few times: some clients learn
         by nothing else that a mission is over."""
         self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
         self._reached, self._reached_us = seq, None

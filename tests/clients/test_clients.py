@@ -87,7 +87,7 @@ def test_mavsdk_flies(mavsdk_and_two_ground_stations: Callable[[], Watched]) -> 
     assert complaints(flight.told.output) == []
     assert told["version"] == [1, 15]
     assert told["progress"] == [0, 1, 2, 3]
-    assert told["texts"] == FLOWN
+    assert told["texts"] == [*FLOWN, "Load released", "Load taken"]
     assert "again" not in told
     result, size, path, name = told["log"]
     assert (result, size) == ("SUCCESS", len(flight.log))
