@@ -40,6 +40,22 @@ FLOWN = [
 FAILSAFE = m.PLUMBLINE_PHASE_FAILSAFE
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "[05:28:07|Warn ] Timeout: retries exceeded (mavlink_mission_transfer_client.cpp:624)",
+        "[05:28:07|Error] Rejecting tune, too short",
+        "WARNING:dronekit:Link timeout, no heartbeat in last 5 seconds",
+        "Got COMMAND_ACK: DO_SET_MODE: TEMPORARILY_REJECTED",
+        "Got MISSION_ACK: TYPE_MISSION: UNSUPPORTED",
+        "fence breach",
+        "AP: Mission denied while lift",
+    ],
+)
+def test_what_counts_as_a_complaint(line: str) -> None:
+    assert complaints(f"all well\n{line}\n") == [line]
+
+
 class Watched(NamedTuple):
     """A flight of MAVSDK's while two ground stations watch, one of which vanishes on the way."""
 
