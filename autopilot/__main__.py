@@ -25,6 +25,7 @@ from autopilot.services.records import (
     ParameterChanged,
     SigningChanged,
     TimesyncAnswered,
+    WorldSaved,
 )
 from autopilot.storage import Storage, StorageError
 from autopilot.tcp_server import TcpServer
@@ -307,6 +308,8 @@ class Program:
                         self._storage.keep_areas(kind, items)
                     case ParameterChanged(name, value):
                         self._storage.keep_parameter(name, value)
+                    case WorldSaved(values):
+                        self._storage.keep_world(values)
                     case SigningChanged(key, timestamp):
                         self._storage.keep_signing(key, timestamp)
             except OSError as error:
@@ -454,7 +457,12 @@ def main(
         options = Options(place, boot, clock_waits=in_step, log=True)
 
         def build(stored: StoredMission | None) -> Onboard:
-            return Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())
+            onboard = Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())
+            world, troubles = kept.load_world()
+            for trouble in troubles:
+                print(f"autopilot: {trouble}", file=sys.stderr)
+            onboard.restore_world(world)
+            return onboard
 
         stations = [address for address in (*gcs, *api) if address is not None]
         ground: GroundStations | GroundInStep

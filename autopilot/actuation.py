@@ -5,11 +5,14 @@
 | u_k     | queue          | B     | N, N m | thrust and moment that the mixer gave at tick k      |
 | r       | thrust, moment | B     | N, N m | what the rotors give at the present tick             |
 | d       | delay          |       | s      | from a command to the instant at which it is in force |
+|         |                |       |        | by the clock of the estimate                         |
 | tau     | lag            |       | s      | r' = (u - r) / tau                                   |
 | T       | period         |       | s      | of the control law                                   |
 
-With d = n T + c, 0 <= c < T, the command in force is u_{k-n-1} for c seconds after tick k, then u_{k-n} until
-the next tick. (2-13) is linear and the rotors are alike, so that thrust and moment lag as each rotor does.
+The estimate is of the instant that the inertial unit shows: tick k is that instant, and d counts the unit's
+delay in. With d = n T + c, 0 <= c < T, the command in force is u_{k-n-1} for c seconds after tick k, then
+u_{k-n} until the next tick. (2-13) is linear and the rotors are alike, so that thrust and moment lag as each
+rotor does.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 
-LONGEST_DELAY = 0.2  # s
+LONGEST_DELAY = 0.3  # s
 GREATEST_RATE = 1000.0  # Hz
 ROWS = round(LONGEST_DELAY * GREATEST_RATE) + 2
 

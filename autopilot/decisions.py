@@ -21,7 +21,7 @@ from autopilot.flight import (
     below,
     forbidden,
 )
-from autopilot.following import Circle, Lean, Stream, Wish
+from autopilot.following import NEVER_US, Circle, Lean, Stream, Wish
 from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
 from autopilot.guidance import Hold, carry_leg
 from autopilot.services import identity
@@ -74,6 +74,7 @@ RAMP_SHARE = 4.0  # a circle is begun with a quarter of the acceleration along i
 STREAM_US = 500_000  # a stream is there where its last setpoint is no older: two a second
 LEVEL_HOME_M = 1.0
 CIRCLE_POINTS = 72
+LONGEST_CIRCLE_S = 1e9
 WAY_M, MOST_PIECES = 0.25, 4000  # at which a way between waypoints is looked at
 SLOWEST_M_S, FASTEST_M_S = 0.05, 15.0
 
@@ -203,7 +204,7 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     if not plan.steps:
         return flight, _denied("Mission denied: there is none")
     if plan.prepared.pending:
-        return flight, _later("Mission not ready: its paths are being prepared; try again")
+        return flight, Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "Mission begins when its paths are prepared")
     beyond = _leaves_fence(flight, plan.steps, plan.sequence, settings)
     if beyond:
         return flight, _denied(f"Mission denied: {beyond}")
@@ -320,7 +321,19 @@ def _set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) 
     handler = _MODES.get((main, sub_mode))
     if handler is None:
         return flight, _denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
-    return handler(flight, request, view, settings)
+    heeds = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not _hold
+    if settings.guided_mode and handler is _hold and heeds and _in_guided_mode(flight):
+        return flight, ACCEPTED
+    after, verdict = handler(flight, request, view, settings)
+    return (replace(after, heeds=heeds) if verdict.result == ACCEPTED.result else after), verdict
+
+
+def _in_guided_mode(flight: Flight) -> bool:
+    """Whether what is flown is a part of ArduPilot's GUIDED: a take-off, the way to a place, setpoints."""
+    if flight.on_mission:
+        return False
+    rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (flight.phase == Phase.HOLD and flight.heeds)
+    return rising or (flight.phase == Phase.GUIDED and flight.guide != Guide.MANUAL)
 
 
 def _replace_mission(flight: Flight, request: ReplaceMission, view: View, settings: Settings) -> Decision:
@@ -364,7 +377,8 @@ def _reposition(flight: Flight, request: Reposition, view: View, settings: Setti
     if norm(sub(there, here)) == 0.0:
         return held, ACCEPTED
     go = carry_leg(here, there, speed, settings.accel_m_s2, settings.least_move_s)
-    return replace(held, legs=as_flown(held, (*held.legs[:-1], go, Hold(there)))), ACCEPTED
+    legs = as_flown(held, (*held.legs[:-1], go, Hold(there)))
+    return replace(held, legs=legs, heeds=True), ACCEPTED
 
 
 def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settings: Settings) -> Decision:
@@ -376,7 +390,15 @@ def _follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settin
     if any(abs(value) > FARTHEST_M for value in position):
         return flight, _denied(f"Setpoint refused: more than {FARTHEST_M:g} m away")
     asked = Wish(position, request.velocity, request.accel, view.now_us)
-    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
+    return _heed(replace(flight, offboard=Stream(asked, view.now_us)), view, settings), ACCEPTED
+
+
+def _heed(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight after a setpoint: in ArduPilot's GUIDED a vehicle that holds or circles follows it."""
+    circles = flight.phase == Phase.GUIDED and flight.guide == Guide.ORBIT
+    if not settings.guided_mode or not flight.heeds or not (flight.phase == Phase.HOLD or circles):
+        return flight
+    return _guide(flight, Guide.OFFBOARD, "Setpoint", view, settings)[0]
 
 
 def _follow_attitude(flight: Flight, request: FollowAttitude, view: View, settings: Settings) -> Decision:
@@ -384,7 +406,7 @@ def _follow_attitude(flight: Flight, request: FollowAttitude, view: View, settin
         return flight, _denied("Attitude setpoint refused: the load is released, fly by position")
     thrust = None if request.thrust is None else request.thrust / settings.hover_share * settings.weight_n
     asked = Lean(request.upward, thrust)
-    return replace(flight, offboard=Stream(asked, view.now_us)), ACCEPTED
+    return _heed(replace(flight, offboard=Stream(asked, view.now_us)), view, settings), ACCEPTED
 
 
 def _follow_stick(flight: Flight, request: FollowStick, view: View, settings: Settings) -> Decision:
@@ -423,14 +445,12 @@ def _orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> De
             return flight, _denied(f"Orbit denied: {beyond}")
     out = sub(here, centre)
     phase = math.atan2(out[1], out[0]) if math.hypot(out[0], out[1]) > 0.0 else 0.0
-    circle = Circle(
-        centre,
-        radius,
-        -speed / request.radius_m,
-        phase,
-        view.now_us,
-        RAMP_SHARE * abs(speed) / settings.accel_m_s2,
-    )
+    rate, ramp_s = -speed / request.radius_m, RAMP_SHARE * abs(speed) / settings.accel_m_s2
+    ends_us = NEVER_US
+    if request.turns is not None:
+        turning_s = min(2.0 * math.pi * request.turns / abs(rate) + 0.5 * ramp_s, LONGEST_CIRCLE_S)
+        ends_us = view.now_us + round(1e6 * turning_s)
+    circle = Circle(centre, radius, rate, phase, view.now_us, ramp_s, ends_us)
     return _guide(replace(flight, circle=circle), Guide.ORBIT, "Orbit", view, settings)
 
 

@@ -37,6 +37,7 @@ class Phase(IntEnum):
     GUIDED = mavlink.PLUMBLINE_PHASE_GUIDED
 
 
+ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
 CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
@@ -119,6 +120,7 @@ class Flight:
     breaches: int = 0
     breach_us: int = 0  # when the last one began
     released: bool = False  # the load: what is flown and asked for is the vehicle, by itself
+    heeds: bool = True  # holding, it follows a setpoint at once: ArduPilot's GUIDED, not its LOITER
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +151,8 @@ class Settings:
     fence_action: int  # GF_ACTION
     fence_radius_m: float  # 0: none
     fence_height_m: float  # 0: none
+    guided_mode: bool  # setpoints as in ArduPilot's GUIDED: heeded while holding, and a place stays asked for
+    guided_loss_us: int  # silence after which other setpoints count as lost there
     guides_vehicle: bool  # position setpoints are for the vehicle, which is kept a cable length over the load
 
 
@@ -164,6 +168,7 @@ class View(NamedTuple):
     tilt_rad: float
     complaints: tuple[str, ...]
     pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
+    height_std: float = 0.0  # m, of heights over home, where a receiver tells them
 
 
 class Report(NamedTuple):
@@ -200,6 +205,8 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         fence_action=int(table["GF_ACTION"]),
         fence_radius_m=table["GF_MAX_HOR_DIST"],
         fence_height_m=table["GF_MAX_VER_DIST"],
+        guided_mode=int(table["MAV_IDENTITY"]) == ARDUPILOT_IDENTITY,
+        guided_loss_us=round(1e6 * table["GUID_TIMEOUT"]),
         guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 

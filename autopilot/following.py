@@ -26,7 +26,7 @@ on from the jet of the one before.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan, comb, cos, exp, inf, isnan, nan, sin, sqrt
+from math import atan, ceil, comb, cos, exp, inf, isnan, nan, sin, sqrt
 
 from autopilot.control.records import Jet
 from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
@@ -37,10 +37,13 @@ K_P = 1.2  # 1/s, speed asked for each metre that the governor's point is away
 K_V = 4.0 * K_P  # 1/s, critically damped with K_P
 BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned: the rest is for what is not planned
 SMOOTH_SHARE = 3.5  # rate of the smoother over that of the pendulum
+FADED = 40.0  # periods 1/w of the smoother, after which it has arrived but for rounding
 FLOOR_M = 0.3  # height over home below which no setpoint takes the load
 
 _BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(ORDER))
+_OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, but for the last
 _FACTORIAL = (1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0)
+NEVER_US = 2**62
 NOWHERE: Vec3 = (nan, nan, nan)
 Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
 
@@ -57,10 +60,16 @@ class Wish:
     accel: Vec3 = NOWHERE
     since_us: int = 0
 
+    @property
+    def is_place(self) -> bool:
+        """Whether it asks for a place that does not move, and for nothing else."""
+        moves = any(v != 0.0 and not isnan(v) for v in (*self.velocity, *self.accel))
+        return not moves and not all(map(isnan, self.position))
+
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A level circle flown for ever at `rate` (rad/s, positive counter-clockwise seen from above)."""
+    """A level circle flown at `rate` (rad/s, positive counter-clockwise seen from above)."""
 
     centre: Vec3
     radius: float
@@ -68,6 +77,7 @@ class Circle:
     phase: float  # angle from east at which it begins
     since_us: int
     ramp_s: float  # in which the rate is reached
+    ends_us: int = NEVER_US  # when it has been flown
 
     def seen(self, now_us: int, rate: float) -> tuple[Vec3, Vec3, Vec3]:
         """Position, velocity and acceleration that a smoother of this rate turns into the circle."""
@@ -155,10 +165,43 @@ class Follow:
         rows = [(x[n], y[n], z[n]) for n in range(ORDER)]
         return (rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
-    def coasting(self, t: float) -> Follow:
-        """The motion from `t` seconds into this leg on, nothing more being asked of it."""
+    def coasting(self, t: float, rate: float) -> Follow:
+        """The motion from `t` seconds into this leg on, its point going on at the velocity it has."""
         x, v, a = self.point
-        return Follow(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), self.rate)
+        return Follow(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), rate)
+
+    def stopped(self, t: float, accel: float) -> tuple[tuple[Follow, ...], Vec3]:
+        """From `t` seconds into this leg on to rest, and where that is.
+
+        The point slows down at `accel` (m/s^2), downwards as fast as keeps it over the floor. The legs last
+        whole microseconds, as the clock has it, and the last one until only rounding is left of the motion.
+        """
+        x, v, a = self.point
+        x, v = axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v)
+        level, drop = (v[0], v[1], 0.0), (0.0, 0.0, v[2])
+        least_s = norm(v) / accel
+        level_s = drop_s = _up_to_us(least_s)
+        height = max(x[2] - FLOOR_M, 0.0)
+        if v[2] < 0.0 and -0.5 * v[2] * least_s > height:
+            drop_s = _up_to_us(max(2.0 * height, -v[2] / accel * -v[2]) / -v[2])
+            lift = -v[2] / drop_s
+            level_s = _up_to_us(norm(level) / sqrt(max(accel * accel - lift * lift, 0.25 * accel * accel)))
+        legs: list[Follow] = []
+        jet, gone_s = self.jet(t), 0.0
+        for until_s in sorted({level_s, drop_s}):
+            push = ZERO
+            if gone_s < level_s:
+                push = axpy(-1.0 / level_s, level, push)
+            if gone_s < drop_s:
+                push = axpy(-1.0 / drop_s, drop, push)
+            lasts = _whole_us(until_s - gone_s)
+            if lasts <= 0.0:
+                continue
+            leg = Follow(jet, (x, v, push), self.rate, lasts)
+            x, v = axpy(0.5 * lasts * lasts, push, axpy(lasts, v, x)), axpy(lasts, push, v)
+            jet, gone_s = leg.jet(lasts), until_s
+            legs.append(leg)
+        return (*legs, Follow(jet, (x, ZERO, ZERO), self.rate, _whole_us(FADED / self.rate))), x
 
     def onward(self, t: float, asked: Wish | Circle, pace: Pace, now_us: int) -> Follow:
         """The motion from `t` seconds into this leg on, towards what is asked at `now_us`."""
@@ -167,9 +210,27 @@ class Follow:
         return Follow(self.jet(t), point, pace.rate)
 
 
+def _whole_us(seconds: float) -> float:
+    return round(seconds * 1e6) * 1e-6
+
+
+def _up_to_us(seconds: float) -> float:
+    return ceil(seconds * 1e6) * 1e-6
+
+
 def begin_following(jet: Jet, rate: float) -> Follow:
-    """A motion that goes on from `jet` at its velocity until something is asked."""
-    return Follow(jet, (axpy(ORDER / rate, jet[1], jet[0]), jet[1], ZERO), rate)
+    """A motion that goes on from `jet` until something is asked.
+
+    The point is where (1 + D/w)^7 x says, as far as the jet tells. A point that disagreed with the jet by no
+    more than its acceleration would throw the load: the smoother answers with ten times as much.
+    """
+    point = []
+    for n in range(3):
+        asked = ZERO
+        for k in range(ORDER - n):
+            asked = axpy(_OF_INPUT[k] / rate**k, jet[n + k], asked)
+        point.append(asked)
+    return Follow(jet, (point[0], point[1], point[2]), rate)
 
 
 def towards(distance: Vec3, accel: float) -> Vec3:
@@ -210,8 +271,15 @@ def governed(x: Vec3, v: Vec3, asked: Wish | Circle, pace: Pace, now_us: int) ->
     # no faster down than stops at the floor
     height = max(x[2] - FLOOR_M, 0.0)
     slowest = -norm(towards((0.0, 0.0, height), BRAKE_SHARE * pace.accel))
+    near_floor = min(wanted[2], v[2]) < slowest
     wanted = (wanted[0], wanted[1], max(wanted[2], slowest))
-    return x, v, _at_most(axpy(K_V, sub(wanted, v), push), pace.accel)
+    asked_for = axpy(K_V, sub(wanted, v), push)
+    if not near_floor:
+        return x, v, _at_most(asked_for, pace.accel)
+    # braking over the floor comes first, what is left is for the rest
+    lift = max(-pace.accel, min(asked_for[2], pace.accel))
+    level = _at_most((asked_for[0], asked_for[1], 0.0), sqrt(pace.accel * pace.accel - lift * lift))
+    return x, v, (level[0], level[1], lift)
 
 
 @dataclass(frozen=True, slots=True)

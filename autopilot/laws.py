@@ -96,7 +96,12 @@ def believed_drag(table: ParameterTable) -> Drag:
 def believed_actuation(table: ParameterTable) -> ActuationConstants:
     """Delay and lag of the rotors as the parameters describe them."""
     period = 1.0 / table["CTL_RATE_HZ"]
-    return actuation_constants(1e-3 * table["VEH_ACT_DELAY"], 1e-3 * table["VEH_ROTOR_TAU"], period)
+    return actuation_constants(believed_delay(table), 1e-3 * table["VEH_ROTOR_TAU"], period)
+
+
+def believed_delay(table: ParameterTable) -> float:
+    """From the instant that an estimate is of to the one at which the command for it is in force, s."""
+    return 1e-3 * (table["VEH_ACT_DELAY"] + table["VEH_IMU_DELAY"])
 
 
 def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
@@ -111,7 +116,7 @@ def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
             zeta=table["PLB_ZETA"],
             noise=table["PLB_NOISE"],
         ),
-        Timing(1e-3 * table["VEH_ACT_DELAY"], lag, min(lag, shown), 1.0 / table["CTL_RATE_HZ"]),
+        Timing(believed_delay(table), lag, min(lag, shown), 1.0 / table["CTL_RATE_HZ"]),
         vehicle,
     )
 
@@ -283,6 +288,7 @@ class PlumblineLaw(NamedTuple):
     constants: PlumblineConstants
     designed: Design
     other_modes: ThesisLaw
+    preview_s: float
 
     @classmethod
     def build(cls, table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
@@ -305,16 +311,12 @@ class PlumblineLaw(NamedTuple):
                 k_R=gains.k_R, k_Omega=gains.k_Omega, k_q=gains.k_q, k_omega=gains.k_omega, epsilon=1.0
             )
         )
-        return cls(constants, designed, others)
+        return cls(constants, designed, others, 1e-3 * table["VEH_ACT_DELAY"])
 
     @property
     def ramp_lag_s(self) -> float:
         # the reference's velocity is fed forward: nothing is left behind on a ramp
         return 0.0
-
-    @property
-    def preview_s(self) -> float:
-        return self.constants.actuation.whole * self.constants.period + self.constants.actuation.late
 
     def start(self, state: State, x_d: Vec3, v_d: Vec3) -> Memory:
         return PlumblineMemory(plumbline.start(), self.other_modes.start(state, x_d, v_d))

@@ -6,6 +6,7 @@ waits until the shell hands it over, between two ticks.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -41,8 +42,9 @@ from autopilot.services.records import (
     SigningChanged,
     TimesyncAnswered,
     Verdict,
+    WorldSaved,
 )
-from autopilot.services.requests import ChangeSigningKey, Reboot
+from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
 from autopilot.services.snapshot import Snapshot
 from autopilot.telemetry_view import Options, make_snapshot
 from autopilot.wire.codec import FrameWriter
@@ -153,7 +155,7 @@ class Onboard:
 
         None for anything else: garbage, or a tick that is over.
         """
-        tick = read_tick(datagram, self._options.home)
+        tick = read_tick(datagram, self._options.home, self._setup.tuning.imu_age)
         if tick is None:
             return None
         if tick.now_us < self.now_us or (self.tick >= 0 and tick.now_us > self.now_us + LEAP_US):
@@ -296,7 +298,7 @@ class Onboard:
                     self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered() | SigningChanged():
+                case TimesyncAnswered() | SigningChanged() | WorldSaved():
                     pass  # the shell waits for the one and stores the other
         return [event for event in events if not self._world.owns(event)]
 
@@ -320,6 +322,10 @@ class Onboard:
         self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
         return self.endpoint.datagram(link, mavlink.MAVLink_timesync_message(0, self.now_us * 1000))
 
+    def restore_world(self, values: Mapping[str, float]) -> None:
+        """What the simulator's parameters were saved as; it is told when it is there."""
+        self._world.restore(values)
+
     def stranded_heartbeat(self, link: Link) -> bytes:
         """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
         snapshot = self._snapshot()._replace(system_status=mavlink.MAV_STATE_CRITICAL)
@@ -337,6 +343,10 @@ class Onboard:
         if isinstance(request, ChangeSigningKey):
             if self.armed:
                 return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, ResetParameters):
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "Reset of parameters denied: armed")
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if isinstance(request, Reboot) and not request.shutdown:
             if self.armed:

@@ -6,7 +6,8 @@ from autopilot.estimation.filter import Readings, control_state
 from autopilot.estimation.parting import parted
 from autopilot.estimation.records import ImuReading, LoadReading, PoseReading, new_history
 from autopilot.flight_core import Setup, initial_state, step, track
-from autopilot.geometry.linear import ZERO
+from autopilot.geometry.linear import E3, ZERO
+from autopilot.geometry.s2 import tangent
 from autopilot.geometry.so3 import IDENTITY_QUAT
 from autopilot.guidance import (
     LOAD_ATTITUDE,
@@ -53,6 +54,7 @@ def rehearse(setup: Setup) -> None:
         Swing(load, 0.1, 0.1, 1.0, LOAD_ATTITUDE),
         Swing(load, 0.1, 0.1, 1.0, QUAD_ATTITUDE),
     )
+    tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
     for leg in legs:
         jet = leg.jet(0.5)
         memory = setup.law.start(motion, jet[0], jet[1])

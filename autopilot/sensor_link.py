@@ -7,6 +7,7 @@ from math import nan
 from typing import Any, NamedTuple
 
 from autopilot.estimation.filter import Readings
+from autopilot.estimation.history import reading_age
 from autopilot.estimation.records import DirectionReading, GnssReading, ImuReading, LoadReading, PoseReading
 from autopilot.geometry.linear import ZERO, norm, scale
 from autopilot.wire.codec import decode
@@ -42,8 +43,11 @@ class Tick(NamedTuple):
     aside: tuple[Any, ...]  # messages that are no sensor's
 
 
-def read_tick(datagram: bytes, home: Home) -> Tick | None:
-    """The tick in a datagram, or None where there is none (garbage, another message)."""
+def read_tick(datagram: bytes, home: Home, imu_age: float = 0.0) -> Tick | None:
+    """The tick in a datagram, or None where there is none (garbage, another message).
+
+    `imu_age` (s) is how old the inertial unit's samples are when they come.
+    """
     messages, _ = decode(datagram)
     sensor = None
     odometry: list[Any] = []
@@ -66,10 +70,10 @@ def read_tick(datagram: bytes, home: Home) -> Tick | None:
     if sensor is None:
         return None
     now_us = sensor.time_us
-    poses = tuple(pose for pose in (_pose(o, now_us) for o in odometry) if pose is not None)
-    loads = tuple(reading for reading in (_load(r, now_us) for r in load) if reading is not None)
-    seen = tuple(reading for reading in (_direction(r, now_us) for r in load) if reading is not None)
-    fix = None if gps is None else _fix(gps, now_us)
+    poses = tuple(pose for pose in (_pose(o, now_us, imu_age) for o in odometry) if pose is not None)
+    loads = tuple(reading for reading in (_load(r, now_us, imu_age) for r in load) if reading is not None)
+    seen = tuple(reading for reading in (_direction(r, now_us, imu_age) for r in load) if reading is not None)
+    fix = None if gps is None else _fix(gps, now_us, imu_age)
     height = sensor.pressure_altitude_m - home.altitude_m if sensor.fields & PRESSURE else nan
     field = sensor.mag_body_gauss if sensor.fields & MAG else (nan, nan, nan)
     # written so that NaN fails
@@ -87,9 +91,9 @@ def read_tick(datagram: bytes, home: Home) -> Tick | None:
     return Tick(now_us, readings, gps, sensor.fields, tuple(aside))
 
 
-def _age_s(now_us: int, time_us: int) -> float | None:
-    age = (now_us - time_us) * 1e-6
-    return age if 0.0 <= age <= OLDEST_READING_S else None
+def _age_s(now_us: int, time_us: int, imu_age: float) -> float | None:
+    age = reading_age(float(now_us - time_us), imu_age)
+    return age if time_us <= now_us and age <= OLDEST_READING_S else None
 
 
 def _at_least(value: float, least: float) -> float:
@@ -97,8 +101,8 @@ def _at_least(value: float, least: float) -> float:
     return value if value > least else least
 
 
-def _pose(o: Any, now_us: int) -> PoseReading | None:
-    age = _age_s(now_us, o.time_us)
+def _pose(o: Any, now_us: int, imu_age: float) -> PoseReading | None:
+    age = _age_s(now_us, o.time_us, imu_age)
     values = (*o.position, *o.quat_wxyz, *(o.velocity or ()))
     if age is None or not all(map(math.isfinite, values)):
         return None
@@ -113,8 +117,8 @@ def _pose(o: Any, now_us: int) -> PoseReading | None:
     )
 
 
-def _load(r: Any, now_us: int) -> LoadReading | None:
-    age = _age_s(now_us, r.time_us)
+def _load(r: Any, now_us: int, imu_age: float) -> LoadReading | None:
+    age = _age_s(now_us, r.time_us, imu_age)
     if age is None or r.position is None or not all(map(math.isfinite, (*r.position, *(r.velocity or ())))):
         return None
     return LoadReading(
@@ -126,8 +130,8 @@ def _load(r: Any, now_us: int) -> LoadReading | None:
     )
 
 
-def _fix(gps: HilGps, now_us: int) -> GnssReading | None:
-    age = _age_s(now_us, gps.time_us)
+def _fix(gps: HilGps, now_us: int, imu_age: float) -> GnssReading | None:
+    age = _age_s(now_us, gps.time_us, imu_age)
     values = (*gps.position, *gps.velocity, gps.horizontal_std, gps.vertical_std)
     if age is None or gps.fix_type < mavlink.GPS_FIX_TYPE_3D_FIX or not all(map(math.isfinite, values)):
         return None
@@ -141,8 +145,8 @@ def _fix(gps: HilGps, now_us: int) -> GnssReading | None:
     )
 
 
-def _direction(r: Any, now_us: int) -> DirectionReading | None:
-    age = _age_s(now_us, r.time_us)
+def _direction(r: Any, now_us: int, imu_age: float) -> DirectionReading | None:
+    age = _age_s(now_us, r.time_us, imu_age)
     if age is None or r.direction_body is None:
         return None
     length = norm(r.direction_body)

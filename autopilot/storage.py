@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -33,6 +33,7 @@ _READERS: dict[int, Callable[[tuple[WireItem, ...], Home], object]] = {
     mavlink.MAV_MISSION_TYPE_RALLY: read_rally,
 }
 PARAMETER_FILE = "parameters.txt"
+WORLD_FILE = "world.txt"  # parameters of the simulator
 SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
 CARD_DIRECTORY = "card"  # what clients reach by FILE_TRANSFER_PROTOCOL
 LOCK_FILE = "lock"
@@ -146,6 +147,24 @@ class Storage:
         self._parameters[name] = value
         lines = [f"{name} {value!r}\n" for name, value in sorted(self._parameters.items())]
         self._write(self._directory / PARAMETER_FILE, "".join(lines).encode())
+
+    def load_world(self) -> tuple[dict[str, float], list[str]]:
+        """The simulator's parameters as they were saved, and a line if the file is none."""
+        path = self._directory / WORLD_FILE
+        try:
+            return parse_text(path.read_text(encoding="utf-8")), []
+        except FileNotFoundError:
+            return {}, []
+        except (OSError, UnicodeDecodeError, ParameterError) as error:
+            return {}, [f"{path}: {error}; left out"]
+
+    def keep_world(self, values: Mapping[str, float]) -> None:
+        """Store the simulator's parameters; none are stored as none."""
+        path = self._directory / WORLD_FILE
+        if values:
+            self._write(path, "".join(f"{name} {value!r}\n" for name, value in values.items()).encode())
+        else:
+            path.unlink(missing_ok=True)
 
     def load_signing(self) -> Signing | None:
         """The stored key with a time later than any that was used; StorageError if it is none."""

@@ -127,6 +127,7 @@ ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable tau
 ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
+HEIGHT_SIGMAS = 2.0  # by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
 LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
 LIFT_OFF_US = 1_000_000  # after which a load that is being lifted is off the ground
@@ -236,7 +237,7 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
         if isinstance(leg, Follow):
-            leg, t = leg.coasting(t), 0.0
+            return leg.stopped(t, settings.accel_m_s2)
         slow = slow_leg(leg, t, settings.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
     accel, least_s = settings.accel_m_s2, settings.least_move_s
@@ -304,11 +305,14 @@ def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     asked = asked_of(flight)
     if isinstance(asked, Lean):
         return (Posture(asked, asked_motion(flight, view, settings)[0]),)
-    jet = setpoint(flight, view.now_us)
+    jet, rate = setpoint(flight, view.now_us), pace_of(flight, settings).rate
     if jet is None or flight.legs[0].control_mode != position_mode(flight):
         x, v, a = asked_motion(flight, view, settings)
-        jet = (x, v, a, ZERO, ZERO, ZERO, ZERO)
-    return (begin_following(jet, pace_of(flight, settings).rate),)
+        return (begin_following((x, v, a, ZERO, ZERO, ZERO, ZERO), rate),)
+    leg = flight.legs[0]
+    if isinstance(leg, Follow):
+        return (leg.coasting(leg_time_s(flight, view.now_us), rate),)
+    return (begin_following(jet, rate),)
 
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -322,7 +326,7 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
             _carry(clear, low, settings.lift_speed_m_s, settings),
             Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
         )
-    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT))
+    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + HEIGHT_SIGMAS * view.height_std))
     return (
         *legs,
         _carry(here, low, settings.lift_speed_m_s, settings),
@@ -484,8 +488,9 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             flight = replace(flight, taut_length_m=norm(sub(view.x_quad, view.x_load)))
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
         flight = _over_load(flight, view)
-        if len(flight.legs) == 1 and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
-            flight, settings
+        creeps = len(flight.legs) == 1
+        if creeps and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
+            flight, view, settings
         ):
             text = "Cable never taut, landing; check VEH_CABLE_LEN"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
@@ -545,6 +550,9 @@ def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
 def lost(flight: Flight, now_us: int, settings: Settings) -> bool:
     """Whether nothing is heard any more from the flight's guide."""
     if flight.guide == Guide.OFFBOARD:
+        if settings.guided_mode:
+            stays = isinstance(flight.offboard.asked, Wish) and flight.offboard.asked.is_place
+            return not stays and not flight.offboard.alive(now_us, settings.guided_loss_us)
         return not flight.offboard.alive(now_us, settings.offboard_loss_us)
     return flight.guide == Guide.MANUAL and not flight.manual.alive(now_us, settings.manual_loss_us)
 
@@ -554,6 +562,8 @@ def _guide(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Repo
     if lost(flight, view.now_us, settings):
         text = f"Nothing heard from {flight.guide.value} any more: holding"
         return _to(flight, E.HOLD, view, settings, (WARNING, text))
+    if flight.guide == Guide.ORBIT and flight.circle is not None and view.now_us >= flight.circle.ends_us:
+        return _to(flight, E.HOLD, view, settings, (INFO, "Circle flown: holding"))
     asked, leg = asked_of(flight), flight.legs[0]
     if isinstance(leg, Posture) and isinstance(asked, Lean):
         return replace(flight, legs=(replace(leg, lean=asked),)), Report()
@@ -667,7 +677,6 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight whose load was let go by command: the vehicle goes on alone, a mission is held."""
     if flight.released:
         return flight
-    mission = flight.on_mission
     alone = replace(flight, released=True, slack_since_us=-1, still_since_us=-1)
     if flight.phase in ON_GROUND or flight.phase in (P.SET_DOWN, P.FAILSAFE):
         return alone
@@ -677,7 +686,8 @@ def release(flight: Flight, view: View, settings: Settings) -> Flight:
     alone = replace(alone, legs=())
     if flight.phase == P.GUIDED and isinstance(asked_of(flight), Lean):
         return enter(replace(alone, offboard=SILENT), P.HOLD, view, settings)
-    return enter(alone, P.HOLD if mission else flight.phase, view, settings)
+    held = flight.on_mission or flight.phase == P.MISSION
+    return enter(alone, P.HOLD if held else flight.phase, view, settings)
 
 
 def _watch_touchdown(flight: Flight, view: View, settings: Settings) -> Flight:
@@ -802,11 +812,12 @@ def _watch_fence(flight: Flight, view: View, settings: Settings) -> Flight | tup
     return _to(replace(noted, on_mission=False), event, view, settings, text)
 
 
-def _taut_by(flight: Flight, settings: Settings) -> float:
+def _taut_by(flight: Flight, view: View, settings: Settings) -> float:
     """Height over home that the vehicle need not climb beyond to pull the cable taut."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
-    return creep.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m
+    unsure = HEIGHT_SIGMAS * view.height_std
+    return creep.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m + unsure
 
 
 def _trouble(flight: Flight, view: View, settings: Settings) -> str:

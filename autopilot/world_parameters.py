@@ -1,11 +1,13 @@
 """The simulator's SIM_* parameters, shown to ground stations as if they were ours.
 
 They are learned over the simulator link, once it is up; a ground station's PARAM_SET is handed on, and what
-the simulator then says is what holds. They are not stored: they describe a world, not the autopilot.
+the simulator then says is what holds. They describe a world, not the autopilot, and are stored only where
+PREFLIGHT_STORAGE asks for it; then they are set again in every simulator that is met.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from autopilot.services.records import Event, ParameterChanged
@@ -27,6 +29,7 @@ class WorldParameters:
         self._expected: int | None = None  # how many there are
         self._asks = 0
         self._ask_us = 0
+        self._restored: Mapping[str, float] = {}
         self._wanted: dict[str, tuple[float, int]] = {}  # value, and when it is sent (again)
 
     def owns(self, event: Event) -> bool:
@@ -37,6 +40,10 @@ class WorldParameters:
         """A ground station set a parameter."""
         if name in self._table.learned:
             self._wanted[name] = (value, 0)
+
+    def restore(self, values: Mapping[str, float]) -> None:
+        """Set these in the simulator as soon as it has told that it has them."""
+        self._restored = values
 
     def receive(self, message: Any) -> str | None:
         """Take a message of the simulator in; the name of a value that differs from what we have told."""
@@ -56,6 +63,9 @@ class WorldParameters:
             return None
         text = "Of the simulator, which knows its range"
         self._table.learn(Parameter(name, value, -_ANYTHING, _ANYTHING, "", text))
+        saved = self._restored.get(name, value)
+        if saved != value:
+            self._wanted[name] = (saved, 0)
         return None
 
     def messages(self, now_us: int) -> list[Any]:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from autopilot.estimation.correct_pose import KNOCK_STD, REFUSED_BY_KNOCK, REJECTIONS_BEFORE_RESET
+from autopilot.estimation.correct_pose import (
+    KNOCK_STD,
+    KNOCK_WHEN,
+    REFUSED_BY_KNOCK,
+    REJECTIONS_BEFORE_RESET,
+    knock,
+)
 from autopilot.estimation.correction import (
     Past,
     add_direction,
@@ -94,14 +100,15 @@ def start_load(
 @kernel
 def knocked(load: LoadEstimate, history: History) -> LoadEstimate:
     """The load whose velocity may have jumped."""
-    P = history.covariance
-    aa, ab, bb = load.covariance
-    knock = KNOCK_STD * KNOCK_STD
+    since, variance = load.age_s, KNOCK_STD * KNOCK_STD
     if load.taut > 0.0:
         for i in range(2):
-            P[RATE + i, RATE + i] += knock / (load.length * load.length)
+            knock(history.covariance, DIRECTION + i, RATE + i, KNOCK_STD / load.length, since)
         return load
-    return placed(load, load.x_load, load.v_load, (aa, ab, bb + knock), load.age_s)
+    aa, ab, bb = load.covariance
+    aa += (1.0 + KNOCK_WHEN * KNOCK_WHEN) * since * since * variance
+    cov = (aa, ab + since * variance, bb + variance)
+    return placed(load, load.x_load, load.v_load, cov, load.age_s)
 
 
 @kernel

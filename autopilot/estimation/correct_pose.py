@@ -32,6 +32,7 @@ from autopilot.estimation.records import (
     V_QUAD,
     VELOCITY,
     X_QUAD,
+    Array,
     EstimatorState,
     EstimatorTuning,
     History,
@@ -45,8 +46,10 @@ from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 
 REJECTIONS_BEFORE_RESET = 50.0
 # A hard knock (the ground, a cable that comes taut) is over between two samples of the accelerometer: after
-# so many refusals the velocity may have changed by about so much, m/s.
+# so many refusals the velocity may have changed by about so much, m/s, soon after the last reading that was
+# believed. The place is off by what came of it since.
 REFUSED_BY_KNOCK, KNOCK_STD = 4.0, 0.3
+KNOCK_WHEN = 0.25  # of the time since then: how little is known of when it was
 STARTING_SPEED_STD = 1.0  # m/s, where no velocity is measured
 UNKNOWN_HEIGHT_STD = 1.0  # m, of the barometer's zero
 
@@ -114,6 +117,16 @@ def start_by_pose(
 
 
 @kernel
+def knock(P: Array, value: int, rate: int, std: float, since: float) -> None:
+    """A value whose rate has changed by `std` some `since` seconds ago."""
+    variance = std * std
+    P[value, value] += (1.0 + KNOCK_WHEN * KNOCK_WHEN) * since * since * variance
+    P[value, rate] += since * variance
+    P[rate, value] += since * variance
+    P[rate, rate] += variance
+
+
+@kernel
 def correct_pose(
     state: EstimatorState, history: History, pose: PoseReading, tuning: EstimatorTuning
 ) -> EstimatorState:
@@ -138,7 +151,7 @@ def correct_pose(
         if vehicle.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
             if vehicle.rejected + 1.0 == REFUSED_BY_KNOCK:
                 for i in range(3):
-                    history.covariance[VELOCITY + i, VELOCITY + i] += KNOCK_STD * KNOCK_STD
+                    knock(history.covariance, POSITION + i, VELOCITY + i, KNOCK_STD, vehicle.age_s)
             refused = vehicle_at(vehicle, vehicle.age_s, vehicle.rejected + 1.0)
             return with_vehicle(state, refused, state.resets)
         return start_by_pose(state, history, pose, tuning)

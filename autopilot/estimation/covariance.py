@@ -44,6 +44,7 @@ class Transit(NamedTuple):
     vertical_slow: float
     reversion: float  # of the receiver's slow error, in units of the rate at which it changes
     cable_accel_std: float  # rad/s^2
+    parting_std: float  # m/s, at which the ends of the cable part
 
 
 @kernel
@@ -138,6 +139,7 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
         model = s / to.length + to.cable_accel_std * to.cable_accel_std * dt * dt
         P[RATE, RATE] += model
         P[RATE + 1, RATE + 1] += model
+        P[LENGTH, LENGTH] += to.parting_std * to.parting_std * dt * dt
     if n == SIZE:
         P[BAROMETER, BAROMETER] += tuning.barometer_walk * tuning.barometer_walk * dt
         level, climb = to.horizontal_slow, to.vertical_slow

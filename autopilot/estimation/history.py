@@ -32,6 +32,15 @@ NEVER = -float("inf")
 
 
 @kernel
+def reading_age(elapsed_us: float, imu_age: float) -> float:
+    """Age (s) of a reading by the clock of the estimate, which is of the instant the inertial unit shows.
+
+    No reading overtakes the inertial unit: one that seems to is of the same instant.
+    """
+    return max(0.0, elapsed_us * 1e-6 - imu_age)
+
+
+@kernel
 def remember(state: EstimatorState, history: History) -> None:
     """Write the state into its row of the ring."""
     row = history.ring[state.head]

@@ -34,17 +34,15 @@ from autopilot.estimation.records import (
     LoadEstimate,
     VehicleEstimate,
 )
-from autopilot.estimation.tautness import frame, watch
+from autopilot.estimation.tautness import frame, loosely_tied, watch
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, add, apply, axpy, cross, dot, norm, scale, sub
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on the ground, it is not known
-# For so long after the cable came taut a load that pulls less than this share of a hanging one's is taken as
-# lying: the pendulum then means little.
-LIFTING_S, LIFTING_PULL = 4.0, 0.8
-LIFTING_ACCEL_STD = 5.0  # rad/s^2
+LIFTING_ACCEL_STD = 5.0  # rad/s^2, of a cable that does not carry its load
+PARTING_STD = 0.3  # m/s, at which a tracked load and the vehicle part until the cable carries
 DEBT_TIME_S = 4.0  # in which a plain receiver's corrections are passed on
 SPEED_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
 LAID_WALK = 0.01  # m per square root of a second, of a load that lies where it was laid
@@ -163,6 +161,13 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
 
 
 @kernel
+def pendulum_error(load: LoadEstimate, tuning: EstimatorTuning) -> float:
+    """Standard deviation (rad/s^2) of the hanging load's model; drag grows with the square of the speed."""
+    still, drag = tuning.cable_accel_std, tuning.load_drag * dot(load.v_load, load.v_load) / load.length
+    return sqrt(still * still + drag * drag)
+
+
+@kernel
 def doubt(history: History, load: LoadEstimate, n: int) -> Doubt:
     """Standard deviations of what the covariance says."""
     P = history.covariance
@@ -207,7 +212,7 @@ def predict(
     load, aids = state.load, state.aids
     vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, tuning, dt)
     a = vehicle.accel_quad
-    lying = load.source != TRACKER and load.held_s < LIFTING_S and load.pull < LIFTING_PULL * load.tension
+    loose = loosely_tied(load, state.memory_s)
     motion = Transit(
         (a[0], a[1], a[2] + tuning.gravity),
         R,
@@ -220,7 +225,8 @@ def predict(
         aids.horizontal_slow,
         aids.vertical_slow,
         aids.reversion,
-        LIFTING_ACCEL_STD if lying else tuning.cable_accel_std,
+        LIFTING_ACCEL_STD if loose else pendulum_error(load, tuning),
+        PARTING_STD if loose and load.source == TRACKER else 0.0,
     )
     if vehicle.source > 0.0:
         transit(history, motion, tuning, dt, state.size)

@@ -37,6 +37,10 @@ PULL_TAUT, PULL_SLACK = 0.8, 0.2  # share of the load's weight that must be felt
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 PULL_DISTANCE = 0.75  # share of the cable length below which no pull is believed
 PULL_TIME_S = 0.04  # in which the felt pull is smoothed
+# For so long after the cable came taut a load that pulls less than this share of a hanging one's is taken as
+# lying: pendulum and length then mean little.
+LIFTING_S, LIFTING_PULL = 4.0, 0.8
+REFUSED_LOOSE = 4.0  # readings refused in a row that show the same
 SEEN_S = 1.0  # a cable is not taken as taut while the load has not been seen for so long
 
 
@@ -57,6 +61,20 @@ def felt_pull(
     a = sub(imu.accel, vehicle.accel_bias)
     left = (mass * a[0], mass * a[1], mass * a[2] - thrust)
     return dot(load.q_cable, apply(rotation_from_quat(vehicle.quat_wxyz), left))
+
+
+@kernel
+def loosely_tied(load: LoadEstimate, memory_s: float) -> bool:
+    """Whether a cable that counts as taut does not carry its load yet.
+
+    A tracked load counts as tied some per cent of the cable's length before it is, and readings up to
+    `memory_s` old still show that.
+    """
+    if load.held_s > LIFTING_S:
+        return False
+    if load.source == TRACKER:
+        return not load.pulled_s > memory_s or load.rejected >= REFUSED_LOOSE
+    return load.pull < LIFTING_PULL * load.tension
 
 
 @kernel
@@ -152,7 +170,8 @@ def watch(
     pull = load.pull + share * (felt - load.pull)
     distance = norm(sub(load.x_load, vehicle.x_quad))
     if load.source == TRACKER:
-        load = _with(load, load.taut, load.length, pull, 0.0)
+        carries = load.taut > 0.0 and pull >= LIFTING_PULL * load.tension
+        load = _with(load, load.taut, load.length, pull, load.pulled_s + dt if carries else 0.0)
         speed_var = load.covariance[2] + history.covariance[VELOCITY, VELOCITY]
         known = speed_var < SPEED_KNOWN * SPEED_KNOWN or load.held_s > KNOWN_S
         if load.taut == 0.0 and known and distance > TAUT_ABOVE * tuning.cable_length:

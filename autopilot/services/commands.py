@@ -1,5 +1,8 @@
 """COMMAND_LONG, COMMAND_INT and the mode and item messages that are commands in all but name.
 
+A command that cannot be decided yet (`IN_PROGRESS`) is asked about again until it can: its ACK comes then,
+and until then one that says so. Another that moves the vehicle, or COMMAND_CANCEL, takes its place.
+
 `PARSERS` says for each command how its parameters become a request, or why they are refused. Who decides
 about a request is an argument. Every command addressed to the vehicle gets one COMMAND_ACK, sent to the asker
 alone; a command for somebody else gets nothing.
@@ -9,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
@@ -31,6 +35,7 @@ from autopilot.services.requests import (
     Request,
     RequestCapabilities,
     RequestMessage,
+    ResetParameters,
     ReturnHome,
     RunPrearmChecks,
     SetCurrent,
@@ -42,17 +47,38 @@ from autopilot.services.requests import (
     Takeoff,
     Terminate,
 )
+from autopilot.services.streams import NEVER_US
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED
 UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
+IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
+CANCELLED = 6  # MAV_RESULT, newer than the dialect's copy of the enum
 _REFUSED = (DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 
 FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGroundControl, PX4 and MAVSDK
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
 REPEAT_US = 3_000_000
+ASK_US, TELL_US = 100_000, 500_000  # a command in progress is decided again, and its asker told
+LONGEST_US = 60_000_000  # that a command may be in progress
+_UNKNOWN_PROGRESS = 255
+# What is to be done in place of a command in progress
+_Moving = (
+    Takeoff
+    | Land
+    | ReturnHome
+    | SetMode
+    | StartMission
+    | Pause
+    | Continue
+    | Reposition
+    | ChangeAltitude
+    | Orbit
+    | Terminate
+    | Reboot
+)
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = (0.0, 1.0)  # by number; 0: all of them
 _NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
@@ -234,6 +260,15 @@ def _loiter(call: Call, context: Context) -> Request | Verdict:
     return Pause() if east is None and up is None else Reposition(east, north, up, True)
 
 
+def _loiter_turns(call: Call, context: Context) -> Request | Verdict:
+    if not (math.isfinite(call.p[0]) and call.p[0] > 0.0):
+        return _refused(f"Loiter: param1 = {call.p[0]:g} turns; must be > 0")
+    if call.x == 0.0 and call.y == 0.0:
+        call = call._replace(x=math.nan, y=math.nan, z=call.z or math.nan)
+    asked = _orbit(call._replace(p=(call.p[2], math.nan, 0.0, 0.0)), context)
+    return replace(asked, turns=call.p[0]) if isinstance(asked, Orbit) else asked
+
+
 def _calibrate(call: Call, context: Context) -> Request | Verdict:
     asked = (*call.p, call.x, call.y, call.z)
     if not any(value for value in asked):
@@ -268,8 +303,9 @@ def _reboot(call: Call, context: Context) -> Request | Verdict:
 
 
 def _store_parameters(call: Call, context: Context) -> Request | Verdict:
-    # 0 load, 1 save; others (reset to defaults and the like) are not offered
-    return StoreParameters() if call.p[0] in (0.0, 1.0) else Verdict(UNSUPPORTED)
+    if call.p[0] in (0.0, 1.0):
+        return StoreParameters(save=call.p[0] == 1.0)
+    return ResetParameters() if call.p[0] == 2.0 else Verdict(UNSUPPORTED)
 
 
 def _request_message(call: Call, context: Context) -> Request | Verdict:
@@ -332,6 +368,9 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
     mavlink.MAV_CMD_NAV_LOITER_UNLIM: _loiter,
+    mavlink.MAV_CMD_NAV_LOITER_TIME: _loiter,  # behind it comes nothing: the load stays
+    mavlink.MAV_CMD_NAV_LOITER_TO_ALT: _loiter,
+    mavlink.MAV_CMD_NAV_LOITER_TURNS: _loiter_turns,
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
     mavlink.MAV_CMD_DO_SET_HOME: _set_home,
     mavlink.MAV_CMD_DO_FLIGHTTERMINATION: _terminate,
@@ -367,13 +406,86 @@ class _Done(NamedTuple):
     at_us: int
 
 
+@dataclass(slots=True)
+class _Waiting:
+    """A command in progress."""
+
+    peer: Peer
+    call: str
+    command: int
+    request: Request
+    decide: Decide
+    since_us: int
+    ask_us: int
+    tell_us: int
+
+
 class CommandService:
     """Commands in, COMMAND_ACK out; what happens is decided by the `decide` given with each message."""
 
     def __init__(self, home: Home, flavour: Flavour) -> None:
         self.context = Context(home, flavour)
         self._done: dict[tuple[Peer, int], _Done] = {}
+        self._waiting: _Waiting | None = None
         self._last: tuple[Peer, int] | None = None
+
+    def next_timer(self) -> int:
+        """When `poll` has something to do, in us."""
+        return self._waiting.ask_us if self._waiting else NEVER_US
+
+    def poll(self, now_us: int) -> list[Output]:
+        """Ask again about a command in progress; its end, or that it still goes on."""
+        waiting = self._waiting
+        if waiting is None or now_us < waiting.ask_us:
+            return []
+        verdict = waiting.decide(waiting.request)
+        if verdict.result == IN_PROGRESS and now_us - waiting.since_us >= LONGEST_US:
+            verdict = Verdict(mavlink.MAV_RESULT_FAILED, verdict.text)
+        if verdict.result != IN_PROGRESS:
+            self._waiting = None
+            if verdict.result == ACCEPTED:
+                self._note_done(waiting.peer, waiting.command, waiting.call, verdict, now_us)
+            return _answer(waiting.command, verdict, waiting.peer)
+        waiting.ask_us = now_us + ASK_US
+        if now_us < waiting.tell_us:
+            return []
+        waiting.tell_us = now_us + TELL_US
+        return [_ack(waiting.command, IN_PROGRESS, waiting.peer)]
+
+    def receive_cancel(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """COMMAND_CANCEL; without such a command in progress there is nothing to be said."""
+        return self._give_up() if self._waiting and self._waiting.command == message.command else []
+
+    def _give_up(self) -> list[Output]:
+        waiting, self._waiting = self._waiting, None
+        return [_ack(waiting.command, CANCELLED, waiting.peer)] if waiting else []
+
+    def _conclude(
+        self, call: str, command: int, request: Request, peer: Peer, now_us: int, decide: Decide
+    ) -> list[Output]:
+        """Have a request decided; its answer."""
+        waiting = self._waiting
+        if waiting and (waiting.peer, waiting.command, waiting.call) == (peer, command, call):
+            return [_ack(command, IN_PROGRESS, peer)]
+        verdict = decide(request)
+        if verdict.result in _REFUSED and self._is_repeated(call, command, peer, now_us):
+            return [_ack(command, ACCEPTED, peer)]
+        given_up: list[Output] = []
+        supersedes = isinstance(request, _Moving) or request == Arm(False, False)
+        if verdict.result == IN_PROGRESS or (supersedes and verdict.result == ACCEPTED):
+            given_up = self._give_up()
+        if verdict.result == IN_PROGRESS:
+            self._waiting = _Waiting(
+                peer, call, command, request, decide, now_us, now_us + ASK_US, now_us + TELL_US
+            )
+        if verdict.result == ACCEPTED and not isinstance(request, Answered):
+            self._note_done(peer, command, call, verdict, now_us)
+        return given_up + _answer(command, verdict, peer)
+
+    def _note_done(self, peer: Peer, command: int, call: str, verdict: Verdict, now_us: int) -> None:
+        self._done = {k: d for k, d in self._done.items() if now_us - d.at_us <= REPEAT_US}
+        self._done[peer, command] = _Done(call, verdict, now_us)
+        self._last = (peer, command)
 
     def receive_long(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute COMMAND_LONG."""
@@ -393,8 +505,10 @@ class CommandService:
         request: Request | Verdict = Verdict(UNSUPPORTED, "Set mode: only custom modes are known")
         if message.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             request = _mode_of_number(message.custom_mode, self.context)
-        verdict = request if isinstance(request, Verdict) else decide(request)
-        return _answer(mavlink.MAV_CMD_DO_SET_MODE, verdict, peer)
+        command = mavlink.MAV_CMD_DO_SET_MODE
+        if isinstance(request, Verdict):
+            return _answer(command, request, peer)
+        return self._conclude(repr(request), command, request, peer, now_us, decide)
 
     def receive_set_current(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Execute MISSION_SET_CURRENT; it is answered by MISSION_CURRENT, a refusal also by a text."""
@@ -407,25 +521,20 @@ class CommandService:
         if parser is None:
             return [_ack(call.command, UNSUPPORTED, peer)]
         request = parser(call, self.context)
-        verdict = request if isinstance(request, Verdict) else decide(request)
-        if verdict.result in _REFUSED and self._is_repeated(call, peer, now_us):
-            return [_ack(call.command, ACCEPTED, peer)]
-        if verdict.result == ACCEPTED and not isinstance(request, Answered):
-            self._done = {k: d for k, d in self._done.items() if now_us - d.at_us <= REPEAT_US}
-            self._done[peer, call.command] = _Done(repr(call), verdict, now_us)
-            self._last = (peer, call.command)
-        outputs = _answer(call.command, verdict, peer)
+        if isinstance(request, Verdict):
+            return _answer(call.command, request, peer)
+        outputs = self._conclude(repr(call), call.command, request, peer, now_us, decide)
         if isinstance(request, SetCurrent):
             outputs.append(Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,)))
         return outputs
 
-    def _is_repeated(self, call: Call, peer: Peer, now_us: int) -> bool:
+    def _is_repeated(self, call: str, command: int, peer: Peer, now_us: int) -> bool:
         """The command that was accepted last, again: its ACK was lost, and some clients never say that they
         repeat it. What it asked for may be so far under way that it cannot be asked for any more."""
-        done = self._done.get((peer, call.command))
-        if self._last != (peer, call.command) or done is None:
+        done = self._done.get((peer, command))
+        if self._last != (peer, command) or done is None:
             return False
-        return done.call == repr(call) and now_us - done.at_us <= REPEAT_US
+        return done.call == call and now_us - done.at_us <= REPEAT_US
 
 
 def _said(verdict: Verdict) -> list[Output]:
@@ -438,7 +547,11 @@ def _said(verdict: Verdict) -> list[Output]:
 
 def _ack(command: int, result: int, peer: Peer) -> Output:
     message = mavlink.MAVLink_command_ack_message(
-        command, result, target_system=peer.system, target_component=peer.component
+        command,
+        result,
+        progress=_UNKNOWN_PROGRESS if result == IN_PROGRESS else 0,
+        target_system=peer.system,
+        target_component=peer.component,
     )
     return Send(peer.link, message)
 

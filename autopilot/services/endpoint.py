@@ -42,14 +42,17 @@ from autopilot.services.records import (
     Say,
     Send,
     Verdict,
+    WorldSaved,
 )
 from autopilot.services.requests import (
     FollowAttitude,
     FollowSetpoint,
     FollowStick,
     GetMessageInterval,
+    Reposition,
     RequestCapabilities,
     RequestMessage,
+    ResetParameters,
     SetMessageInterval,
     SetMode,
     StoreParameters,
@@ -67,6 +70,7 @@ from autopilot.wire.parameters import ParameterTable
 from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
+PLANS = (mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 REACHED_AGAIN = 4  # times that the end of a mission is said again
 REACHED_US = 300_000  # between two of them
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
@@ -112,7 +116,14 @@ class VehicleEndpoint:
         self.files = FileTree(MemoryCard() if card is None else card, made)
         self._ftp = FtpService(self.files)
         self._logs = LogService(self.files)
-        self._timed = (self._signing, self._missions, self._parameters, self._ftp, self._logs)
+        self._timed = (
+            self._signing,
+            self._commands,
+            self._missions,
+            self._parameters,
+            self._ftp,
+            self._logs,
+        )
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._table: dict[int, Stream] = dict(STREAMS)
@@ -121,6 +132,7 @@ class VehicleEndpoint:
         self._defaults = {key: stream.interval_us for key, stream in self._table.items()}
         self._watched: dict[int, Any] = {}
         self._asked_mode: int | None = None
+        self._consequences: list[Output] = []  # of a decision
         self._work = False  # something waits in a queue
         self._events: list[Event] = []  # of `poll`, until they are taken
         self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
@@ -170,7 +182,13 @@ class VehicleEndpoint:
                 peer = Peer(link, received.system, received.component)
                 wrapped = self._decider(state, peer, now_us, decide)
                 self._do(handler(received.message, peer, now_us, wrapped), events)
+                self._follow_up(events)
         return events
+
+    def _follow_up(self, events: list[Event]) -> None:
+        """What came of a decision besides its answer."""
+        consequences, self._consequences = self._consequences, []
+        self._do(consequences, events)
 
     def tell_time(self, unix_us: int) -> None:
         """The wall clock, by which messages are signed where the vehicle's clock is not in step with it."""
@@ -186,8 +204,10 @@ class VehicleEndpoint:
         self._do([Say(severity, text)], [])
 
     def item_reached(self, seq: int, last: bool = False) -> None:
-        """The mission came to the end of an item. Of the last one it is said a few times: some clients learn
-        by nothing else that a mission is over."""
+        """The mission came to the end of an item.
+
+        Of the last one this is said a few times: some clients learn by nothing else that a mission is over.
+        """
         self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
         self._reached, self._reached_us = seq, None
         self._reached_left = REACHED_AGAIN if last else 0
@@ -210,11 +230,7 @@ class VehicleEndpoint:
             self._work
             or (self._reached_left > 0 and (self._reached_us is None or now_us >= self._reached_us))
             or any(state.streams.next_us <= now_us for state in self._links.values())
-            or self._signing.next_timer() <= now_us
-            or self._missions.next_timer() <= now_us
-            or self._parameters.next_timer() <= now_us
-            or self._ftp.next_timer() <= now_us
-            or self._logs.next_timer() <= now_us
+            or any(service.next_timer() <= now_us for service in self._timed)
         )
 
     def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:
@@ -224,11 +240,15 @@ class VehicleEndpoint:
         self._forget_silent(now_us)
         for service in self._timed:
             self._do(service.poll(now_us), self._events)
+        self._follow_up(self._events)
         self._say_reached_again(now_us)
         self._work = False
         taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
         if any(taken.values()) or any(state.announced for state in self._links.values()):
-            snapshot = make_snapshot()._replace(asked_mode=self._asked_mode)
+            plans = [self._missions.plan_id(kind) for kind in PLANS]
+            snapshot = make_snapshot()._replace(
+                asked_mode=self._asked_mode, plan_ids=(plans[0], plans[1], plans[2])
+            )
             self._watch(snapshot)
         datagrams: list[tuple[Link, bytes]] = []
         built: dict[int, list[Outgoing]] = {}
@@ -351,7 +371,9 @@ class VehicleEndpoint:
 
         def decided(request: Any) -> Verdict:
             match request:
-                case StoreParameters():
+                case StoreParameters(save):
+                    if save and self._parameters.table.learned:
+                        self._consequences.append(self._parameters.world())
                     return _ACCEPTED
                 case RequestCapabilities():
                     return self._request_message(
@@ -364,9 +386,13 @@ class VehicleEndpoint:
                 case SetMessageInterval(message_id, interval_us):
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
+            if verdict.result == mavlink.MAV_RESULT_ACCEPTED and isinstance(request, ResetParameters):
+                self._consequences += [*self._parameters.reset(), WorldSaved({})]
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 if isinstance(request, SetMode):
                     self._asked_mode = request.number
+                elif isinstance(request, Reposition):
+                    self._asked_mode = None
                 self.state_changed()
             return verdict
 
@@ -428,6 +454,7 @@ class VehicleEndpoint:
         return {
             m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
+            m.MAVLINK_MSG_ID_COMMAND_CANCEL: commands.receive_cancel,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,

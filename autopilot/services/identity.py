@@ -26,6 +26,8 @@ _AUTO_FLAGS = (
 )
 _MANUAL_FLAGS = _CUSTOM | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 
+ARDUPILOT_GUIDED = 4  # ArduPilot's mode for take-off, "go there" and setpoints
+
 # PX4's main modes and the sub-modes of AUTO
 MANUAL, ALTCTL, POSCTL, AUTO, ACRO, OFFBOARD, STABILIZED = 1, 2, 3, 4, 5, 6, 7
 AUTO_TAKEOFF, AUTO_LOITER, AUTO_MISSION, AUTO_RTL, AUTO_LAND = 2, 3, 4, 5, 6
@@ -187,14 +189,14 @@ ARDUPILOT = Flavour(
     autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
     modes=(
         # GUIDED is where take-off, "go there" and holding happen; in a request it means holding
-        _ardupilot(4, "GUIDED", AUTO, AUTO_LOITER),
+        _ardupilot(ARDUPILOT_GUIDED, "GUIDED", AUTO, AUTO_LOITER),
         _ardupilot(5, "LOITER", AUTO, AUTO_LOITER),
         _ardupilot(17, "BRAKE", AUTO, AUTO_LOITER),
         _ardupilot(3, "AUTO", AUTO, AUTO_MISSION),
         _ardupilot(6, "RTL", AUTO, AUTO_RTL),
         _ardupilot(9, "LAND", AUTO, AUTO_LAND),
-        _ardupilot(4, "GUIDED", AUTO, AUTO_TAKEOFF),
-        _ardupilot(4, "GUIDED", OFFBOARD),
+        _ardupilot(ARDUPILOT_GUIDED, "GUIDED", AUTO, AUTO_TAKEOFF),
+        _ardupilot(ARDUPILOT_GUIDED, "GUIDED", OFFBOARD),
         _ardupilot(0, "STABILIZE", STABILIZED),
         _ardupilot(0, "STABILIZE", MANUAL),
         _ardupilot(1, "ACRO", ACRO),

@@ -61,6 +61,14 @@ def serialise(items: tuple[WireItem, ...]) -> bytes:
     return body + _CHECK.pack(zlib.crc32(body))
 
 
+def plan_id(items: tuple[WireItem, ...]) -> int:
+    """Number of this version of a plan, the same after a restart; 0: there is none."""
+    if not items:
+        return 0
+    check: int = _CHECK.unpack(serialise(items)[-_CHECK.size :])[0]
+    return check or 1
+
+
 def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
     """The mission in `data`; anything but what `serialise` wrote is `CorruptMission`."""
     items = deserialise_items(data)

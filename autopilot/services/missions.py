@@ -25,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from autopilot.services.mission_store import MAX_ITEMS, StoredMission
+from autopilot.services.mission_store import MAX_ITEMS, StoredMission, plan_id
 from autopilot.services.records import Announce, AreasChanged, Decide, MissionChanged, Output, Peer, Say, Send
 from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
@@ -105,6 +105,15 @@ class MissionService:
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
         self._ended: _Ended | None = None
+        self._numbered: dict[int, tuple[tuple[WireItem, ...], int]] = {}
+
+    def plan_id(self, kind: int) -> int:
+        """Number of the version of a plan in force (MAV_MISSION_TYPE); 0: there is none."""
+        items = self.mission.items if kind == _MISSION else self.areas.get(kind, ())
+        known = self._numbered.get(kind)
+        if known is None or known[0] is not items:
+            known = self._numbered[kind] = (items, plan_id(items))
+        return known[1]
 
     # ---- upload
 
@@ -125,7 +134,7 @@ class MissionService:
             return refused
         if count == 0:
             done = self._area_replaced(kind, ()) if kind in _AREAS else self._replaced(StoredMission())
-            return [*done, _ack(peer, _ACCEPTED, kind)]
+            return [*done, self._accepted(peer, kind)]
         self._upload = _Upload(peer, count, now_us + ASK_US, kind)
         return [self._ask()]
 
@@ -155,7 +164,7 @@ class MissionService:
         if upload is None and ended and now_us >= ended.echo_us:
             left = ended.echoes - 1
             self._ended = replace(ended, echoes=left, echo_us=now_us + ECHO_US if left else NEVER_US)
-            return [_ack(ended.peer, ended.result, ended.kind)]
+            return [self._said_again(ended)]
         if upload is None or now_us < upload.ask_again_us:
             return []
         if upload.asks == MAX_ASKS:
@@ -224,7 +233,7 @@ class MissionService:
             if kind in _AREAS:
                 _READERS[kind](items, self.home)
                 self._end(_ACCEPTED, now_us)
-                return [*self._area_replaced(kind, items), _ack(upload.peer, _ACCEPTED, kind)]
+                return [*self._area_replaced(kind, items), self._accepted(upload.peer, kind)]
             steps = located_steps(items, self.home)
         except MissionItemError as error:
             self._end(error.result, now_us)
@@ -234,7 +243,11 @@ class MissionService:
             self._end(mavlink.MAV_MISSION_DENIED, now_us)
             return refused
         self._end(_ACCEPTED, now_us)
-        return [*self._replaced(StoredMission(items, steps)), _ack(upload.peer, _ACCEPTED)]
+        return [*self._replaced(StoredMission(items, steps)), self._accepted(upload.peer, kind)]
+
+    def _accepted(self, peer: Peer, kind: int) -> Output:
+        """The acknowledgement of a plan that is in force by now."""
+        return _ack(peer, _ACCEPTED, kind, self.plan_id(kind))
 
     def _late_item(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
         ended = self._ended
@@ -245,8 +258,13 @@ class MissionService:
             and message.mission_type == ended.kind
             and now_us - ended.at_us <= LATE_US
         ):
-            return [_ack(peer, ended.result, ended.kind)]
+            return [self._said_again(ended)]
         return []
+
+    def _said_again(self, ended: _Ended) -> Output:
+        if ended.result == _ACCEPTED:
+            return self._accepted(ended.peer, ended.kind)
+        return _ack(ended.peer, ended.result, ended.kind)
 
     def _end(self, result: int, now_us: int) -> None:
         upload, self._upload = self._upload, None
@@ -314,7 +332,7 @@ class MissionService:
         if self.areas[kind] == items:
             return []
         self.areas[kind] = items
-        return [AreasChanged(kind, items)]
+        return [AreasChanged(kind, items), Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
 
     def _replaced(self, mission: StoredMission) -> list[Output]:
         self.mission = mission
@@ -329,7 +347,9 @@ class MissionService:
         if kind != _MISSION and kind not in _AREAS:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
         count = len(self._items_of(kind))
-        answer = mavlink.MAVLink_mission_count_message(peer.system, peer.component, count, kind)
+        answer = mavlink.MAVLink_mission_count_message(
+            peer.system, peer.component, count, kind, opaque_id=self.plan_id(kind)
+        )
         return [Send(peer.link, answer)]
 
     def _items_of(self, kind: int) -> tuple[WireItem, ...]:
@@ -388,8 +408,9 @@ def _home_item(home: Home) -> WireItem:
     return WireItem(frame, command, 1, 1, 0.0, 0.0, 0.0, 0.0, x, y, home.altitude_m)
 
 
-def _ack(peer: Peer, result: int, kind: int = _MISSION) -> Output:
-    return Send(peer.link, mavlink.MAVLink_mission_ack_message(peer.system, peer.component, result, kind))
+def _ack(peer: Peer, result: int, kind: int = _MISSION, number: int = 0) -> Output:
+    answer = mavlink.MAVLink_mission_ack_message(peer.system, peer.component, result, kind, opaque_id=number)
+    return Send(peer.link, answer)
 
 
 def _item_of_int(m: Any) -> WireItem:

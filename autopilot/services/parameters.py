@@ -8,7 +8,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from autopilot.services.records import Decide, Link, Output, ParameterChanged, Peer, Say, Send
+from autopilot.services.records import (
+    Decide,
+    Link,
+    Output,
+    ParameterChanged,
+    Peer,
+    Say,
+    Send,
+    WorldSaved,
+)
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameters import ParameterError, ParameterTable, decimal_from_float32
@@ -68,6 +77,28 @@ class ParameterService:
         if after == before:
             return [Send(peer.link, self.value_message(name))]
         return [Send(None, self.value_message(name)), ParameterChanged(name, after)]
+
+    def reset(self) -> list[Output]:
+        """Every parameter back to its default, but for those that are fixed while running."""
+        outputs: list[Output] = []
+        kept = 0
+        for name, value in self.table.changed().items():
+            default = self.table.describe(name).default
+            try:
+                self.table.set(name, default)
+            except ParameterError:
+                kept += 1
+                continue
+            if self.table[name] != value:
+                outputs += [Send(None, self.value_message(name)), ParameterChanged(name, default)]
+        text = f"{len(outputs) // 2} parameters are at their default again"
+        if kept:
+            text += f"; {kept} are fixed while running"
+        return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
+
+    def world(self) -> WorldSaved:
+        """What the simulator's parameters are now."""
+        return WorldSaved({name: self.table[name] for name in sorted(self.table.learned)})
 
     def value_message(self, name: str) -> Any:
         """PARAM_VALUE of the value in force."""

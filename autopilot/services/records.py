@@ -7,7 +7,7 @@ shell, named as facts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -89,7 +89,14 @@ class SigningChanged:
     timestamp: int
 
 
-Event = ParameterChanged | MissionChanged | AreasChanged | TimesyncAnswered | SigningChanged
+@dataclass(frozen=True, slots=True)
+class WorldSaved:
+    """The simulator's parameters are to be as they are now after a restart as well (none: as it likes)."""
+
+    values: Mapping[str, float]
+
+
+Event = ParameterChanged | MissionChanged | AreasChanged | TimesyncAnswered | SigningChanged | WorldSaved
 Output = Send | Say | Announce | Event
 
 

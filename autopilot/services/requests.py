@@ -126,6 +126,7 @@ class Orbit:
     east_m: float | None
     north_m: float | None
     altitude_m: float | None
+    turns: float | None = None  # after which the load is held; None: for ever
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +179,15 @@ class Reboot:
 
 @dataclass(frozen=True, slots=True)
 class StoreParameters:
-    """Save or load the parameters: both always in effect, because each change is stored at once."""
+    """Save the parameters (`save`) or load them. Our own are stored when they change; those of the simulator
+    are saved by this alone."""
+
+    save: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ResetParameters:
+    """Bring every parameter back to its default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,6 +247,7 @@ Decided = (
     | Terminate
     | RunPrearmChecks
     | Reboot
+    | ResetParameters
     | ChangeSigningKey
 )
 Answered = StoreParameters | RequestMessage | SetMessageInterval | GetMessageInterval | RequestCapabilities

@@ -133,3 +133,4 @@ class Snapshot(NamedTuple):
     mission_current: int = 0
     mission_total: int = 0
     mission_state: int = mavlink.MISSION_STATE_NO_MISSION
+    plan_ids: tuple[int, int, int] = (0, 0, 0)  # of mission, fence, rally points; 0: there is none

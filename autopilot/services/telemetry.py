@@ -15,6 +15,8 @@ from autopilot.geometry.frames import ned_from_enu
 from autopilot.geometry.linear import cross, dot
 from autopilot.services.heartbeat import HEARTBEAT_US, heartbeat_message, load_heartbeat_message
 from autopilot.services.identity import (
+    AUTO,
+    AUTO_MISSION,
     AUTOPILOT_COMPONENT,
     DIALECT_COMPONENT,
     LOAD_COMPONENT,
@@ -54,6 +56,7 @@ _UINT16 = 0xFFFF  # "unknown" in most unsigned fields
 _INT16 = 0x7FFF  # "unknown" temperature
 _UINT32 = 0xFFFFFFFF
 _ESTIMATED = mavlink.PLUMBLINE_SOURCE_ESTIMATED
+_IN_MISSION_MODE, _SUSPENDED = 1, 2  # MISSION_CURRENT.mission_mode
 _PWM_STOP, _PWM_FULL = 1000, 2000  # SERVO_OUTPUT_RAW as most tools expect it, us
 
 
@@ -190,7 +193,19 @@ def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _mission_current(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     seq, total = uint16(s.mission_current), uint16(s.mission_total)
-    return (mavlink.MAVLink_mission_current_message(seq, total, s.mission_state),)
+    flies = (s.main_mode, s.sub_mode) == (AUTO, AUTO_MISSION)
+    mission, fence, rally = s.plan_ids
+    return (
+        mavlink.MAVLink_mission_current_message(
+            seq,
+            total,
+            s.mission_state,
+            mission_mode=_IN_MISSION_MODE if flies else _SUSPENDED,
+            mission_id=mission,
+            fence_id=fence,
+            rally_points_id=rally,
+        ),
+    )
 
 
 def _system_time(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -426,7 +441,12 @@ LOAD_STREAMS: dict[int, Stream] = {
 WATCHED: dict[int, Callable[[Snapshot], tuple[Any, ...]]] = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: lambda s: (s.armed, s.main_mode, s.sub_mode, s.system_status),
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda s: (s.landed_state,),
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda s: (s.mission_current, s.mission_total, s.mission_state),
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda s: (
+        s.mission_current,
+        s.mission_total,
+        s.mission_state,
+        s.plan_ids,
+    ),
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: lambda s: (s.home, s.launch),
     mavlink.MAVLINK_MSG_ID_FENCE_STATUS: lambda s: (s.breach, s.breaches),
 }

@@ -13,14 +13,19 @@ TUNED_FOR_KG = 0.4  # mass of the vehicle for which the QP_ gains are given; the
 
 
 # what a builder measures on the bench: the autopilot is told of it where the world is
-MEASURED = {"SIM_ACT_DELAY_MS": "VEH_ACT_DELAY", "SIM_ROTOR_TAU_MS": "VEH_ROTOR_TAU"}
+MEASURED = {
+    "SIM_ACT_DELAY_MS": "VEH_ACT_DELAY",
+    "SIM_ROTOR_TAU_MS": "VEH_ROTOR_TAU",
+    "SIM_SENS_LAT_MS": "VEH_IMU_DELAY",
+}
 
 
 def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]]) -> None:
     """Set what is the autopilot's; SIM_ parameters that it does not know belong to the simulator.
 
-    Delay and lag of the rotors that are given to the simulator are believed as well, unless the belief is
-    given, too: then the two differ, which is the experiment.
+    Delay and lag of the rotors and latency of the sensors that are given to the simulator are believed as
+    well, as far as a belief may go, unless the belief is given, too: then the two differ, which is the
+    experiment.
     """
     given = list(settings)
     names = {name for name, _ in given}
@@ -28,7 +33,8 @@ def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]])
         if name in table or not name.startswith("SIM_"):
             table.set(name, value)
         elif name in MEASURED and MEASURED[name] not in names:
-            table.set(MEASURED[name], value)
+            belief = table.describe(MEASURED[name])
+            table.set(belief.name, min(max(value, belief.low), belief.high))
 
 
 def autopilot_parameters(belief: Belief) -> ParameterTable:
@@ -72,6 +78,7 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
                 "Drag torque for each newton of rotor force",
             ),
             p("VEH_ACT_DELAY", 0.0, 0.0, 200.0, "ms", "Believed transport delay of actuator commands"),
+            p("VEH_IMU_DELAY", 0.0, 0.0, 100.0, "ms", "Believed age of an inertial sample when it comes"),
             p(
                 "VEH_ROTOR_TAU",
                 1e3 * belief.rotor_tau_s,
@@ -182,6 +189,14 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("EST_ACC_WALK", 1e-3, 0.0, 1.0, "m/s^2", "Believed accelerometer bias walk in a second"),
             p("EST_GYRO_BIAS", 0.01, 1e-6, 1.0, "rad/s", "Believed gyro bias at switch-on"),
             p("EST_ACC_BIAS", 0.1, 1e-6, 10.0, "m/s^2", "Believed accelerometer bias at switch-on"),
+            p(
+                "EST_LOAD_DRAG",
+                0.005,
+                0.0,
+                10.0,
+                "1/m",
+                "Believed size of the drag on the load: acceleration over square of speed",
+            ),
             p("EST_LEN_STD", 0.01, 1e-6, 10.0, "m", "Believed error of VEH_CABLE_LEN"),
             p(
                 "EST_RTK_NEW",
@@ -334,6 +349,14 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
                 60.0,
                 "s",
                 "Silence of a setpoint stream after which the load is held",
+            ),
+            p(
+                "GUID_TIMEOUT",
+                3.0,
+                0.1,
+                60.0,
+                "s",
+                "The same of velocities and attitudes in ArduPilot's GUIDED; a place stays asked for",
             ),
             p("COM_RC_LOSS_T", 0.5, 0.1, 60.0, "s", "The same of MANUAL_CONTROL"),
             p("MPC_VEL_MANUAL", 1.0, 0.05, 15.0, "m/s", "Speed of the load for a stick pushed home"),

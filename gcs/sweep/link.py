@@ -18,6 +18,7 @@ from autopilot.estimation.correct_load import correct_load
 from autopilot.estimation.correct_magnetic import correct_magnetic
 from autopilot.estimation.correct_pose import correct_pose
 from autopilot.estimation.correct_standing import correct_standing
+from autopilot.estimation.correct_tautened import correct_tautened
 from autopilot.estimation.filter import (
     ATTITUDE_STD_TO_FLY,
     COASTING_S,
@@ -26,6 +27,7 @@ from autopilot.estimation.filter import (
     POSITION_STD_TO_FLY,
     PROMISE,
 )
+from autopilot.estimation.history import reading_age
 from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     CAMERA,
@@ -168,8 +170,13 @@ def _fix(row: Floats, age_s: float, link: LinkModel) -> GnssReading:
 
 
 @kernel
-def _fresh(row: Floats, now_us: int) -> bool:
-    return bool(0.0 <= (now_us - row[SHOWS]) * 1e-6 <= OLDEST_READING_S)
+def _age(row: Floats, now_us: int, tuning: EstimatorTuning) -> float:
+    return reading_age(now_us - row[SHOWS], tuning.imu_age)
+
+
+@kernel
+def _fresh(row: Floats, now_us: int, tuning: EstimatorTuning) -> bool:
+    return bool(row[SHOWS] <= now_us and _age(row, now_us, tuning) <= OLDEST_READING_S)
 
 
 @kernel
@@ -196,10 +203,10 @@ def by_poses(
     at = arrived(MOCAP, now_us, buffers)
     while at >= 0:
         row = buffers.queue[MOCAP, at]
-        pose = _pose(row, (now_us - row[SHOWS]) * 1e-6, link)
+        pose = _pose(row, _age(row, now_us, tuning), link)
         q = pose.quat_wxyz
         sound = _finite3(pose.x_quad) and _finite3(pose.v_quad) and isfinite(q[0] + q[1] + q[2] + q[3])
-        if sound and _fresh(row, now_us):
+        if sound and _fresh(row, now_us, tuning):
             state = correct_pose(state, history, pose, tuning)
         at = arrived(MOCAP, now_us, buffers)
     return state
@@ -219,9 +226,9 @@ def by_loads(
     at = arrived(LOAD, now_us, buffers)
     while at >= 0:
         row = buffers.queue[LOAD, at]
-        load = _load(row, (now_us - row[SHOWS]) * 1e-6, link)
+        load = _load(row, _age(row, now_us, tuning), link)
         sound = _finite3(load.x_load) and _finite3(load.v_load)
-        if accepted and sound and _fresh(row, now_us):
+        if accepted and sound and _fresh(row, now_us, tuning):
             state = correct_load(state, history, load, tuning)
         at = arrived(LOAD, now_us, buffers)
     return state
@@ -262,8 +269,8 @@ def by_fix(
         at = arrived(GNSS, now_us, buffers)
     if newest >= 0:
         row = buffers.queue[GNSS, newest]
-        fix = _fix(row, (now_us - row[SHOWS]) * 1e-6, link)
-        if _finite3(fix.position) and _finite3(fix.velocity) and _fresh(row, now_us):
+        fix = _fix(row, _age(row, now_us, tuning), link)
+        if _finite3(fix.position) and _finite3(fix.velocity) and _fresh(row, now_us, tuning):
             state = correct_gnss(state, history, fix, tuning)
     return state
 
@@ -305,10 +312,8 @@ def by_sights(
         row = buffers.queue[CABLE, at]
         seen = _single3(row, READING)
         length = norm(seen)
-        if row[READING + 3] > 0.0 and 0.5 < length < 2.0 and _fresh(row, now_us):
-            sight = DirectionReading(
-                (now_us - row[SHOWS]) * 1e-6, scale(1.0 / length, seen), link.direction_std
-            )
+        if row[READING + 3] > 0.0 and 0.5 < length < 2.0 and _fresh(row, now_us, tuning):
+            sight = DirectionReading(_age(row, now_us, tuning), scale(1.0 / length, seen), link.direction_std)
             state = correct_direction(state, history, sight, tuning)
         at = arrived(CABLE, now_us, buffers)
     return state
@@ -335,7 +340,9 @@ def estimate(
     used = state.last_imu
     if norm(inertial.accel) < GREATEST_ACCEL_M_S2 and norm(inertial.gyro) < GREATEST_RATE_RAD_S:
         used = inertial
+    load = state.load
     state = predict(state, history, used, tuning, dt, thrust)
+    state = correct_tautened(state, history, load, tuning)
     state = by_poses(state, history, now_us, buffers, link, tuning)
     state = by_field(state, history, now_us, buffers, tuning)
     state = by_fix(state, history, now_us, buffers, link, tuning)

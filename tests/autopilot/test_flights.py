@@ -7,6 +7,7 @@ import io
 import pytest
 
 from autopilot.flight import Phase
+from autopilot.geometry.linear import norm, sub
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
 from gcs.closed_loop import Conditions, fly
@@ -38,6 +39,38 @@ def test_hovering_holds_the_load_and_lands_beside_it(sensors: str) -> None:
     assert truth.x_quad[2] < TRUTH.gear_height + GROUND
     assert sum(truth.rotor_force) < 0.01
     assert abs(truth.x_quad[0] - truth.x_load[0]) > TRUTH.load_radius + 0.1, "beside, not upon"
+
+
+@pytest.mark.parametrize(("scale", "seed"), [(0.1, 2), (0.1, 7), (0.25, 3)])
+def test_quiet_trackers_lift_and_set_down(scale: float, seed: int) -> None:
+    """What the model of the taut cable leaves out is more than the noise of such readings."""
+    craft = Craft(Takeoff(1.0), Land(), seed=seed, SIM_NOISE_SCALE=scale)
+    craft.begin()
+    craft.run(at_phase(Phase.DISARMED))
+    assert craft.texts[-1] == "Landed, disarmed"
+
+
+def test_sensors_all_late_are_flown_with_if_that_is_known() -> None:
+    """The estimate is of the instant that the inertial unit shows, the command for that at which it acts."""
+    ticks, late_ms = 10, 40.0
+    craft = Craft(Takeoff(1.0), Waypoint(6.0, 0.0, 1.0), Land(), SIM_SENS_LAT_MS=late_ms)
+    craft.begin()
+    craft.run(at_phase(Phase.MISSION))
+    truths = []
+    off = fastest = 0.0
+    while craft.flight.phase == Phase.MISSION:
+        truths.append(craft.truth)
+        craft.tick()
+        fastest = max(fastest, norm(craft.truth.v_load))
+        if len(truths) > ticks:
+            estimated, then = craft.onboard._state.estimator.load.x_load, truths[-1 - ticks].x_load
+            off = max(off, norm(sub(estimated, then)))
+    assert fastest > 1.2  # within 40 ms the load moves 50 mm
+    assert 0.0 < off < 0.003  # 1 mm
+    craft.run(at_phase(Phase.LOWER))
+    assert craft.worst_error < HELD["lab"]
+    craft.run(at_phase(Phase.DISARMED))
+    assert craft.texts[-1] == "Landed, disarmed"
 
 
 @pytest.mark.parametrize("distance", [0.02, 0.1, 0.3])

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.flight import Guide, Phase, pace_of
+from autopilot.flight import Guide, Phase, pace_of, setpoint
 from autopilot.following import NOWHERE, Circle, Follow, Pace, Posture, Wish, begin_following, governed
 from autopilot.geometry.linear import ZERO, Vec3, norm, sub
+from autopilot.guidance import LOAD_POSITION, transfer_leg
 from autopilot.services import identity
 from autopilot.services.requests import (
     Arm,
@@ -24,9 +26,11 @@ from autopilot.services.requests import (
     ReturnHome,
     SetHome,
     SetMode,
+    Takeoff,
 )
 from autopilot.telemetry_view import mode_of
 from autopilot.wire.dialect import plumbline as m
+from missions import model
 
 from .conftest import ACCEPTED, CABLE_LENGTH, SETTINGS, STEP_US, TICK_S, Craft, Sky
 
@@ -94,6 +98,38 @@ def test_no_derivative_jumps_whatever_is_asked(asked: list[Vec3], kinds: list[bo
             leg = after
 
 
+@settings(max_examples=60, deadline=None)
+@given(at_s=st.floats(0.0, 9.7), place=vectors, is_place=st.booleans())
+def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: Vec3, is_place: bool) -> None:
+    before = transfer_leg((0.0, 0.0, 3.0), (10.0, 0.0, 3.0), 3.0, PACE.accel, LOAD_POSITION)
+    wish = Wish(place) if is_place else Wish(velocity=place)
+    *jets, _ = led(wish, 3.0, begin_following(before.jet(at_s), PACE.rate))
+    # 300 of them: 1.50 m/s^2 and 5.9 m/s^3; with a point begun at the velocity alone 1.63 and 16.5
+    assert max(norm(jet[2]) for jet in jets) < 1.05 * PACE.accel
+    assert max(norm(jet[3]) for jet in jets) < 8.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(height=st.floats(0.3, 6.0), wish=vectors, seconds=st.floats(0.1, 8.0))
+def test_it_comes_to_rest_over_the_floor_wherever_it_was_led(
+    height: float, wish: Vec3, seconds: float
+) -> None:
+    leg = begin_following(((0.0, 0.0, height), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    *_, leg = led(Wish(velocity=wish), seconds, leg)
+    legs, end = leg.stopped(0.013, PACE.accel)
+    last = leg.jet(0.013)
+    for leg in legs:
+        for n, (before_, after_) in enumerate(zip(last, leg.jet(0.0), strict=True)):
+            assert norm(sub(before_, after_)) <= 1e-9 * 40.0 * PACE.rate**n
+        for k in range(21):
+            jet = leg.jet(k / 20 * leg.duration_s)
+            # 300 of them: no lower than 0.29999 m, and 1.50 m/s^2
+            assert jet[0][2] > 0.299
+            assert norm(jet[2]) < 1.05 * PACE.accel
+        last = leg.jet(leg.duration_s)
+    assert norm(sub(last[0], end)) < 1e-9 and norm(last[1]) < 1e-9
+
+
 def test_derivatives_are_those_of_the_motion() -> None:
     *_, leg = led(Wish((3.0, -2.0, 4.0)), 1.0)
     h = 1e-4
@@ -112,7 +148,7 @@ def test_a_far_place_is_reached_within_speed_and_acceleration_and_not_overshot()
     assert norm(sub(leg.jet(0.0)[0], (12.0, 0.0, 3.0))) < 1e-3
     assert max(norm(jet[1]) for jet in jets) < 1.001 * PACE.speed
     assert max(norm(jet[2]) for jet in jets) < 1.001 * PACE.accel
-    assert max(jet[0][0] for jet in jets) < 12.005  # measured 0.2 mm
+    assert max(jet[0][0] for jet in jets) < 12.001  # measured: 4 um short of it
 
 
 def test_a_velocity_is_reached_and_held_and_stops() -> None:
@@ -315,6 +351,75 @@ def test_the_pace_is_that_of_the_pendulum() -> None:
     assert pace_of(sky.flight, SETTINGS).rate == pytest.approx(3.5 * math.sqrt(9.81 / 0.7))
 
 
+# ---- ArduPilot's GUIDED
+
+ARDUPILOT = replace(SETTINGS, guided_mode=True)
+GUIDED = SetMode(identity.AUTO, identity.AUTO_LOITER, number=4)
+LOITER = SetMode(identity.AUTO, identity.AUTO_LOITER, number=5)
+
+
+def guided() -> Sky:
+    """GUIDED, armed, taken off, as ArduPilot's clients do it; GUIDED is asked for again on the way."""
+    sky = Sky(settings=ARDUPILOT)
+    for request in (GUIDED, Arm(True, False), Takeoff(2.0)):
+        assert sky.ask(request).result == ACCEPTED
+    sky.run(lambda sky: sky.flight.phase == Phase.LIFT)
+    assert sky.ask(GUIDED).result == ACCEPTED
+    assert sky.flight.phase == Phase.LIFT
+    sky.run(lambda sky: sky.flight.phase == Phase.HOLD)
+    return sky
+
+
+def test_one_place_is_enough_in_guided() -> None:
+    sky = guided()
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    sky.wait(12.0)
+    assert sky.flight.phase == Phase.GUIDED
+    assert norm(sub(sky.view.x_load, (2.0, 1.0, 3.0))) < 0.01
+    assert sky.ask(GUIDED).result == ACCEPTED
+    assert sky.flight.phase == Phase.GUIDED
+    assert identity.ARDUPILOT.mode(*mode_of(sky.flight)).name == "GUIDED"  # type: ignore[union-attr]
+
+
+def test_a_velocity_in_guided_ceases_after_its_time() -> None:
+    sky = guided()
+    assert sky.ask(moving(1.0, 0.0, 0.0)).result == ACCEPTED
+    sky.wait(ARDUPILOT.guided_loss_us * 1e-6 - 0.1)
+    assert sky.flight.phase == Phase.GUIDED and sky.view.v_load[0] > 0.9
+    sky.wait(0.2)
+    assert sky.flight.phase == Phase.HOLD
+    sky.wait(5.0)
+    assert norm(sky.view.v_load) < 1e-6
+    assert sky.ask(at(0.0, 0.0, 2.0)).result == ACCEPTED
+    assert sky.flight.phase == Phase.GUIDED
+
+
+@pytest.mark.parametrize("mode", [LOITER, SetMode(identity.AUTO, identity.AUTO_RTL, number=6)])
+def test_setpoints_are_followed_in_guided_only(mode: SetMode) -> None:
+    sky = guided()
+    assert sky.ask(mode).result == ACCEPTED
+    before = sky.flight.phase
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    assert sky.flight.phase == before
+    assert sky.ask(GUIDED).result == ACCEPTED
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    assert sky.flight.phase == Phase.GUIDED
+
+
+def test_a_setpoint_ends_a_circle_in_guided() -> None:
+    sky = guided()
+    assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED
+    sky.wait(3.0)
+    assert sky.ask(at(0.0, 0.0, 2.0)).result == ACCEPTED
+    assert sky.flight.guide == Guide.OFFBOARD
+
+
+def test_with_other_identities_holding_heeds_no_setpoint() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(at(2.0, 1.0, 3.0)).result == ACCEPTED
+    assert sky.flight.phase == Phase.HOLD
+
+
 # ---- in flight
 
 
@@ -347,11 +452,52 @@ def test_steps_of_an_offboard_stream_in_the_simulator() -> None:
     follow(0.0, 0.0, -2.0, 0.3)
     assert craft.command(m.MAV_CMD_DO_SET_MODE, 1.0, 6.0) == ACCEPTED
     worst = max(follow(2.0, 0.0, -2.0, 4.0), follow(2.0, 3.0, -3.0, 5.0), follow(-1.0, 0.0, -2.0, 6.0))
-    # measured 8 mm on the way; a step that is not smoothed throws the load by decimetres
-    assert worst < 0.03
+    # measured 6 mm on the way and 7 mm in the end; a step that is not smoothed throws the load by decimetres
+    assert worst < 0.02
     assert norm(sub(craft.truth.x_load, (0.0, -1.0, 2.0))) < 0.02
     craft.wait(1.5)
     assert craft.flight.phase == Phase.HOLD
+
+
+def test_offboard_hold_and_mission_follow_each_other_in_full_motion() -> None:
+    """Each takes the load over while it moves, descends and brakes."""
+    square = tuple(model.Waypoint(x, y, 2.0) for x, y in ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+    craft = Craft(model.Takeoff(2.0), *square)
+    craft.wait(1.0)
+    assert craft.command(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 3.0) == ACCEPTED
+    assert craft.command(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    craft.run(lambda craft: craft.flight.phase == Phase.HOLD)
+    hold, mission, offboard = (1.0, 4.0, 3.0), (1.0, 4.0, 4.0), (1.0, 6.0)
+    worst, lowest = 0.0, math.inf
+
+    def fly(seconds: float, velocity: Vec3 | None = None) -> None:
+        nonlocal worst, lowest
+        for k in range(round(seconds / TICK_S)):
+            if velocity is not None and k % 12 == 0:
+                craft.send(
+                    m.MAVLink_set_position_target_local_ned_message(
+                        0, 1, 1, 1, 0xDC7, 0, 0, 0, *velocity, 0, 0, 0, 0, 0
+                    )
+                )
+            craft.tick()
+            jet = setpoint(craft.flight, craft.onboard.now_us)
+            assert jet is not None
+            worst = max(worst, norm(sub(craft.truth.x_load, jet[0])))
+            lowest = min(lowest, craft.truth.x_load[2])
+
+    fly(0.1, (0.0, 0.0, 0.0))
+    for mode in (offboard, hold, mission, offboard, mission, offboard, hold, mission):
+        assert craft.command(m.MAV_CMD_DO_SET_MODE, *mode) == ACCEPTED
+        if mode == offboard:
+            fly(2.5, (2.5, -1.0, 1.5))
+        else:
+            fly(0.4)
+            fly(0.1, (2.5, -1.0, 1.5))  # heard, not followed
+    craft.run(lambda craft: craft.flight.step >= 2)  # the first waypoint is passed
+    assert not any("given up" in text or "slack" in text for text in craft.texts)
+    # measured 11 mm from the reference and 0.279 m; a stop that coasted on downwards ended on the ground
+    assert worst < 0.025
+    assert lowest > 0.26
 
 
 # ---- whatever is asked, in any order

@@ -263,3 +263,48 @@ def test_a_vehicle_whose_sensors_are_silent_still_says_that_it_is_there() -> Non
     (received,), _ = decode(craft.onboard.stranded_heartbeat(GCS))
     assert received.message.system_status == mavlink.MAV_STATE_EMERGENCY
     assert received.message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def test_the_saved_world_is_set_again_in_the_simulator() -> None:
+    craft = Craft()
+    craft.onboard.restore_world({"SIM_WIND_E": 2.5, "SIM_LOAD_MASS": 0.1, "SIM_NO_SUCH": 1.0})
+    craft.run(lambda craft: craft.simulator._parameters.table["SIM_WIND_E"] == 2.5, 3.0)
+    craft.wait(1.0)
+    assert craft.onboard.parameters["SIM_WIND_E"] == 2.5
+    assert "SIM_NO_SUCH" not in craft.onboard.parameters
+
+
+def test_reset_of_parameters_reaches_the_simulator_and_waits_for_the_ground() -> None:
+    craft = Craft()
+    craft.wait(1.0)
+    began = craft.onboard.parameters["SIM_WIND_E"]
+    for name, value in ((b"SIM_WIND_E", 2.0), (b"MIS_SPEED", 2.0)):
+        craft.send(mavlink.MAVLink_param_set_message(1, 1, name, value, mavlink.MAV_PARAM_TYPE_REAL32))
+    craft.run(lambda craft: craft.simulator._parameters.table["SIM_WIND_E"] == 2.0, 3.0)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, 2.0) == DENIED
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, 2.0) == ACCEPTED
+    craft.run(lambda craft: craft.simulator._parameters.table["SIM_WIND_E"] == began, 3.0)
+    assert craft.onboard.parameters["MIS_SPEED"] == 1.5
+
+
+def test_an_ardupilot_client_flies_without_any_stream() -> None:
+    """Mode GUIDED, arm, take off, one place, land: as DroneKit's first example."""
+    craft = Craft(MAV_IDENTITY=1.0)
+    craft.wait(1.0)
+    assert craft.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 4.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 1.0) == ACCEPTED
+    craft.run(at_phase(Phase.HOLD))
+    craft.send(
+        mavlink.MAVLink_set_position_target_local_ned_message(
+            0, 1, 1, 1, 0xDF8, 1.0, 0.5, -1.5, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+    )
+    craft.wait(6.0)
+    assert craft.flight.phase == Phase.GUIDED
+    # measured 1 mm
+    assert math.dist(craft.truth.x_load, (0.5, 1.0, 1.5)) < 0.015
+    assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
+    craft.run(at_phase(Phase.DISARMED))

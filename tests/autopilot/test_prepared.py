@@ -31,7 +31,7 @@ from missions.planning import PENDING, REFUSE, SLOW_DOWN, prepare
 from .conftest import ACCEPTED, SETTINGS, STEP_US, Craft, Sky
 
 PLUMBLINE = 2.0  # CTL_LAW
-LATER, DENIED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_DENIED
+IN_PROGRESS, DENIED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_DENIED
 EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 ROUND = (
     Waypoint(3.0, 0.0, 2.0),
@@ -159,7 +159,7 @@ def test_a_start_before_the_paths_are_there_is_for_later() -> None:
     sky = prepared_sky(Takeoff(2.0), *ROUND, model.Land())
     ready = sky.flight.plan.prepared
     sky.flight = with_plan(sky.flight, replace(sky.flight.plan, prepared=PENDING))
-    assert sky.ask(StartMission(None)).result == LATER
+    assert sky.ask(StartMission(None)).result == IN_PROGRESS
     sky.flight = replace(sky.flight, plan=replace(sky.flight.plan, prepared=ready))
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED

@@ -13,6 +13,7 @@ from autopilot.storage import (
     MISSION_FILE,
     PARAMETER_FILE,
     SIGNING_FILE,
+    WORLD_FILE,
     Storage,
     StorageError,
 )
@@ -190,3 +191,14 @@ def test_a_directory_serves_one_autopilot_at_a_time(tmp_path: Path) -> None:
         second.lock()
     del first
     second.lock()
+
+
+def test_the_simulators_parameters_come_back_where_they_were_saved(tmp_path: Path) -> None:
+    assert Storage(tmp_path).load_world() == ({}, [])
+    Storage(tmp_path).keep_world({"SIM_WIND_E": 3.0, "SIM_LOAD_MASS": 0.1})
+    assert Storage(tmp_path).load_world() == ({"SIM_WIND_E": 3.0, "SIM_LOAD_MASS": 0.1}, [])
+    Storage(tmp_path).keep_world({})
+    assert Storage(tmp_path).load_world() == ({}, [])
+    (tmp_path / WORLD_FILE).write_text("SIM_WIND_E three")
+    values, troubles = Storage(tmp_path).load_world()
+    assert values == {} and len(troubles) == 1

@@ -63,6 +63,7 @@ lower     hold                   hold
 lower     fly the mission        mission
 lower     return                 return
 lower     follow setpoints       guided
+lower     vehicle on the ground  disarmed
 set_down  vehicle on the ground  disarmed
 failsafe  disarm                 disarmed
 """

@@ -20,7 +20,8 @@ Every number that can be set by name, with the value it has for the vehicle `beb
 `--set NAME=VALUE` (of `sitl`, `autopilot` or `gcs fly`, which hands it to the right one), or in flight by the
 parameter protocol: `gcs param list`, `gcs param set NAME VALUE`, or any ground station. The autopilot shows
 the simulator's parameters beside its own. A change of its own is stored at once and is there again after a
-restart; a change of the world lasts as long as the world. Those marked *fixed* take effect at start only.
+restart; a change of the world lasts as long as the world, unless PREFLIGHT_STORAGE saves it. Those
+marked *fixed* take effect at start only.
 """
 AUTOPILOT = """
 ## Autopilot

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
+from autopilot.services.commands import CANCELLED, FORCE_ARM, LONGEST_US, PARSERS, REPEAT_US
 from autopilot.services.identity import AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
-from autopilot.services.records import Verdict
+from autopilot.services.records import ParameterChanged, Verdict, WorldSaved
 from autopilot.services.requests import (
     Arm,
     ChangeAltitude,
@@ -22,6 +22,7 @@ from autopilot.services.requests import (
     Reboot,
     Release,
     Reposition,
+    ResetParameters,
     ReturnHome,
     RunPrearmChecks,
     SetCurrent,
@@ -33,6 +34,7 @@ from autopilot.services.requests import (
 )
 from autopilot.wire.convert import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameters import Parameter
 
 NAN = math.nan
 OK, DENIED, UNSUPPORTED = (
@@ -40,6 +42,7 @@ OK, DENIED, UNSUPPORTED = (
     mavlink.MAV_RESULT_DENIED,
     mavlink.MAV_RESULT_UNSUPPORTED,
 )
+IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
 PACKED_LAND = float(AUTO_LAND << 24 | AUTO << 16)
 
 # what is sent as COMMAND_LONG, what the supervisor is asked (None: nothing), the result
@@ -86,6 +89,12 @@ LONG = [
     (186, (4, 1), None, DENIED),
     (17, (), Pause(), OK),
     (17, (0, 0, 0, 0, NAN, NAN, 4), Reposition(None, None, 4.0, True), OK),
+    (19, (30, 0, 0, 0, NAN, NAN, 4), Reposition(None, None, 4.0, True), OK),
+    (31, (0, 0, 0, 0, NAN, NAN, 4), Reposition(None, None, 4.0, True), OK),
+    (18, (2, 0, -1.5, 0, NAN, NAN, NAN), Orbit(-1.5, None, None, None, None, 2.0), OK),
+    (18, (2, 0, 1.5), Orbit(1.5, None, None, None, None, 2.0), OK),
+    (18, (0, 0, 1.5), None, DENIED),
+    (18, (2, 0, 0), None, DENIED),
     (241, (1,), None, UNSUPPORTED),
     (241, (), None, OK),
     (178, (1, 2.5, -1), ChangeSpeed(2.5), OK),
@@ -99,8 +108,10 @@ LONG = [
     (246, (1,), Reboot(False), OK),
     (246, (2,), Reboot(True), OK),
     (246, (NAN,), None, UNSUPPORTED),
+    (245, (0,), None, OK),
     (245, (1,), None, OK),
-    (245, (2,), None, UNSUPPORTED),
+    (245, (2,), ResetParameters(), OK),
+    (245, (3,), None, UNSUPPORTED),
     (512, (148,), None, OK),
     (512, (397,), None, OK),
     (512, (395,), None, OK),
@@ -354,3 +365,99 @@ def test_every_parser_is_in_the_case_table():
 
 def test_takeoff_in_the_px4_flavour_is_above_the_sea():
     assert not Identity().flavour.takeoff_above_home
+
+
+# ---- commands in progress
+
+LATER = Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "not yet")
+
+
+def progress(received) -> list[tuple[int, int, int]]:
+    """(command, result, progress) of the COMMAND_ACKs."""
+    found = [getattr(r, "message", r) for r in received]
+    return [(x.command, x.result, x.progress) for x in found if x.get_type() == "COMMAND_ACK"]
+
+
+def begin(rig, command: int = 300) -> None:
+    rig.verdict = lambda request: LATER
+    assert progress(rig.replies(long(command))) == [(command, IN_PROGRESS, 255)]
+
+
+def test_a_command_in_progress_is_told_and_ends(rig):
+    begin(rig)
+    told = progress(rig.run(1_200_000))
+    assert told == [(300, IN_PROGRESS, 255)] * 2
+    rig.verdict = lambda request: Verdict(OK)
+    assert progress(rig.run(200_000)) == [(300, OK, 0)]
+    assert progress(rig.run(2_000_000)) == []
+
+
+def test_a_command_in_progress_is_not_begun_twice(rig):
+    begin(rig)
+    asked = len(rig.asked)
+    assert progress(rig.replies(long(300))) == [(300, IN_PROGRESS, 255)]
+    assert len(rig.asked) == asked
+
+
+@pytest.mark.parametrize("command", [21, 20, 176, 193])
+def test_another_command_takes_its_place(rig, command):
+    begin(rig)
+    rig.verdict = lambda request: Verdict(OK)
+    p = (1, AUTO, AUTO_LAND) if command == 176 else ()
+    assert progress(rig.replies(long(command, p))) == [(300, CANCELLED, 0), (command, OK, 0)]
+    assert progress(rig.run(2_000_000)) == []
+
+
+def test_what_does_not_move_the_vehicle_leaves_it(rig):
+    begin(rig)
+    rig.verdict = lambda request: LATER if isinstance(request, StartMission) else Verdict(OK)
+    for command, p in ((400, (1,)), (401, ()), (512, (148,)), (178, (1, 2))):
+        assert progress(rig.replies(long(command, p))) == [(command, OK, 0)]
+    rig.verdict = lambda request: Verdict(OK)
+    assert progress(rig.run(200_000)) == [(300, OK, 0)]
+
+
+def test_a_command_in_progress_is_cancelled(rig):
+    begin(rig)
+    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 22))) == []
+    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 300))) == [(300, CANCELLED, 0)]
+    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 300))) == []
+    assert progress(rig.run(2_000_000)) == []
+
+
+def test_a_command_in_progress_for_ever_fails(rig):
+    begin(rig)
+    told = progress(rig.run(LONGEST_US + 200_000))
+    assert told[-1] == (300, mavlink.MAV_RESULT_FAILED, 0)
+    assert progress(rig.run(2_000_000)) == []
+
+
+def test_the_asker_alone_is_told(rig):
+    rig.send(mavlink.MAVLink_ping_message(0, 0, 0, 0), link="other")
+    begin(rig)
+    assert progress(rig.run(1_000_000, "other")) == []
+
+
+# ---- storage
+
+
+def test_parameters_go_back_to_their_defaults(rig):
+    rig.table.set("LOAD_MASS", 0.5)
+    rig.table.set("CTRL_RATE_HZ", 500.0)
+    rig.table.freeze()
+    told = [x for x in rig.replies(long(245, (2,))) if x.get_type() == "PARAM_VALUE"]
+    assert [x.param_id for x in told] == ["LOAD_MASS"]
+    assert rig.table["LOAD_MASS"] == rig.table.describe("LOAD_MASS").default
+    assert rig.table["CTRL_RATE_HZ"] == 500.0
+    assert ParameterChanged("LOAD_MASS", rig.table["LOAD_MASS"]) in rig.events
+
+
+def test_the_simulators_parameters_are_saved_on_request_alone(rig):
+    rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
+    rig.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_E", 3.0, mavlink.MAV_PARAM_TYPE_REAL32))
+    assert not any(isinstance(event, WorldSaved) for event in rig.events)
+    rig.send(long(245, (1,)))
+    assert rig.events[-1] == WorldSaved({"SIM_WIND_E": 3.0})
+    rig.send(long(245, (2,)))
+    assert rig.events[-1] == WorldSaved({})
+    assert rig.table["SIM_WIND_E"] == 0.0

@@ -418,3 +418,28 @@ def test_reached_items_are_told_to_all(rig):
     rig.endpoint.item_reached(4)
     for received in rig.poll().values():
         assert [r.message.seq for r in received if r.message.get_type() == "MISSION_ITEM_REACHED"] == [4]
+
+
+# ---- numbers of plans
+
+
+def test_a_plan_has_a_number_that_tells_its_versions_apart(rig, items, as_message):
+    def numbers() -> tuple[int, int]:
+        (listed,) = rig.replies(m.MAVLink_mission_request_list_message(1, 1))
+        rig.send(m.MAVLink_command_long_message(1, 1, m.MAV_CMD_REQUEST_MESSAGE, 0, 42, 0, 0, 0, 0, 0, 0))
+        current = [r.message for r in rig.poll()["gcs"] if r.message.get_type() == "MISSION_CURRENT"]
+        return listed.opaque_id, current[-1].mission_id
+
+    assert numbers() == (0, 0)
+    seen = set()
+    for sent in (items(3), items(4), items(3)):
+        answers = rig.replies(count(len(sent)))
+        for seq, item in enumerate(sent):
+            answers = rig.replies(as_message(seq, item))
+        assert answers[-1].opaque_id != 0
+        assert numbers() == (answers[-1].opaque_id,) * 2
+        seen.add(answers[-1].opaque_id)
+    assert len(seen) == 2  # equal plans have equal numbers, and so after a restart
+    (cleared,) = rig.replies(m.MAVLink_mission_clear_all_message(1, 1))
+    assert cleared.opaque_id == 0
+    assert numbers() == (0, 0)

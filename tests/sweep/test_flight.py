@@ -75,6 +75,11 @@ def test_same_bits_under_rough_conditions(short: str) -> None:
     flown(short, Conditions(sensors="lab", seed=2, settings={"CTL_LAW": PLUMBLINE, **ROUGH}))
 
 
+def test_same_bits_with_late_sensors(short: str) -> None:
+    settings = {"CTL_LAW": PLUMBLINE, "SIM_SENS_LAT_MS": 26.0, "SIM_ACT_DELAY_MS": 9.0}
+    flown(short, Conditions(sensors="lab", seed=1, settings=settings))
+
+
 def test_same_bits_with_two_ticks_for_each_command(short: str) -> None:
     settings = {"CTL_LAW": PLUMBLINE, "SIM_RATE_HZ": 500.0}
     flown(short, Conditions(sensors="ideal", seed=1, settings=settings))

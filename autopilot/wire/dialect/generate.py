@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import shutil
 import sys
 import tempfile
@@ -21,7 +22,31 @@ DIALECT = Path(__file__).with_name("plumbline.xml")
 MISSING = Path(__file__).with_name("missing.xml")  # what pymavlink's common.xml lacks
 MODULE = Path(__file__).with_name("plumbline.py")
 _INCLUDED = ("common.xml", "standard.xml", "minimal.xml")
+# Extension fields of MAVLink's common.xml that pymavlink's copy of it lacks, behind those that it has
+_EXTENSIONS = {
+    "MISSION_COUNT": {"opaque_id": "Number of this version of the plan; 0: none, or not told."},
+    "MISSION_ACK": {"opaque_id": "Number of this version of the plan; 0: none, or not told."},
+    "MISSION_CURRENT": {
+        "mission_id": "Number of this version of the mission; 0: none.",
+        "fence_id": "Number of this version of the fence; 0: none.",
+        "rally_points_id": "Number of this version of the rally points; 0: none.",
+    },
+}
 _STAMP = "# Generated with pymavlink "
+
+
+def extended(text: str) -> str:
+    """common.xml with the extension fields that it lacks."""
+    for message, fields in _EXTENSIONS.items():
+        found = re.search(rf'<message id="\d+" name="{message}">.*?</message>', text, re.DOTALL)
+        if found is None:
+            raise RuntimeError(f"common.xml has no {message}")
+        lacking = [name for name in fields if f'name="{name}"' not in found[0]]
+        lines = [f'<field type="uint32_t" name="{name}">{fields[name]}</field>' for name in lacking]
+        if lines and "<extensions/>" not in found[0]:
+            lines.insert(0, "<extensions/>")
+        text = text.replace(found[0], found[0].replace("</message>", "\n".join(lines) + "\n</message>"))
+    return text
 
 
 def generated() -> bytes:
@@ -30,6 +55,8 @@ def generated() -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         for source in (MISSING, *(definitions / name for name in _INCLUDED)):
             shutil.copy(source, folder)
+        common = Path(folder) / "common.xml"
+        common.write_text(extended(common.read_text(encoding="utf-8")), encoding="utf-8")
         include = "<include>{}</include>".format
         both = include("common.xml") + include(MISSING.name)
         text = DIALECT.read_text(encoding="utf-8").replace(include("common.xml"), both)

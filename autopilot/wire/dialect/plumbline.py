@@ -6658,6 +6658,7 @@ MAVLINK_MSG_ID_OPEN_DRONE_ID_ARM_STATUS = 12918
 MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM_UPDATE = 12919
 MAVLINK_MSG_ID_HYGROMETER_SENSOR = 12920
 MAVLINK_MSG_ID_EKF_STATUS_REPORT = 193
+MAVLINK_MSG_ID_COMMAND_CANCEL = 80
 MAVLINK_MSG_ID_COMPONENT_INFORMATION = 395
 MAVLINK_MSG_ID_COMPONENT_METADATA = 397
 MAVLINK_MSG_ID_PROTOCOL_VERSION = 300
@@ -8405,22 +8406,22 @@ class MAVLink_mission_current_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_MISSION_CURRENT
     msgname = "MISSION_CURRENT"
-    fieldnames = ["seq", "total", "mission_state", "mission_mode"]
-    ordered_fieldnames = ["seq", "total", "mission_state", "mission_mode"]
-    fieldtypes = ["uint16_t", "uint16_t", "uint8_t", "uint8_t"]
+    fieldnames = ["seq", "total", "mission_state", "mission_mode", "mission_id", "fence_id", "rally_points_id"]
+    ordered_fieldnames = ["seq", "total", "mission_state", "mission_mode", "mission_id", "fence_id", "rally_points_id"]
+    fieldtypes = ["uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint32_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {"mission_state": "MISSION_STATE"}
     fieldunits_by_name: Dict[str, str] = {}
-    native_format = bytearray(b"<HHBB")
-    orders = [0, 1, 2, 3]
-    lengths = [1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0]
+    native_format = bytearray(b"<HHBBIII")
+    orders = [0, 1, 2, 3, 4, 5, 6]
+    lengths = [1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0]
     crc_extra = 28
-    unpacker = struct.Struct("<HHBB")
+    unpacker = struct.Struct("<HHBBIII")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, seq: int, total: int = 0, mission_state: int = 0, mission_mode: int = 0):
+    def __init__(self, seq: int, total: int = 0, mission_state: int = 0, mission_mode: int = 0, mission_id: int = 0, fence_id: int = 0, rally_points_id: int = 0):
         MAVLink_message.__init__(self, MAVLink_mission_current_message.id, MAVLink_mission_current_message.msgname)
         self._fieldnames = MAVLink_mission_current_message.fieldnames
         self._instance_field = MAVLink_mission_current_message.instance_field
@@ -8429,9 +8430,12 @@ class MAVLink_mission_current_message(MAVLink_message):
         self.total = total
         self.mission_state = mission_state
         self.mission_mode = mission_mode
+        self.mission_id = mission_id
+        self.fence_id = fence_id
+        self.rally_points_id = rally_points_id
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.seq, self.total, self.mission_state, self.mission_mode), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.seq, self.total, self.mission_state, self.mission_mode, self.mission_id, self.fence_id, self.rally_points_id), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -8490,22 +8494,22 @@ class MAVLink_mission_count_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_MISSION_COUNT
     msgname = "MISSION_COUNT"
-    fieldnames = ["target_system", "target_component", "count", "mission_type"]
-    ordered_fieldnames = ["count", "target_system", "target_component", "mission_type"]
-    fieldtypes = ["uint8_t", "uint8_t", "uint16_t", "uint8_t"]
+    fieldnames = ["target_system", "target_component", "count", "mission_type", "opaque_id"]
+    ordered_fieldnames = ["count", "target_system", "target_component", "mission_type", "opaque_id"]
+    fieldtypes = ["uint8_t", "uint8_t", "uint16_t", "uint8_t", "uint32_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {"mission_type": "MAV_MISSION_TYPE"}
     fieldunits_by_name: Dict[str, str] = {}
-    native_format = bytearray(b"<HBBB")
-    orders = [1, 2, 0, 3]
-    lengths = [1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0]
+    native_format = bytearray(b"<HBBBI")
+    orders = [1, 2, 0, 3, 4]
+    lengths = [1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0]
     crc_extra = 221
-    unpacker = struct.Struct("<HBBB")
+    unpacker = struct.Struct("<HBBBI")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, target_system: int, target_component: int, count: int, mission_type: int = 0):
+    def __init__(self, target_system: int, target_component: int, count: int, mission_type: int = 0, opaque_id: int = 0):
         MAVLink_message.__init__(self, MAVLink_mission_count_message.id, MAVLink_mission_count_message.msgname)
         self._fieldnames = MAVLink_mission_count_message.fieldnames
         self._instance_field = MAVLink_mission_count_message.instance_field
@@ -8514,9 +8518,10 @@ class MAVLink_mission_count_message(MAVLink_message):
         self.target_component = target_component
         self.count = count
         self.mission_type = mission_type
+        self.opaque_id = opaque_id
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.count, self.target_system, self.target_component, self.mission_type), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.count, self.target_system, self.target_component, self.mission_type, self.opaque_id), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -8613,22 +8618,22 @@ class MAVLink_mission_ack_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_MISSION_ACK
     msgname = "MISSION_ACK"
-    fieldnames = ["target_system", "target_component", "type", "mission_type"]
-    ordered_fieldnames = ["target_system", "target_component", "type", "mission_type"]
-    fieldtypes = ["uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fieldnames = ["target_system", "target_component", "type", "mission_type", "opaque_id"]
+    ordered_fieldnames = ["target_system", "target_component", "type", "mission_type", "opaque_id"]
+    fieldtypes = ["uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint32_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {"type": "MAV_MISSION_RESULT", "mission_type": "MAV_MISSION_TYPE"}
     fieldunits_by_name: Dict[str, str] = {}
-    native_format = bytearray(b"<BBBB")
-    orders = [0, 1, 2, 3]
-    lengths = [1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0]
+    native_format = bytearray(b"<BBBBI")
+    orders = [0, 1, 2, 3, 4]
+    lengths = [1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0]
     crc_extra = 153
-    unpacker = struct.Struct("<BBBB")
+    unpacker = struct.Struct("<BBBBI")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, target_system: int, target_component: int, type: int, mission_type: int = 0):
+    def __init__(self, target_system: int, target_component: int, type: int, mission_type: int = 0, opaque_id: int = 0):
         MAVLink_message.__init__(self, MAVLink_mission_ack_message.id, MAVLink_mission_ack_message.msgname)
         self._fieldnames = MAVLink_mission_ack_message.fieldnames
         self._instance_field = MAVLink_mission_ack_message.instance_field
@@ -8637,9 +8642,10 @@ class MAVLink_mission_ack_message(MAVLink_message):
         self.target_component = target_component
         self.type = type
         self.mission_type = mission_type
+        self.opaque_id = opaque_id
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.target_system, self.target_component, self.type, self.mission_type), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.target_system, self.target_component, self.type, self.mission_type, self.opaque_id), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -17028,6 +17034,47 @@ class MAVLink_ekf_status_report_message(MAVLink_message):
 setattr(MAVLink_ekf_status_report_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_command_cancel_message(MAVLink_message):
+    """
+    Gives up a command in progress; what is acknowledged is the
+    command.
+    """
+
+    id = MAVLINK_MSG_ID_COMMAND_CANCEL
+    msgname = "COMMAND_CANCEL"
+    fieldnames = ["target_system", "target_component", "command"]
+    ordered_fieldnames = ["command", "target_system", "target_component"]
+    fieldtypes = ["uint8_t", "uint8_t", "uint16_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {"command": "MAV_CMD"}
+    fieldunits_by_name: Dict[str, str] = {}
+    native_format = bytearray(b"<HBB")
+    orders = [1, 2, 0]
+    lengths = [1, 1, 1]
+    array_lengths = [0, 0, 0]
+    crc_extra = 14
+    unpacker = struct.Struct("<HBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, target_system: int, target_component: int, command: int):
+        MAVLink_message.__init__(self, MAVLink_command_cancel_message.id, MAVLink_command_cancel_message.msgname)
+        self._fieldnames = MAVLink_command_cancel_message.fieldnames
+        self._instance_field = MAVLink_command_cancel_message.instance_field
+        self._instance_offset = MAVLink_command_cancel_message.instance_offset
+        self.target_system = target_system
+        self.target_component = target_component
+        self.command = command
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.command, self.target_system, self.target_component), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_command_cancel_message, "name", mavlink_msg_deprecated_name_property())
+
+
 class MAVLink_component_information_message(MAVLink_message):
     """
     Where the general metadata file is; superseded by
@@ -17644,6 +17691,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM_UPDATE: MAVLink_open_drone_id_system_update_message,
     MAVLINK_MSG_ID_HYGROMETER_SENSOR: MAVLink_hygrometer_sensor_message,
     MAVLINK_MSG_ID_EKF_STATUS_REPORT: MAVLink_ekf_status_report_message,
+    MAVLINK_MSG_ID_COMMAND_CANCEL: MAVLink_command_cancel_message,
     MAVLINK_MSG_ID_COMPONENT_INFORMATION: MAVLink_component_information_message,
     MAVLINK_MSG_ID_COMPONENT_METADATA: MAVLink_component_metadata_message,
     MAVLINK_MSG_ID_PROTOCOL_VERSION: MAVLink_protocol_version_message,
@@ -19405,7 +19453,7 @@ class MAVLink(object):
         """
         self.send(self.mission_set_current_encode(target_system, target_component, seq), force_mavlink1=force_mavlink1)
 
-    def mission_current_encode(self, seq: int, total: int = 0, mission_state: int = 0, mission_mode: int = 0) -> MAVLink_mission_current_message:
+    def mission_current_encode(self, seq: int, total: int = 0, mission_state: int = 0, mission_mode: int = 0, mission_id: int = 0, fence_id: int = 0, rally_points_id: int = 0) -> MAVLink_mission_current_message:
         """
         Message that announces the sequence number of the current target
         mission item (that the system will fly towards/execute when
@@ -19418,11 +19466,14 @@ class MAVLink(object):
         total                     : Total number of mission items on vehicle (on last item, sequence == total). If the autopilot stores its home location as part of the mission this will be excluded from the total. 0: Not supported, UINT16_MAX if no mission is present on the vehicle. (type:uint16_t)
         mission_state             : Mission state machine state. MISSION_STATE_UNKNOWN if state reporting not supported. (type:uint8_t, values:MISSION_STATE)
         mission_mode              : Vehicle is in a mode that can execute mission items or suspended. 0: Unknown, 1: In mission mode, 2: Suspended (not in mission mode). (type:uint8_t)
+        mission_id                : Number of this version of the mission; 0: none. (type:uint32_t)
+        fence_id                  : Number of this version of the fence; 0: none. (type:uint32_t)
+        rally_points_id           : Number of this version of the rally points; 0: none. (type:uint32_t)
 
         """
-        return MAVLink_mission_current_message(seq, total, mission_state, mission_mode)
+        return MAVLink_mission_current_message(seq, total, mission_state, mission_mode, mission_id, fence_id, rally_points_id)
 
-    def mission_current_send(self, seq: int, total: int = 0, mission_state: int = 0, mission_mode: int = 0, force_mavlink1: bool = False) -> None:
+    def mission_current_send(self, seq: int, total: int = 0, mission_state: int = 0, mission_mode: int = 0, mission_id: int = 0, fence_id: int = 0, rally_points_id: int = 0, force_mavlink1: bool = False) -> None:
         """
         Message that announces the sequence number of the current target
         mission item (that the system will fly towards/execute when
@@ -19435,9 +19486,12 @@ class MAVLink(object):
         total                     : Total number of mission items on vehicle (on last item, sequence == total). If the autopilot stores its home location as part of the mission this will be excluded from the total. 0: Not supported, UINT16_MAX if no mission is present on the vehicle. (type:uint16_t)
         mission_state             : Mission state machine state. MISSION_STATE_UNKNOWN if state reporting not supported. (type:uint8_t, values:MISSION_STATE)
         mission_mode              : Vehicle is in a mode that can execute mission items or suspended. 0: Unknown, 1: In mission mode, 2: Suspended (not in mission mode). (type:uint8_t)
+        mission_id                : Number of this version of the mission; 0: none. (type:uint32_t)
+        fence_id                  : Number of this version of the fence; 0: none. (type:uint32_t)
+        rally_points_id           : Number of this version of the rally points; 0: none. (type:uint32_t)
 
         """
-        self.send(self.mission_current_encode(seq, total, mission_state, mission_mode), force_mavlink1=force_mavlink1)
+        self.send(self.mission_current_encode(seq, total, mission_state, mission_mode, mission_id, fence_id, rally_points_id), force_mavlink1=force_mavlink1)
 
     def mission_request_list_encode(self, target_system: int, target_component: int, mission_type: int = 0) -> MAVLink_mission_request_list_message:
         """
@@ -19461,7 +19515,7 @@ class MAVLink(object):
         """
         self.send(self.mission_request_list_encode(target_system, target_component, mission_type), force_mavlink1=force_mavlink1)
 
-    def mission_count_encode(self, target_system: int, target_component: int, count: int, mission_type: int = 0) -> MAVLink_mission_count_message:
+    def mission_count_encode(self, target_system: int, target_component: int, count: int, mission_type: int = 0, opaque_id: int = 0) -> MAVLink_mission_count_message:
         """
         This message is emitted as response to MISSION_REQUEST_LIST by the MAV
         and to initiate a write transaction. The GCS can then request
@@ -19472,11 +19526,12 @@ class MAVLink(object):
         target_component          : Component ID (type:uint8_t)
         count                     : Number of mission items in the sequence (type:uint16_t)
         mission_type              : Mission type. (type:uint8_t, values:MAV_MISSION_TYPE)
+        opaque_id                 : Number of this version of the plan; 0: none, or not told. (type:uint32_t)
 
         """
-        return MAVLink_mission_count_message(target_system, target_component, count, mission_type)
+        return MAVLink_mission_count_message(target_system, target_component, count, mission_type, opaque_id)
 
-    def mission_count_send(self, target_system: int, target_component: int, count: int, mission_type: int = 0, force_mavlink1: bool = False) -> None:
+    def mission_count_send(self, target_system: int, target_component: int, count: int, mission_type: int = 0, opaque_id: int = 0, force_mavlink1: bool = False) -> None:
         """
         This message is emitted as response to MISSION_REQUEST_LIST by the MAV
         and to initiate a write transaction. The GCS can then request
@@ -19487,9 +19542,10 @@ class MAVLink(object):
         target_component          : Component ID (type:uint8_t)
         count                     : Number of mission items in the sequence (type:uint16_t)
         mission_type              : Mission type. (type:uint8_t, values:MAV_MISSION_TYPE)
+        opaque_id                 : Number of this version of the plan; 0: none, or not told. (type:uint32_t)
 
         """
-        self.send(self.mission_count_encode(target_system, target_component, count, mission_type), force_mavlink1=force_mavlink1)
+        self.send(self.mission_count_encode(target_system, target_component, count, mission_type, opaque_id), force_mavlink1=force_mavlink1)
 
     def mission_clear_all_encode(self, target_system: int, target_component: int, mission_type: int = 0) -> MAVLink_mission_clear_all_message:
         """
@@ -19535,7 +19591,7 @@ class MAVLink(object):
         """
         self.send(self.mission_item_reached_encode(seq), force_mavlink1=force_mavlink1)
 
-    def mission_ack_encode(self, target_system: int, target_component: int, type: int, mission_type: int = 0) -> MAVLink_mission_ack_message:
+    def mission_ack_encode(self, target_system: int, target_component: int, type: int, mission_type: int = 0, opaque_id: int = 0) -> MAVLink_mission_ack_message:
         """
         Acknowledgment message during waypoint handling. The type field states
         if this message is a positive ack (type=0) or if an error
@@ -19545,11 +19601,12 @@ class MAVLink(object):
         target_component          : Component ID (type:uint8_t)
         type                      : Mission result. (type:uint8_t, values:MAV_MISSION_RESULT)
         mission_type              : Mission type. (type:uint8_t, values:MAV_MISSION_TYPE)
+        opaque_id                 : Number of this version of the plan; 0: none, or not told. (type:uint32_t)
 
         """
-        return MAVLink_mission_ack_message(target_system, target_component, type, mission_type)
+        return MAVLink_mission_ack_message(target_system, target_component, type, mission_type, opaque_id)
 
-    def mission_ack_send(self, target_system: int, target_component: int, type: int, mission_type: int = 0, force_mavlink1: bool = False) -> None:
+    def mission_ack_send(self, target_system: int, target_component: int, type: int, mission_type: int = 0, opaque_id: int = 0, force_mavlink1: bool = False) -> None:
         """
         Acknowledgment message during waypoint handling. The type field states
         if this message is a positive ack (type=0) or if an error
@@ -19559,9 +19616,10 @@ class MAVLink(object):
         target_component          : Component ID (type:uint8_t)
         type                      : Mission result. (type:uint8_t, values:MAV_MISSION_RESULT)
         mission_type              : Mission type. (type:uint8_t, values:MAV_MISSION_TYPE)
+        opaque_id                 : Number of this version of the plan; 0: none, or not told. (type:uint32_t)
 
         """
-        self.send(self.mission_ack_encode(target_system, target_component, type, mission_type), force_mavlink1=force_mavlink1)
+        self.send(self.mission_ack_encode(target_system, target_component, type, mission_type, opaque_id), force_mavlink1=force_mavlink1)
 
     def set_gps_global_origin_encode(self, target_system: int, latitude: int, longitude: int, altitude: int, time_usec: int = 0) -> MAVLink_set_gps_global_origin_message:
         """
@@ -26204,6 +26262,28 @@ class MAVLink(object):
 
         """
         self.send(self.ekf_status_report_encode(flags, velocity_variance, pos_horiz_variance, pos_vert_variance, compass_variance, terrain_alt_variance), force_mavlink1=force_mavlink1)
+
+    def command_cancel_encode(self, target_system: int, target_component: int, command: int) -> MAVLink_command_cancel_message:
+        """
+        Gives up a command in progress; what is acknowledged is the command.
+
+        target_system             : System ID. (type:uint8_t)
+        target_component          : Component ID. (type:uint8_t)
+        command                   : Command ID of the command to give up. (type:uint16_t, values:MAV_CMD)
+
+        """
+        return MAVLink_command_cancel_message(target_system, target_component, command)
+
+    def command_cancel_send(self, target_system: int, target_component: int, command: int, force_mavlink1: bool = False) -> None:
+        """
+        Gives up a command in progress; what is acknowledged is the command.
+
+        target_system             : System ID. (type:uint8_t)
+        target_component          : Component ID. (type:uint8_t)
+        command                   : Command ID of the command to give up. (type:uint16_t, values:MAV_CMD)
+
+        """
+        self.send(self.command_cancel_encode(target_system, target_component, command), force_mavlink1=force_mavlink1)
 
     def component_information_encode(self, time_boot_ms: int, general_metadata_file_crc: int, general_metadata_uri: bytes, peripherals_metadata_file_crc: int, peripherals_metadata_uri: bytes) -> MAVLink_component_information_message:
         """
