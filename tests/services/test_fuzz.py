@@ -9,14 +9,23 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from autopilot.services.records import AreasChanged, MissionChanged, ParameterChanged, Verdict
+from autopilot.services.records import (
+    AreasChanged,
+    MissionChanged,
+    ParameterChanged,
+    SigningChanged,
+    Verdict,
+)
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import MissionItemError, WireItem, encode_steps, located_steps
 from autopilot.wire.parameters import ParameterError, decimal_from_float32
+from autopilot.wire.signing import NEWEST, Signing
 from missions.model import Takeoff, Waypoint
+
+from .conftest import STREAMED
 
 FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -305,3 +314,26 @@ def test_what_changes_is_what_a_model_says(rig_with, items, turns, result):
                 values[name] = value
     assert repr(stored) == repr(model.plans)
     assert repr(initial | values) == repr(model.values)
+
+
+@FEW
+@given(
+    steps=st.lists(st.tuples(PEER, ANY_MESSAGE | SENSIBLE), max_size=20),
+    key=st.sampled_from([None, bytes(range(1, 33))]),
+)
+def test_with_a_key_no_service_hears_what_is_not_signed_with_it(rig_with, items, steps, key):
+    """Unsigned or signed with another key: no answer, no request, no change, no link but by a HEARTBEAT."""
+    rig = rig_with(items(3))
+    rig.send(m.MAVLink_setup_signing_message(1, 1, bytes(range(32)), 0))
+    rig.poll()
+    rig.asked.clear()
+    rig.events.clear()
+    before = state(rig)
+    sign = None if key is None else Signing(key, NEWEST).signer(1)
+    for (link, system, component), message in steps:
+        rig.send_bytes(FrameWriter(system, component).frame(message, sign), link)
+        said = [r.message.get_type() for r in rig.poll().get("gcs", [])]
+        assert set(said) <= {*STREAMED, "SYSTEM_TIME", "STATUSTEXT", "EKF_STATUS_REPORT", "VIBRATION"}
+    assert rig.asked == [] and state(rig) == before
+    assert not [event for event in rig.events if not isinstance(event, SigningChanged)]
+    assert "api" not in rig.endpoint.links or any(x.get_type() == "HEARTBEAT" for _, x in steps)
