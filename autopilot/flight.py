@@ -168,6 +168,7 @@ class View(NamedTuple):
     tilt_rad: float
     complaints: tuple[str, ...]
     pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
+    height_std: float = 0.0  # m, of heights over home, where a receiver tells them
 
 
 class Report(NamedTuple):

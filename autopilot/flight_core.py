@@ -14,7 +14,7 @@ from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis import attitude_towards
 from autopilot.estimation.filter import Readings, complaints, control_state, estimate
 from autopilot.estimation.parting import parted, untied
-from autopilot.estimation.records import EstimatorState, EstimatorTuning, History, blank_state
+from autopilot.estimation.records import RECEIVER, EstimatorState, EstimatorTuning, History, blank_state
 from autopilot.flight import IN_AIR, Flight, Phase, Report, Settings, View, jet_ahead, leg_time_s
 from autopilot.following import Posture
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
@@ -96,6 +96,7 @@ def view_of(
         tilt_angle(state.R),
         complaints(estimator, settings.sensor_age_limit_s, carries=not released),
         pull_n,
+        estimator.doubt.vertical if estimator.vehicle.source == RECEIVER else 0.0,
     )
 
 

@@ -215,7 +215,8 @@ class Onboard:
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
-            self.endpoint.item_reached(seq)
+            last = self._state.flight.mission_done and seq == report.reached[-1]
+            self.endpoint.item_reached(seq, last)
         if self._log is not None:
             rate_hz = self.parameters["LOG_RATE_HZ"]
             self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self._log_sample)

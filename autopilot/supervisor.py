@@ -127,6 +127,7 @@ ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable tau
 ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
+HEIGHT_SIGMAS = 2.0  # by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
 LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
 LIFT_OFF_US = 1_000_000  # after which a load that is being lifted is off the ground
@@ -325,7 +326,7 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
             _carry(clear, low, settings.lift_speed_m_s, settings),
             Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
         )
-    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT))
+    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + HEIGHT_SIGMAS * view.height_std))
     return (
         *legs,
         _carry(here, low, settings.lift_speed_m_s, settings),
@@ -487,8 +488,9 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             flight = replace(flight, taut_length_m=norm(sub(view.x_quad, view.x_load)))
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
         flight = _over_load(flight, view)
-        if len(flight.legs) == 1 and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
-            flight, settings
+        creeps = len(flight.legs) == 1
+        if creeps and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
+            flight, view, settings
         ):
             text = "Cable never taut, landing; check VEH_CABLE_LEN"
             return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
@@ -810,11 +812,12 @@ def _watch_fence(flight: Flight, view: View, settings: Settings) -> Flight | tup
     return _to(replace(noted, on_mission=False), event, view, settings, text)
 
 
-def _taut_by(flight: Flight, settings: Settings) -> float:
+def _taut_by(flight: Flight, view: View, settings: Settings) -> float:
     """Height over home that the vehicle need not climb beyond to pull the cable taut."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
-    return creep.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m
+    unsure = HEIGHT_SIGMAS * view.height_std
+    return creep.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m + unsure
 
 
 def _trouble(flight: Flight, view: View, settings: Settings) -> str:

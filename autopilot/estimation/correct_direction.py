@@ -125,7 +125,7 @@ def correct_direction(
         if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
             return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, load.source), state.resets)
         widen(history)
-        return with_load(state, load_at(load, load.age_s, 0.0, load.source), state.resets + 1.0)
+        state = with_load(state, load, state.resets + 1.0)
     begin(history)
     nis = 0.0
     for i in range(2):
@@ -139,7 +139,7 @@ def correct_direction(
 
 @kernel
 def widen(history: History) -> None:
-    """The cable may point anywhere and turn fast: the next sight decides."""
+    """The cable may point anywhere and turn fast: the sights decide."""
     P = history.covariance
     for i in range(DIRECTION, DIRECTION + 4):
         P[i, i] += 1.0

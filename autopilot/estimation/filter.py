@@ -13,6 +13,7 @@ from autopilot.estimation.correct_load import correct_load
 from autopilot.estimation.correct_magnetic import correct_magnetic
 from autopilot.estimation.correct_pose import correct_pose
 from autopilot.estimation.correct_standing import correct_standing
+from autopilot.estimation.correct_tautened import correct_tautened
 from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     CAMERA,
@@ -68,6 +69,7 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         gyro_bias_walk=table["EST_GYRO_WALK"],
         accel_bias_walk=table["EST_ACC_WALK"],
         cable_accel_std=table["EST_CABLE_STD"],
+        load_drag=table["EST_LOAD_DRAG"],
         length_std=table["EST_LEN_STD"],
         gate_sigma=table["EST_GATE"],
         imu_age=1e-3 * table["VEH_IMU_DELAY"],
@@ -103,7 +105,9 @@ def estimate(
 
     `thrust` (N) is what the rotors are believed to give.
     """
+    load = state.load
     state = predict(state, history, readings.imu or state.last_imu, tuning, dt, thrust)
+    state = correct_tautened(state, history, load, tuning)
     for pose in readings.poses:
         state = correct_pose(state, history, pose, tuning)
     if readings.field_body is not None:
@@ -113,8 +117,8 @@ def estimate(
     if readings.height_m is not None:
         state = correct_barometer(state, history, readings.height_m, tuning.barometer_age, tuning)
     if state.vehicle.rejected == 0.0:
-        for load in readings.loads:
-            state = correct_load(state, history, load, tuning)
+        for reading in readings.loads:
+            state = correct_load(state, history, reading, tuning)
     for direction in readings.directions:
         state = correct_direction(state, history, direction, tuning)
     if state.vehicle.source == RECEIVER:

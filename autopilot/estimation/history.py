@@ -33,7 +33,7 @@ NEVER = -float("inf")
 
 @kernel
 def reading_age(elapsed_us: float, imu_age: float) -> float:
-    """Age (s) of a reading by the clock of the estimate: the instant that the inertial unit shows.
+    """Age (s) of a reading by the clock of the estimate, which is of the instant the inertial unit shows.
 
     No reading overtakes the inertial unit: one that seems to is of the same instant.
     """

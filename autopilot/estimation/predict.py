@@ -161,6 +161,13 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
 
 
 @kernel
+def pendulum_error(load: LoadEstimate, tuning: EstimatorTuning) -> float:
+    """Standard deviation (rad/s^2) of the hanging load's model; drag grows with the square of the speed."""
+    still, drag = tuning.cable_accel_std, tuning.load_drag * dot(load.v_load, load.v_load) / load.length
+    return sqrt(still * still + drag * drag)
+
+
+@kernel
 def doubt(history: History, load: LoadEstimate, n: int) -> Doubt:
     """Standard deviations of what the covariance says."""
     P = history.covariance
@@ -218,7 +225,7 @@ def predict(
         aids.horizontal_slow,
         aids.vertical_slow,
         aids.reversion,
-        LIFTING_ACCEL_STD if loose else tuning.cable_accel_std,
+        LIFTING_ACCEL_STD if loose else pendulum_error(load, tuning),
         PARTING_STD if loose and load.source == TRACKER else 0.0,
     )
     if vehicle.source > 0.0:

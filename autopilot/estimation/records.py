@@ -123,6 +123,7 @@ class EstimatorTuning(NamedTuple):
     gyro_bias_walk: float  # rad/s per square root of a second
     accel_bias_walk: float  # m/s^2 per square root of a second
     cable_accel_std: float  # rad/s^2, error of the pendulum model while taut
+    load_drag: float  # 1/m, drag on the load that the model leaves out: acceleration over square of speed
     length_std: float  # m, of the believed length
     gate_sigma: float
     imu_age: float  # s, of an inertial sample when it comes

@@ -71,6 +71,8 @@ from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
 PLANS = (mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
+REACHED_AGAIN = 4  # times that the end of a mission is said again
+REACHED_US = 300_000  # between two of them
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
 _SECOND_US = 1_000_000
 _INT32 = 2**31 - 1
@@ -105,6 +107,8 @@ class VehicleEndpoint:
         self.identity = identity
         self._signing = SigningService(signing, boot_unix_us)
         self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
+        self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
+        self._reached_us: int | None = None
         self._parameters = ParameterService(parameters)
         self._commands = CommandService(home, identity.flavour)
         self._guided = GuidedService(home, identity.system)
@@ -199,9 +203,14 @@ class VehicleEndpoint:
         """A text for the operators of all links."""
         self._do([Say(severity, text)], [])
 
-    def item_reached(self, seq: int) -> None:
-        """The mission came to the end of an item."""
+    def item_reached(self, seq: int, last: bool = False) -> None:
+        """The mission came to the end of an item.
+
+        Of the last one this is said a few times: some clients learn by nothing else that a mission is over.
+        """
         self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
+        self._reached, self._reached_us = seq, None
+        self._reached_left = REACHED_AGAIN if last else 0
 
     def state_changed(self) -> None:
         """Mode or arming changed: tell everybody with the next `poll`, whatever is due."""
@@ -219,6 +228,7 @@ class VehicleEndpoint:
         """Whether `poll` has anything to do."""
         return (
             self._work
+            or (self._reached_left > 0 and (self._reached_us is None or now_us >= self._reached_us))
             or any(state.streams.next_us <= now_us for state in self._links.values())
             or any(service.next_timer() <= now_us for service in self._timed)
         )
@@ -231,6 +241,7 @@ class VehicleEndpoint:
         for service in self._timed:
             self._do(service.poll(now_us), self._events)
         self._follow_up(self._events)
+        self._say_reached_again(now_us)
         self._work = False
         taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
         if any(taken.values()) or any(state.announced for state in self._links.values()):
@@ -252,6 +263,15 @@ class VehicleEndpoint:
             state.announced.clear()
             datagrams += [(link, datagram) for datagram in state.datagrams(outgoing)]
         return datagrams
+
+    def _say_reached_again(self, now_us: int) -> None:
+        if not self._reached_left:
+            return
+        if self._reached_us is None:
+            self._reached_us = now_us + REACHED_US
+        elif now_us >= self._reached_us:
+            self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(self._reached))], [])
+            self._reached_left, self._reached_us = self._reached_left - 1, now_us + REACHED_US
 
     # ---- sending
 

@@ -189,6 +189,14 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("EST_ACC_WALK", 1e-3, 0.0, 1.0, "m/s^2", "Believed accelerometer bias walk in a second"),
             p("EST_GYRO_BIAS", 0.01, 1e-6, 1.0, "rad/s", "Believed gyro bias at switch-on"),
             p("EST_ACC_BIAS", 0.1, 1e-6, 10.0, "m/s^2", "Believed accelerometer bias at switch-on"),
+            p(
+                "EST_LOAD_DRAG",
+                0.005,
+                0.0,
+                10.0,
+                "1/m",
+                "Believed size of the drag on the load: acceleration over square of speed",
+            ),
             p("EST_LEN_STD", 0.01, 1e-6, 10.0, "m", "Believed error of VEH_CABLE_LEN"),
             p(
                 "EST_RTK_NEW",

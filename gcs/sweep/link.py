@@ -18,6 +18,7 @@ from autopilot.estimation.correct_load import correct_load
 from autopilot.estimation.correct_magnetic import correct_magnetic
 from autopilot.estimation.correct_pose import correct_pose
 from autopilot.estimation.correct_standing import correct_standing
+from autopilot.estimation.correct_tautened import correct_tautened
 from autopilot.estimation.filter import (
     ATTITUDE_STD_TO_FLY,
     COASTING_S,
@@ -339,7 +340,9 @@ def estimate(
     used = state.last_imu
     if norm(inertial.accel) < GREATEST_ACCEL_M_S2 and norm(inertial.gyro) < GREATEST_RATE_RAD_S:
         used = inertial
+    load = state.load
     state = predict(state, history, used, tuning, dt, thrust)
+    state = correct_tautened(state, history, load, tuning)
     state = by_poses(state, history, now_us, buffers, link, tuning)
     state = by_field(state, history, now_us, buffers, tuning)
     state = by_fix(state, history, now_us, buffers, link, tuning)

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from autopilot.services.endpoint import REACHED_AGAIN, REACHED_US
 from autopilot.services.identity import ARDUPILOT, Identity
 from autopilot.services.mission_store import MAX_ITEMS
 from autopilot.services.missions import ASK_US, ECHO_US, ECHOES, INT_ASKS, LATE_US, MAX_ASKS
@@ -402,6 +403,13 @@ def test_mission_current_goes_out_when_it_changes(rig):
         rig.endpoint.state_changed()
         got = [r.message.seq for r in rig.poll()["gcs"] if r.message.get_type() == "MISSION_CURRENT"]
         assert got == [seq]
+
+
+def test_the_end_of_a_mission_is_said_again(rig):
+    rig.endpoint.item_reached(3)
+    rig.endpoint.item_reached(4, last=True)
+    told = [r.message.seq for r in rig.run(20 * REACHED_US) if r.message.get_type() == "MISSION_ITEM_REACHED"]
+    assert told == [3, 4] + [4] * REACHED_AGAIN
 
 
 def test_reached_items_are_told_to_all(rig):

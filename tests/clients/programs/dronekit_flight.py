@@ -20,7 +20,7 @@ collections.MutableMapping = collections.abc.MutableMapping  # type: ignore[attr
 
 from dronekit import Command, LocationGlobalRelative, VehicleMode, connect  # noqa: E402
 
-LONG_S = 60.0
+LONG_S = 120.0  # of a busy machine
 DEGREE_M = 111_319.5
 NAV_WAYPOINT, RELATIVE = 16, 3
 

@@ -17,6 +17,7 @@ from mavsdk import ComponentType, Configuration, Mavsdk, MavsdkError
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.ftp import Ftp
 from mavsdk.plugins.geofence import Geofence
+from mavsdk.plugins.gripper import Gripper
 from mavsdk.plugins.info import Info
 from mavsdk.plugins.log_files import LogFiles, LogFilesResult
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
@@ -26,7 +27,8 @@ from mavsdk.plugins.offboard import Offboard, PositionNedYaw, VelocityNedYaw
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 
-LONG_S = 60.0
+LONG_S = 120.0  # of a busy machine
+LOST_ON_THE_WAY = ("TIMEOUT", "BUSY", "NOT_RECEIVED_YET")
 DEGREE_M = 111_319.5  # of latitude
 NAN = math.nan
 
@@ -73,7 +75,7 @@ class Pilot:
             try:
                 return act()
             except MavsdkError as error:
-                if not any(word in str(error) for word in ("TIMEOUT", "BUSY")):
+                if not any(word in str(error) for word in LOST_ON_THE_WAY):
                     raise
                 self.told["again"] = self.told.get("again", 0) + 1
                 self._turn.wait(1.0)
@@ -88,7 +90,7 @@ class Pilot:
         assert health.is_global_position_ok
         assert health.is_home_position_ok
         assert health.is_armable
-        version = Info(self.system).get_version()
+        version = self.again(Info(self.system).get_version)
         self.told["version"] = [version.flight_sw_major, version.flight_sw_minor]
 
     def telemetry_seen(self) -> None:
@@ -265,6 +267,12 @@ class Pilot:
         """On the ground, before anything is asked."""
         self.again(self.action.disarm)
         self.until("disarmed", lambda: not self.telemetry.armed())
+
+    def gripper(self) -> None:
+        """The load let go of and taken again, on the ground."""
+        gripper = Gripper(self.system)
+        self.again(lambda: gripper.release(1))
+        self.again(lambda: gripper.grab(1))
 
     def log(self) -> None:
         """The log of the flight that is over, by the log protocol; its folder by FTP."""

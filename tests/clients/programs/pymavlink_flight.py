@@ -11,7 +11,7 @@ from typing import Any
 
 from pymavlink import mavutil
 
-LONG_S = 60.0
+LONG_S = 120.0  # of a busy machine
 RELATIVE_INT = mavutil.mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 POSITION_ONLY = 0b110111111000
 MISSION, FENCE, RALLY = 0, 1, 2

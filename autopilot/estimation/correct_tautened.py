@@ -1,0 +1,69 @@
+"""Correction by a cable that comes taut: the load lies, so the vehicle is a cable's length over the ground.
+
+A plain receiver and a barometer know the height to decimetres; here it is measured once.
+"""
+
+from __future__ import annotations
+
+from autopilot.estimation.correct_load import load_position_row
+from autopilot.estimation.correction import inject, look_back, with_aids
+from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.records import (
+    CAMERA,
+    RECEIVER,
+    AidEstimate,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+    LoadEstimate,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3
+
+LYING_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
+
+
+@kernel
+def _owing(a: AidEstimate, debt: Vec3) -> AidEstimate:
+    return AidEstimate(
+        a.mounting,
+        a.heading,
+        a.barometer,
+        a.gnss,
+        a.horizontal_slow,
+        a.vertical_slow,
+        a.reversion,
+        debt,
+        a.field,
+        a.magnetic_age,
+        a.barometer_age,
+        a.rejected,
+    )
+
+
+@kernel
+def correct_tautened(
+    state: EstimatorState, history: History, before: LoadEstimate, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The state after a prediction that found the cable taut; `before` is the load that lay.
+
+    The laws are told at once: they are about to lift the load off this ground.
+    """
+    load = state.load
+    if not (before.taut == 0.0 and load.taut > 0.0 and load.source == CAMERA):
+        return state
+    if state.vehicle.source != RECEIVER:
+        return state
+    n, debt = state.size, state.aids.debt
+    past = look_back(state, history, tuning, 0.0)
+    innovation = before.x_load[2] - load.x_load[2]
+    variance = LYING_STD * LYING_STD
+    load_position_row(history, past, load.length, 2, n)
+    limit = tuning.gate_sigma * tuning.gate_sigma * (spread(history, n) + variance)
+    if not innovation * innovation <= limit:
+        return state
+    begin(history)
+    absorb(history, innovation, variance, n)
+    state = inject(state, history)
+    owed = state.aids.debt
+    return with_aids(state, _owing(state.aids, (owed[0], owed[1], debt[2])))
