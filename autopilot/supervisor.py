@@ -130,7 +130,7 @@ ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable tau
 ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
-HEIGHT_SIGMAS = 2.0  # by which a height may be wrong
+HEIGHT_SIGMAS = 3.0  # by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
 LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
 LIFT_OFF_US = 1_000_000  # after which a load that is being lifted is off the ground
@@ -500,7 +500,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             flight = replace(flight, taut_length_m=norm(sub(view.x_quad, view.x_load)))
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
         flight = _over_load(flight, view)
-        creeps = len(flight.legs) == 1
+        creeps = len(flight.legs) == 1 and flight.still_since_us < 0
         if creeps and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
             flight, view, settings
         ):

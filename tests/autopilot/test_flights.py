@@ -73,6 +73,35 @@ def test_sensors_all_late_are_flown_with_if_that_is_known() -> None:
     assert craft.texts[-1] == "Landed, disarmed"
 
 
+# each was lost: never taut, slack as it was lifted, climb not known, too early on the ground
+@pytest.mark.parametrize("seed", [1, 7, 9, 13])
+def test_a_plain_receiver_lifts_and_sets_down(seed: int) -> None:
+    """Its height is known to decimetres; the cable that comes taut tells it better."""
+    craft = Craft(*load_mission("hover").steps, sensors="gps", seed=seed)
+    craft.begin()
+    craft.run(at_phase(Phase.LIFT))
+    estimated = craft.onboard._state.estimator.vehicle.x_quad[2]
+    assert abs(estimated - craft.truth.x_quad[2]) < 0.06  # at most 0.03; 0.10 to 0.15 without
+    craft.run(at_phase(Phase.DISARMED), 90.0)
+    assert "Load on the ground" in craft.texts
+    assert "Cable slack: falling with the load to catch it" not in craft.texts
+
+
+def test_a_fast_load_is_where_the_estimate_has_it() -> None:
+    """Its drag, which the pendulum does not know, is half a degree of lean at 12 m/s."""
+    craft = Craft(Takeoff(2.0), Waypoint(200.0, 0.0, 2.0), Land(), MIS_SPEED=12.0, MIS_ACCEL=3.0)
+    craft.begin()
+    craft.run(at_phase(Phase.MISSION))
+    off = fastest = 0.0
+    while craft.flight.phase == Phase.MISSION:
+        truth = craft.truth
+        craft.tick()
+        fastest = max(fastest, norm(truth.v_load))
+        off = max(off, norm(sub(craft.onboard._state.estimator.load.x_load, truth.x_load)))
+    assert fastest > 9.0
+    assert off < 0.004  # 2 mm; 8 mm without EST_LOAD_DRAG
+
+
 @pytest.mark.parametrize("distance", [0.02, 0.1, 0.3])
 def test_short_moves_are_gentle(distance: float) -> None:
     craft = Craft(Takeoff(1.0), Waypoint(distance, 0.0, 1.0), Delay(1.0), Land())

@@ -265,6 +265,19 @@ def test_a_vehicle_whose_sensors_are_silent_still_says_that_it_is_there() -> Non
     assert received.message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 
+@pytest.mark.parametrize(("given", "believed"), [({}, 30.0), ({"VEH_IMU_DELAY": 20.0}, 20.0)])
+def test_latency_of_the_sensors_is_believed_unless_a_belief_is_given(
+    given: dict[str, float], believed: float
+) -> None:
+    onboard = build_onboard(Conditions(settings={"SIM_SENS_LAT_MS": 30.0, **given}), Home())
+    assert onboard.parameters["VEH_IMU_DELAY"] == believed
+
+
+def test_no_more_latency_is_believed_than_may_be() -> None:
+    onboard = build_onboard(Conditions(settings={"SIM_SENS_LAT_MS": 300.0}), Home())
+    assert onboard.parameters["VEH_IMU_DELAY"] == onboard.parameters.describe("VEH_IMU_DELAY").high
+
+
 def test_the_saved_world_is_set_again_in_the_simulator() -> None:
     craft = Craft()
     craft.onboard.restore_world({"SIM_WIND_E": 2.5, "SIM_LOAD_MASS": 0.1, "SIM_NO_SUCH": 1.0})

@@ -149,7 +149,7 @@ def test_a_mission_delivers_and_lands_beside_what_it_delivered() -> None:
     assert craft.truth.x_load == pytest.approx((1.0, 0.5, 0.02), abs=0.03)
     assert 0.3 < math.dist(craft.truth.x_quad[:2], (1.0, 0.5)) < 0.4
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
-    assert reached == [0, 1, 2, 3, 4, 5]
+    assert sorted(set(reached)) == [0, 1, 2, 3, 4, 5]
     assert craft.texts.count("Load released") == 1
 
 

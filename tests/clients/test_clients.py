@@ -40,6 +40,22 @@ FLOWN = [
 FAILSAFE = m.PLUMBLINE_PHASE_FAILSAFE
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "[05:28:07|Warn ] Timeout: retries exceeded (mavlink_mission_transfer_client.cpp:624)",
+        "[05:28:07|Error] Rejecting tune, too short",
+        "WARNING:dronekit:Link timeout, no heartbeat in last 5 seconds",
+        "Got COMMAND_ACK: DO_SET_MODE: TEMPORARILY_REJECTED",
+        "Got MISSION_ACK: TYPE_MISSION: UNSUPPORTED",
+        "fence breach",
+        "AP: Mission denied while lift",
+    ],
+)
+def test_what_counts_as_a_complaint(line: str) -> None:
+    assert complaints(f"all well\n{line}\n") == [line]
+
+
 class Watched(NamedTuple):
     """A flight of MAVSDK's while two ground stations watch, one of which vanishes on the way."""
 
@@ -87,7 +103,7 @@ def test_mavsdk_flies(mavsdk_and_two_ground_stations: Callable[[], Watched]) -> 
     assert complaints(flight.told.output) == []
     assert told["version"] == [1, 15]
     assert told["progress"] == [0, 1, 2, 3]
-    assert told["texts"] == FLOWN
+    assert told["texts"] == [*FLOWN, "Load released", "Load taken"]
     assert "again" not in told
     result, size, path, name = told["log"]
     assert (result, size) == ("SUCCESS", len(flight.log))

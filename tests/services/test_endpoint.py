@@ -47,6 +47,19 @@ def test_default_rates_over_ten_seconds(rig):
         assert counts.get(message_id, 0) == expected * per_poll.get(message_id, 1), message_id
 
 
+def test_every_stream_comes_when_it_is_asked_for(rig):
+    rig.changes = {"x_quad_d": (0.0, 0.0, 1.0), "wind": (1.0, 0.0, 0.0)}
+    for message_id in STREAMS:
+        rig.run(12_000)
+        for off in STREAMS.keys() - {m.MAVLINK_MSG_ID_HEARTBEAT}:
+            rig.send(m.MAVLink_command_long_message(1, 1, 511, 0, off, -1, 0, 0, 0, 0, 0))
+        rig.run(12_000)
+        rig.send(m.MAVLink_command_long_message(1, 1, 512, 0, message_id, 0, 0, 0, 0, 0, 0))
+        heard = [r.message for r in rig.poll()["gcs"]]
+        assert [x.result for x in heard if x.get_type() == "COMMAND_ACK"] == [0]
+        assert message_id in [x.get_msgId() for x in heard]
+
+
 def test_messages_of_the_dialect_come_from_their_own_component(rig):
     components = {r.message.get_msgId(): r.component for r in rig.run(1_000_000)}
     assert {c for i, c in components.items() if i >= 60000} == {DIALECT_COMPONENT}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 from autopilot.services.file_tree import checksum
 from autopilot.services.files import path_of
 from autopilot.services.identity import Identity
-from autopilot.services.made_files import PARAMETER_TEXTS, made_files
+from autopilot.services.made_files import GENERAL, PARAMETER_TEXTS, made_files
 from autopilot.services.mission_store import StoredMission
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -54,3 +55,38 @@ def test_the_range_of_another_process_parameter_is_not_made_up(rig: Any) -> None
     rig.table.learn(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
     told = {p["name"]: p for p in json.loads(made(rig.table)[PARAMETER_TEXTS]({}))["parameters"]}
     assert not {"min", "max", "default"} & told["SIM_WIND_E"].keys()
+
+
+# what MAVLink's component_metadata/parameter.schema.json and general.schema.json allow: no other keys
+_PARAMETER_KEYS = {
+    "name": str, "type": str, "shortDesc": str, "longDesc": str, "units": str, "default": (int, float),
+    "decimalPlaces": int, "min": (int, float), "max": (int, float), "increment": (int, float),
+    "rebootRequired": bool, "group": str, "category": str, "volatile": bool, "values": list, "bitmask": list,
+    "readOnly": bool,
+}  # fmt: skip
+_TYPES = {"Uint8", "Int8", "Uint16", "Int16", "Uint32", "Int32", "Float"}
+_GENERAL_KEYS = {"version", "vendorName", "modelName", "firmwareVersion", "hardwareVersion", "metadataTypes"}
+_METADATA_KEYS = {
+    "type", "uri", "fileCrc", "uriFallback", "fileCrcFallback", "translationUri", "translationUriFallback",
+}  # fmt: skip
+
+
+def test_the_metadata_keep_to_mavlinks_schemas() -> None:
+    table = autopilot_parameters(load_belief("bebop"))
+    table.learn(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
+    texts = json.loads(made(table)[PARAMETER_TEXTS]({}))
+    assert texts.keys() == {"version", "parameters"}
+    assert isinstance(texts["version"], int) and texts["version"] >= 3
+    for told in texts["parameters"]:
+        assert re.fullmatch(r"[.\-a-zA-Z0-9_{}]{1,16}", told["name"])
+        assert told["type"] in _TYPES
+        assert told.get("decimalPlaces", 0) >= 0
+        for key, value in told.items():
+            assert isinstance(value, _PARAMETER_KEYS[key]), (told["name"], key)
+    general = json.loads(made(table)[GENERAL]({}))
+    assert general.keys() <= _GENERAL_KEYS
+    assert general["version"] >= 1
+    assert re.fullmatch(r"\d+\.\d+\.\d+(\.\d+)?", general["firmwareVersion"])
+    for kind in general["metadataTypes"]:
+        assert {"type", "uri"} <= kind.keys() <= _METADATA_KEYS
+        assert isinstance(kind["type"], int) and 0 <= kind["fileCrc"] < 2**32
