@@ -317,6 +317,19 @@ def test_an_orbit_is_flown_about_its_centre_without_a_stream() -> None:
     assert x[0] * v[1] - x[1] * v[0] > 0.0
 
 
+def test_a_circle_of_so_many_turns_ends_in_a_hold() -> None:
+    sky = Sky().airborne()
+    begun_us = sky.now_us
+    assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0, turns=1.5)).result == ACCEPTED
+    sky.run(lambda sky: sky.flight.phase == Phase.HOLD, 40.0)
+    # 1.5 turns of 2 m at 1 m/s, and half of the ramp, 4 v / a, in which the speed is reached
+    lasted = 1.5 * 2.0 * math.pi * 2.0 + 0.5 * 4.0 / SETTINGS.accel_m_s2
+    assert (sky.now_us - begun_us) * 1e-6 == pytest.approx(lasted, abs=0.05)
+    assert sky.texts[-1] == "Circle flown: holding"
+    sky.wait(5.0)
+    assert norm(sky.view.v_load) < 1e-6
+
+
 @pytest.mark.parametrize(
     "orbit",
     [
