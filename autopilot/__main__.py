@@ -56,6 +56,7 @@ from autopilot.wire.shell import (
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
 _BEAT_S = 1.0  # between two heartbeats while the clock stands
+_SLOW_SHARE = 0.8  # of the wall clock, below which the vehicle's is slow
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _GROUND_RESEND_S = 0.5
 _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
@@ -209,6 +210,10 @@ class Program:
         self._ground = ground
         self._say = say
         self._socket = _open(simulator, "simulator")
+        self._beaten, self._beaten_us = (
+            0.0,
+            0,
+        )  # the wall's and the vehicle's clock when it was last looked at
         greeting = mavlink.MAVLink_heartbeat_message(
             type=mavlink.MAV_TYPE_QUADROTOR,
             autopilot=mavlink.MAV_AUTOPILOT_PX4,
@@ -288,11 +293,20 @@ class Program:
         else:
             self._socket.sendto(answer, self._simulator)
             self.onboard.endpoint.tell_time(time.time_ns() // 1000)
+            self._keep_beating()
             self._ground.exchange(self.onboard, self._keep, stop)
         self._keep(self.onboard.endpoint.take_events())
         self._keep_log(_LOG_BYTES)
         if new and self.onboard.fault and self.onboard.tick == 1:
             raise AutopilotError(self.onboard.fault)
+
+    def _keep_beating(self) -> None:
+        """A heartbeat each second of the wall clock where the vehicle's is slower: clients wait by theirs."""
+        now, now_us = time.monotonic(), self.onboard.now_us
+        if now - self._beaten >= _BEAT_S:
+            if now_us - self._beaten_us < _SLOW_SHARE * _BEAT_S * 1e6:
+                self.onboard.endpoint.state_changed()
+            self._beaten, self._beaten_us = now, now_us
 
     def _greet(self) -> None:
         with suppress(OSError):
