@@ -41,7 +41,8 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
 SLACK_ACCEL_STD = 10.0  # m/s^2, of a load that is tracked: free fall or rest on the ground, it is not known
-LIFTING_ACCEL_STD = 5.0  # rad/s^2, of a cable that does not carry its load
+# rad/s^2, error of the pendulum model of a cable that does not carry its load, and of one that is tracked
+LIFTING_ACCEL_STD, LIFTING_TRACKED_ACCEL_STD = 5.0, 0.5
 PARTING_STD = 0.3  # m/s, at which a tracked load and the vehicle part until the cable carries
 DEBT_TIME_S = 4.0  # in which a plain receiver's corrections are passed on
 SPEED_TIME_S = 1.0  # for which an error of the vehicle's velocity lasts
@@ -212,7 +213,11 @@ def predict(
     load, aids = state.load, state.aids
     vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, tuning, dt)
     a = vehicle.accel_quad
-    loose = loosely_tied(load, state.memory_s)
+    swaying, parting = pendulum_error(load, tuning), 0.0
+    if loosely_tied(load, state.memory_s):
+        tracked = load.source == TRACKER
+        swaying = LIFTING_TRACKED_ACCEL_STD if tracked else LIFTING_ACCEL_STD
+        parting = PARTING_STD if tracked else 0.0
     motion = Transit(
         (a[0], a[1], a[2] + tuning.gravity),
         R,
@@ -225,8 +230,8 @@ def predict(
         aids.horizontal_slow,
         aids.vertical_slow,
         aids.reversion,
-        LIFTING_ACCEL_STD if loose else pendulum_error(load, tuning),
-        PARTING_STD if loose and load.source == TRACKER else 0.0,
+        swaying,
+        parting,
     )
     if vehicle.source > 0.0:
         transit(history, motion, tuning, dt, state.size)
