@@ -47,6 +47,7 @@ class Truth(NamedTuple):
     slip_rate: float  # 1/s, rate at which friction below the Coulomb limit brakes a slide
     reel_rate: float = 0.0  # m/s, at which `cable_length` grows at the beginning of a step
     reel_accel: float = 0.0  # m/s^2, constant along a step
+    rotor_share: Rotors = (1.0, 1.0, 1.0, 1.0)  # of its command that a rotor gives; 0: it has failed
 
 
 class PlantState(NamedTuple):

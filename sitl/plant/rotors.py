@@ -18,12 +18,12 @@ def _clamp(force: float, low: float, high: float) -> float:
 @kernel
 def limited(command: Rotors, truth: Truth) -> Rotors:
     """The command in N as far as each rotor can follow it at all."""
-    low, high = truth.rotor_min, truth.rotor_max
+    low, high, share = truth.rotor_min, truth.rotor_max, truth.rotor_share
     return (
-        _clamp(command[0], low, high),
-        _clamp(command[1], low, high),
-        _clamp(command[2], low, high),
-        _clamp(command[3], low, high),
+        share[0] * _clamp(command[0], low, high),
+        share[1] * _clamp(command[1], low, high),
+        share[2] * _clamp(command[2], low, high),
+        share[3] * _clamp(command[3], low, high),
     )
 
 

@@ -14,6 +14,16 @@ def sim_parameters(truth: Truth) -> ParameterTable:
             Parameter(
                 "SIM_ROTOR_TAU_MS", truth.rotor_tau * 1e3, 0.0, 1000.0, "ms", "Time constant of the rotor lag"
             ),
+            Parameter(
+                "SIM_ENGINE_FAIL",
+                0.0,
+                0.0,
+                15.0,
+                "",
+                "Rotors that fail, a bit for each: 1, 2, 4, 8 for rotor 1, 2, 3, 4",
+                integer=True,
+            ),
+            Parameter("SIM_ENGINE_MUL", 0.0, 0.0, 1.0, "", "Share of its command that a failing rotor gives"),
             Parameter("SIM_NOISE_SCALE", 1.0, 0.0, 100.0, "", "Factor on the noise and bias of every sensor"),
             Parameter(
                 "SIM_SENS_LAT_MS", 0.0, 0.0, 500.0, "ms", "Latency added to that of every sensor", fixed=True
@@ -53,11 +63,14 @@ def _around(name: str, value: float, unit: str, text: str, fixed: bool = False) 
 def apply(truth: Truth, table: ParameterTable) -> Truth:
     """`truth` with what the table says of the plant itself."""
     drag = table["SIM_DRAG_SCALE"]
+    failing, left = int(table["SIM_ENGINE_FAIL"]), table["SIM_ENGINE_MUL"]
+    one, two, three, four = (left if failing >> bit & 1 else 1.0 for bit in range(4))
     return truth._replace(
         quad_mass=table["SIM_QUAD_MASS"],
         load_mass=table["SIM_LOAD_MASS"],
         cable_length=table["SIM_CABLE_LEN"],
         rotor_tau=table["SIM_ROTOR_TAU_MS"] * 1e-3,
+        rotor_share=(one, two, three, four),
         quad_drag=truth.quad_drag * drag,
         quad_drag_quadratic=truth.quad_drag_quadratic * drag,
         spin_drag=truth.spin_drag * drag,

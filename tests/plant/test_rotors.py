@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from sitl.plant.rotors import decay, limited, thrust_and_moment
 from sitl.plant.step import advance, advance_many
+from sitl.truth.parameters import apply, sim_parameters
 
 CALM = (0.0, 0.0, 0.0)
 
@@ -68,3 +69,16 @@ def test_command_that_is_no_number_stops_the_rotor(bebop):
 
 def test_unlimited_rotors_follow_any_command(thesis):
     assert limited((-3.0, 0.0, 7.0, 1e3), thesis) == (-3.0, 0.0, 7.0, 1e3)
+
+
+def test_a_failing_rotor_gives_its_share_of_what_it_could(bebop):
+    failing = bebop._replace(rotor_share=(1.0, 0.0, 0.25, 1.0))
+    assert limited((1.0, 1.0, 9.0, 0.5), failing) == (1.0, 0.0, 0.25 * bebop.rotor_max, 0.5)
+
+
+def test_failing_rotors_are_named_by_the_bits_of_a_parameter(bebop):
+    table = sim_parameters(bebop)
+    assert apply(bebop, table).rotor_share == (1.0, 1.0, 1.0, 1.0)
+    table.set("SIM_ENGINE_FAIL", 5.0)
+    table.set("SIM_ENGINE_MUL", 0.5)
+    assert apply(bebop, table).rotor_share == (0.5, 1.0, 0.5, 1.0)
