@@ -24,6 +24,7 @@ from autopilot.flight import (
 from autopilot.following import NEVER_US, Circle, Lean, Stream, Wish
 from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
 from autopilot.guidance import Hold, carry_leg, reel_leg, top_of
+from autopilot.phase_legs import LEAST_REEL_M, as_flown, asked_motion, length_at, stop
 from autopilot.services import identity
 from autopilot.services.records import Verdict
 from autopilot.services.requests import (
@@ -52,17 +53,12 @@ from autopilot.services.requests import (
     Winch,
 )
 from autopilot.supervisor import (
-    LEAST_REEL_M,
     RELEASED_TEXT,
     TRANSITIONS,
-    as_flown,
-    asked_motion,
     begin_step,
     disarmed,
     happen,
-    length_at,
     release,
-    stop,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model

@@ -34,18 +34,17 @@ from autopilot.geometry.linear import ZERO
 from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Catch, Creep, asked_jet
 from autopilot.observer import nominal
 from autopilot.onboard import Onboard, build_setup, plan_of
+from autopilot.phase_legs import CLEARANCE, TOUCH_SPEED
 from autopilot.scheduler import divider, is_due
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor import (
-    CLEARANCE,
     LIFT_OFF_US,
     LOAD_SUNK,
     PULL_US,
     STILL_SPEED,
     STILL_US,
     TAUT_LATEST,
-    TOUCH_SPEED,
     VEHICLE_SUNK,
 )
 from autopilot.vehicle.belief import load_belief

@@ -20,6 +20,7 @@ ROOMS = ("autopilot", "sitl", "gcs", "missions")
 
 LEAVES = ("autopilot.geometry", "missions", "autopilot.wire", "autopilot.vehicle")
 RECORDS = "autopilot.control.records"  # what the laws speak of: vehicle, state, reference, command
+PHASES = (*LEAVES, RECORDS, "autopilot.flight", "autopilot.following", "autopilot.guidance")
 # room: what it may import besides itself. A module belongs to the longest room that begins its name.
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.geometry": (),
@@ -30,13 +31,8 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.estimation": (*LEAVES, RECORDS),
     "autopilot.mixer": (*LEAVES, RECORDS),
     "autopilot.services": LEAVES,
-    "autopilot.supervisor": (
-        *LEAVES,
-        RECORDS,
-        "autopilot.flight",
-        "autopilot.following",
-        "autopilot.guidance",
-    ),
+    "autopilot.phase_legs": PHASES,
+    "autopilot.supervisor": (*PHASES, "autopilot.phase_legs"),
     "autopilot": ("autopilot", "missions"),  # what joins the rooms; TOP says who may not be joined
     "sitl": ("autopilot.geometry", "autopilot.wire"),
     "gcs": ("autopilot.geometry", "autopilot.wire", "missions"),
