@@ -109,7 +109,7 @@ class VehicleEndpoint:
         self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
         self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
         self._reached_us: int | None = None
-        self._parameters = ParameterService(parameters)
+        self._parameters = ParameterService(parameters, identity.parameter_encoding)
         self._commands = CommandService(home, identity.flavour)
         self._guided = GuidedService(home, identity.system)
         made = made_files(identity, parameters, lambda: self._missions.mission)

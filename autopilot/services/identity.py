@@ -220,6 +220,17 @@ FLAVOURS = {flavour.name: flavour for flavour in (PX4, ARDUPILOT, GENERIC)}
 
 
 @dataclass(frozen=True, slots=True)
+class ParameterEncoding:
+    """How parameters travel: all as REAL32, or whole-numbered ones as INT32, by their bits or their value."""
+
+    integers: bool
+    bytewise: bool
+
+
+ALL_REAL = ParameterEncoding(False, False)
+
+
+@dataclass(frozen=True, slots=True)
 class Identity:
     """Ids on the wire and the flavour. `load_system` 0: the load is no MAVLink system of its own."""
 
@@ -227,13 +238,20 @@ class Identity:
     flavour: Flavour = PX4
     version: tuple[int, int, int] = (0, 1, 0)  # of this program
     load_system: int = 0
+    integers: bool = False  # whole-numbered parameters travel as INT32
+
+    @property
+    def parameter_encoding(self) -> ParameterEncoding:
+        """Bit by bit or by value, as the capabilities say."""
+        return ParameterEncoding(self.integers, bool(self.flavour.capabilities & _BYTEWISE))
 
 
 def identity_of(table: ParameterTable) -> Identity:
     """The identity that the parameters ask for; a load under the vehicle's own id is no system of its own."""
     system, load = int(table["MAV_SYS_ID"]), int(table["MAV_LOAD_SYS_ID"])
     flavour = tuple(FLAVOURS.values())[int(table["MAV_IDENTITY"])]
-    return Identity(system, flavour, load_system=0 if load == system else load)
+    integers = table["MAV_PARAM_INT"] > 0.0
+    return Identity(system, flavour, load_system=0 if load == system else load, integers=integers)
 
 
 def available_modes_messages(identity: Identity) -> tuple[mavlink.MAVLink_available_modes_message, ...]:

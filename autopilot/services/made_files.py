@@ -27,7 +27,7 @@ GENERAL: Path = ("etc", "extras", "component_general.json")
 PARAMETER_TEXTS: Path = ("etc", "extras", "parameters.json")
 
 _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
-_FLOAT_TYPE, _HAS_DEFAULT = 4, 0x10
+_INT32_TYPE, _FLOAT_TYPE, _HAS_DEFAULT = 3, 4, 0x10
 _LONGEST_COMMON = 15  # letters of a name that the one before it may lend, a field of four bits
 _HEAD = struct.Struct("<HHH")
 _MISSION_MAGIC = 0x763D
@@ -37,7 +37,7 @@ _FLOAT32_MAX = 3.4028234663852886e38
 _PARAMETER_METADATA = 1  # COMP_METADATA_TYPE
 
 
-def parameter_pack(table: ParameterTable, query: Mapping[str, str]) -> bytes:
+def parameter_pack(table: ParameterTable, query: Mapping[str, str], integers: bool = False) -> bytes:
     """All parameters; `withdefaults=1` adds the defaults, `start` and `count` choose a part.
 
     A record is type and flags, length of the name and how much of it is that of the name before, the rest of
@@ -55,8 +55,10 @@ def parameter_pack(table: ParameterTable, query: Mapping[str, str]) -> bytes:
         flags = _HAS_DEFAULT if defaults and default != value else 0
         rest = name[common:]
         numbers = (value, default) if flags else (value,)
-        packed.append(bytes((_FLOAT_TYPE | flags, common | (len(rest) - 1) << 4)) + rest)
-        packed.append(struct.pack(f"<{len(numbers)}f", *map(_within_float32, numbers)))
+        kind, letter = (_INT32_TYPE, "i") if integers and table.describe(text).integer else (_FLOAT_TYPE, "f")
+        packed.append(bytes((kind | flags, common | (len(rest) - 1) << 4)) + rest)
+        carried = map(round if letter == "i" else _within_float32, numbers)
+        packed.append(struct.pack(f"<{len(numbers)}{letter}", *carried))
         before = name
     return b"".join(packed)
 
@@ -86,14 +88,14 @@ def mission_pack(items: tuple[WireItem, ...]) -> bytes:
     )
 
 
-def parameter_texts(table: ParameterTable) -> bytes:
+def parameter_texts(table: ParameterTable, integers: bool = False) -> bytes:
     """Metadata of the parameters; those of another process without a range, which only it knows."""
     listed = []
     for name in table.names:
         known = table.describe(name)
         record: dict[str, Any] = {
             "name": name,
-            "type": "Float",
+            "type": "Int32" if integers and known.integer else "Float",
             "shortDesc": known.text,
             "units": known.unit,
             "group": name.partition("_")[0],
@@ -108,7 +110,7 @@ def parameter_texts(table: ParameterTable) -> bytes:
 
 def general(identity: Identity, table: ParameterTable) -> bytes:
     """Which metadata there are, and where."""
-    texts = parameter_texts(table)
+    texts = parameter_texts(table, identity.integers)
     return _json(
         {
             "version": 1,
@@ -127,10 +129,10 @@ def made_files(
 ) -> dict[Path, Maker]:
     """All of them by path; `mission` tells the mission in force."""
     return {
-        PARAMETERS: lambda query: parameter_pack(table, query),
+        PARAMETERS: lambda query: parameter_pack(table, query, identity.integers),
         MISSION: lambda query: mission_pack(mission().items),
         GENERAL: lambda query: general(identity, table),
-        PARAMETER_TEXTS: lambda query: parameter_texts(table),
+        PARAMETER_TEXTS: lambda query: parameter_texts(table, identity.integers),
     }
 
 

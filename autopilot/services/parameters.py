@@ -1,4 +1,5 @@
-"""The parameter protocol: list, read and set of a `ParameterTable`, every value a float32.
+"""The parameter protocol: list, read and set of a `ParameterTable`, every value a float32, or whole numbers
+an INT32 where the identity says so.
 
 Lists go out at a steady pace for each link; whoever misses an index asks for it again. A set is answered with
 the value that is really stored, to every link if it is a new one, so that no ground station shows an old one.
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from autopilot.services.identity import ALL_REAL, ParameterEncoding
 from autopilot.services.records import (
     Decide,
     Link,
@@ -20,9 +22,8 @@ from autopilot.services.records import (
 )
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import ParameterError, ParameterTable, decimal_from_float32
+from autopilot.wire.parameters import ParameterError, ParameterTable, from_the_wire, on_the_wire
 
-_REAL32 = mavlink.MAV_PARAM_TYPE_REAL32
 _BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
 LIST_PACE_US = 2000  # between two values of a list: 500 a second
 LIST_BURST = 8  # of them at once, where ticks are longer than that
@@ -32,13 +33,15 @@ DOES_NOT_EXIST = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
 OUT_OF_RANGE = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
 READ_ONLY = mavlink.MAV_PARAM_ERROR_READ_ONLY
 TYPE_MISMATCH = 7
+_TYPE_NAMES = {mavlink.MAV_PARAM_TYPE_REAL32: "REAL32", mavlink.MAV_PARAM_TYPE_INT32: "INT32"}
 
 
 class ParameterService:
     """Serves one table to any number of links."""
 
-    def __init__(self, table: ParameterTable) -> None:
+    def __init__(self, table: ParameterTable, encoding: ParameterEncoding = ALL_REAL) -> None:
         self.table = table
+        self._encoding = encoding
         self._lists: dict[Link, tuple[int, int]] = {}  # next index, and when
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
@@ -61,11 +64,12 @@ class ParameterService:
         name = message.param_id
         if name not in self.table:
             return [self._error(name, _BY_NAME, DOES_NOT_EXIST, peer)]
-        if message.param_type != _REAL32:
-            why = f"{name}: type {message.param_type} was sent; every parameter is REAL32 ({_REAL32})"
+        kind = self._carried(name)[1]
+        if message.param_type not in (kind, mavlink.MAV_PARAM_TYPE_REAL32):
+            why = f"{name}: type {message.param_type} was sent; it is {_TYPE_NAMES[kind]} ({kind})"
             return self._refused(name, TYPE_MISMATCH, why, peer)
         before = self.table[name]
-        value = decimal_from_float32(message.param_value)
+        value = from_the_wire(message.param_value, message.param_type)
         try:
             self.table.describe(name).checked(value)
         except ParameterError as error:
@@ -104,8 +108,12 @@ class ParameterService:
         """PARAM_VALUE of the value in force."""
         table = self.table
         return mavlink.MAVLink_param_value_message(
-            name.encode(), table[name], _REAL32, len(table.names), table.index(name)
+            name.encode(), *self._carried(name), len(table.names), table.index(name)
         )
+
+    def _carried(self, name: str) -> tuple[float, int]:
+        whole = self._encoding.integers and self.table.describe(name).integer
+        return on_the_wire(self.table[name], whole, self._encoding.bytewise)
 
     def next_timer(self) -> int:
         """When `poll` has something to send, in us."""

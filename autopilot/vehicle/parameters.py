@@ -324,6 +324,16 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
                 fixed=True,
             ),
             p(
+                "MAV_PARAM_INT",
+                0.0,
+                0.0,
+                1.0,
+                "",
+                "1: whole-numbered parameters travel as INT32, 0: all as REAL32",
+                integer=True,
+                fixed=True,
+            ),
+            p(
                 "MAV_LOAD_SYS_ID",
                 0.0,
                 0.0,

@@ -1,6 +1,6 @@
 """The parameter protocol: the whole list with its gaps filled, one by name, and setting one for certain.
 
-All parameters of the vehicle are REAL32, so a value is the float32 nearest to what was typed.
+A value is sent as the float32 nearest to what was typed, also where the vehicle tells it as an INT32.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import struct
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import NAME_LENGTH, decimal_from_float32
+from autopilot.wire.parameters import NAME_LENGTH, decimal_from_float32, from_the_wire
 from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
 
 RETRY_US = 500_000
@@ -59,7 +59,10 @@ class ParameterList:
             return
         self._count = message.param_count
         if message.param_index not in self._found:
-            self._found[message.param_index] = (message.param_id, decimal_from_float32(message.param_value))
+            self._found[message.param_index] = (
+                message.param_id,
+                from_the_wire(message.param_value, message.param_type),
+            )
             self._retry.restart()
             self._retry.wait(now_us, RETRY_US)
         if len(self._found) >= self._count:
@@ -100,7 +103,7 @@ class ParameterGet:
         if error is not None:
             self.result = Result(Status.REFUSED, error)
         elif _is_value(message, self._name):
-            self.value = decimal_from_float32(message.param_value)
+            self.value = from_the_wire(message.param_value, message.param_type)
             self.result = Result(Status.DONE, f"{self._name} = {self.value:.9g}")
 
     def poll(self, now_us: int) -> list[Any]:
@@ -136,10 +139,11 @@ class ParameterSet:
         if error is not None:
             self.result = Result(Status.REFUSED, error)
         elif _is_value(message, self._name):
-            if message.param_value == self._value:
+            held = from_the_wire(message.param_value, message.param_type)
+            if float32(held) == self._value:
                 self.result = Result(Status.DONE, f"{self._name} = {decimal_from_float32(self._value):.9g}")
             else:  # refused, or an answer to an older question: the next tries will tell
-                self._held = message.param_value
+                self._held = held
 
     def poll(self, now_us: int) -> list[Any]:
         if self.result is not None or not self._retry.due(now_us):
@@ -150,8 +154,7 @@ class ParameterSet:
                 text = f"{self._name} = {wanted:.9g}: no answer after {self._retry.sent} tries"
                 self.result = Result(Status.UNANSWERED, text)
             else:
-                held = decimal_from_float32(self._held)
-                text = f"{self._name} = {wanted:.9g}: the vehicle keeps {held:.9g}"
+                text = f"{self._name} = {wanted:.9g}: the vehicle keeps {self._held:.9g}"
                 self.result = Result(Status.REFUSED, text)
             return []
         self._retry.asked(now_us)

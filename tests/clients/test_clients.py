@@ -70,7 +70,7 @@ class Watched(NamedTuple):
 
 @staged
 def mavsdk_and_two_ground_stations(stage: Stage) -> Watched:
-    stage.begin("--set", "MAV_LOAD_SYS_ID=2", speed=SPEED)
+    stage.begin("--set", "MAV_LOAD_SYS_ID=2", "--set", "MAV_PARAM_INT=1", speed=SPEED)
     stays = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     vanishes = stage.mavproxy(f"tcp:{LOOPBACK}:{stage.tcp}")
     for program in (stays, vanishes):
@@ -102,6 +102,7 @@ def test_mavsdk_flies(mavsdk_and_two_ground_stations: Callable[[], Watched]) -> 
     told = flight.told.value
     assert complaints(flight.told.output) == []
     assert told["version"] == [1, 15]
+    assert told["parameters"] == {"real": True, "whole": True}
     assert told["progress"] == [0, 1, 2, 3]
     assert told["texts"] == [*FLOWN, "Load released", "Load taken"]
     assert "again" not in told

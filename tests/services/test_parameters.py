@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import pytest
 
+from autopilot.services.identity import ParameterEncoding
 from autopilot.services.parameters import (
     DOES_NOT_EXIST,
     LIST_PACE_US,
@@ -17,8 +19,9 @@ from autopilot.services.parameters import (
 from autopilot.services.records import ParameterChanged, Peer
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.parameters import Parameter, ParameterTable
 
-REAL32 = m.MAV_PARAM_TYPE_REAL32
+REAL32, INT32 = m.MAV_PARAM_TYPE_REAL32, m.MAV_PARAM_TYPE_INT32
 
 
 def set_(name: bytes, value: float, kind: int = REAL32):
@@ -154,3 +157,40 @@ def test_a_list_under_way_ends_with_its_link(rig):
     service.forget("late")
     assert service.next_timer() == NEVER_US
     assert service.poll(10**9) == []
+
+
+def integer_service(bytewise: bool):
+    table = ParameterTable(
+        [
+            Parameter("WHOLE", 3.0, -1000.0, 100_000.0, "", "A count", integer=True),
+            Parameter("LOAD_MASS", 0.1, 0.01, 1.0, "kg", "Believed mass of the load"),
+        ]
+    )
+    return ParameterService(table, ParameterEncoding(True, bytewise))
+
+
+def bits(number: int) -> float:
+    """The float whose bits are those of the INT32."""
+    return struct.unpack("<f", struct.pack("<i", number))[0]
+
+
+@pytest.mark.parametrize("bytewise", [True, False])
+@pytest.mark.parametrize("number", [-1000, -1, 0, 1, 7, 100_000])
+def test_whole_numbers_travel_as_int32(number: int, bytewise: bool) -> None:
+    service = integer_service(bytewise)
+    carried = bits(number) if bytewise else float(number)
+    service.receive_set(set_(b"WHOLE", carried, INT32), Peer("gcs", 255, 190), 0, lambda request: None)
+    assert service.table["WHOLE"] == number
+    value = service.value_message("WHOLE")
+    assert value.param_type == INT32
+    assert struct.pack("<f", value.param_value) == struct.pack("<f", carried)
+    assert service.value_message("LOAD_MASS").param_type == REAL32
+
+
+def test_a_real_number_for_a_whole_one_is_taken_if_it_is_whole(rig):
+    service, peer = integer_service(bytewise=True), Peer("gcs", 255, 190)
+    service.receive_set(set_(b"WHOLE", 5.0), peer, 0, rig.decide)
+    assert service.table["WHOLE"] == 5.0
+    service.receive_set(set_(b"WHOLE", 5.5), peer, 0, rig.decide)
+    service.receive_set(set_(b"LOAD_MASS", bits(1), INT32), peer, 0, rig.decide)
+    assert (service.table["WHOLE"], service.table["LOAD_MASS"]) == (5.0, 0.1)

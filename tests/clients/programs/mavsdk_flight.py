@@ -135,11 +135,13 @@ class Pilot:
     def parameters(self) -> None:
         param = Param(self.system)
         everything = param.get_all_params()
-        self.told["parameters"] = len(everything.float_params) + len(everything.int_params)
+        real, whole = ({p.name for p in some} for some in (everything.float_params, everything.int_params))
+        self.told["parameters"] = {"real": "MIS_SPEED" in real, "whole": "MIS_SHAPE" in whole}
         param.set_param_float("MIS_SPEED", 1.25)
         assert param.get_param_float("MIS_SPEED") == 1.25
         param.set_param_float("MIS_SPEED", 1.5)
-        param.set_param_float("MIS_SHAPE", 1.0)  # an integer in our table
+        param.set_param_int("MIS_SHAPE", 1)
+        assert param.get_param_int("MIS_SHAPE") == 1
         self.action.set_takeoff_altitude(1.5)
         assert self.action.get_takeoff_altitude() == 1.5
 
