@@ -21,7 +21,7 @@ fly: $(STAMP) ## fly Case B through three real processes and show the report
 	$(BIN)/gcs fly case-b --sensors lab
 
 test: $(STAMP) ## run the tests
-	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist worksteal
+	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist loadgroup
 
 lint: $(STAMP) ## ruff: lint and format
 	$(BIN)/ruff check .

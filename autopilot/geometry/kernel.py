@@ -48,13 +48,13 @@ def _imported(path: Path) -> frozenset[Path]:
 
 @cache
 def sources_hash(path: Path) -> str:
-    """Of a source file and all that it imports of this project; the same wherever the project stands."""
+    """Of a source file, all that it imports of this project, and where that stands: numba looks there, too."""
     seen, ahead = {path}, [path]
     while ahead:
         fresh = _imported(ahead.pop()) - seen
         seen |= fresh
         ahead += fresh
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(str(_ROOT).encode())
     for name, file in sorted((os.path.relpath(file, _ROOT), file) for file in seen):
         digest.update(name.encode() + b"\0" + _source(file) + b"\0")
     return digest.hexdigest()[:16]
