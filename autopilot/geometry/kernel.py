@@ -48,7 +48,7 @@ def _imported(path: Path) -> frozenset[Path]:
 
 @cache
 def sources_hash(path: Path) -> str:
-    """Of a source file, all that it imports of this project, and where that stands: numba looks there, too."""
+    """Of a source file, all that it imports of this project, and where that stands, as numba has it."""
     seen, ahead = {path}, [path]
     while ahead:
         fresh = _imported(ahead.pop()) - seen
