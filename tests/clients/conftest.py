@@ -265,7 +265,7 @@ class Stage:
         self._mavproxies.append(Mavproxy(master, self.directory / f"mavproxy-{len(self._mavproxies)}"))
         return self._mavproxies[-1]
 
-    def wait_for(self, text: str, timeout_s: float = 90.0) -> None:
+    def wait_for(self, text: str, timeout_s: float = LONG_S) -> None:
         """Until the vehicle has said so to everybody."""
         self.wait_until(lambda: text in self.witness.texts, timeout_s)
 

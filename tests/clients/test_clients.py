@@ -19,7 +19,7 @@ import pytest
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as m
 
-from .conftest import LOOPBACK, Mavproxy, Place, Stage, Told, Witness, complaints, staged
+from .conftest import LONG_S, LOOPBACK, Mavproxy, Place, Stage, Told, Witness, complaints, staged
 
 pytestmark = [
     pytest.mark.processes,
@@ -189,7 +189,7 @@ def mavproxy_and_a_survey(stage: Stage) -> Surveyed:
     program.type("arm throttle")
     program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
     program.expect("Cable taut, lifting the load")
-    program.expect("Landed, disarmed", 90.0)
+    program.expect("Landed, disarmed", LONG_S)
     program.type("ftp list /fs/microsd/log")
     program.expect(".ulg")
     program.type("log list")
