@@ -22,7 +22,6 @@ Positions are positions of the load. Where a standard command leaves freedom:
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -30,7 +29,7 @@ from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import decimal_from_float32
+from autopilot.wire.parameters import decimal_from_float32, float32
 from missions.model import (
     AttitudeRun,
     Axis,
@@ -76,7 +75,6 @@ _PLACE_FRAMES = (*_GLOBAL_FRAMES, mavlink.MAV_FRAME_LOCAL_NED)
 _AXIS_CODE: dict[Axis, tuple[int, float]] = {"x": (1, 1.0), "y": (0, 1.0), "z": (2, -1.0)}
 _AXIS_OF_CODE: dict[int, tuple[Axis, float]] = {code: (axis, s) for axis, (code, s) in _AXIS_CODE.items()}
 
-_FLOAT32 = struct.Struct("<f")
 _PARAM_RESULT = (
     mavlink.MAV_MISSION_INVALID_PARAM1,
     mavlink.MAV_MISSION_INVALID_PARAM2,
@@ -201,16 +199,8 @@ def _item(
     y: int = 0,
     z: float = 0.0,
 ) -> WireItem:
-    params = (_float32(param1), _float32(param2), _float32(param3), _float32(param4))
-    return WireItem(frame, command, 0, 1, *params, x, y, _float32(z))
-
-
-def _float32(value: float) -> float:
-    try:
-        rounded: float = _FLOAT32.unpack(_FLOAT32.pack(value))[0]
-    except OverflowError:
-        return math.copysign(math.inf, value)
-    return rounded
+    params = (float32(param1), float32(param2), float32(param3), float32(param4))
+    return WireItem(frame, command, 0, 1, *params, x, y, float32(z))
 
 
 def _whole(seq: int, param: int, name: str, seconds: float, per_second: float) -> int:

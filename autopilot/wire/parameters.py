@@ -69,7 +69,7 @@ class Parameter:
                     return value + 0.0  # -0.0 is stored as 0.0
                 raise ParameterError(f"{self._shown(value)}; must be a whole number")
             for limit in (self.low, self.high):
-                if _rounded(limit) == value:
+                if float32(limit) == value:
                     return float(limit)
         raise ParameterError(f"{self._shown(value)}; must be {self.low:.10g} ... {self.high:.10g}")
 
@@ -77,7 +77,7 @@ class Parameter:
         return f"{self.name} = {value!r} {self.unit}".rstrip()
 
 
-def _rounded(value: float) -> float:
+def float32(value: float) -> float:
     """`value` after a passage through float32; infinite beyond its range."""
     try:
         rounded: float = _FLOAT32.unpack(_FLOAT32.pack(value))[0]
@@ -92,9 +92,9 @@ def decimal_from_float32(value: float) -> float:
         return value
     for digits in range(6, 9):
         decimal = float(f"{value:.{digits}g}")
-        if _rounded(decimal) == value:
+        if float32(decimal) == value:
             return decimal
-    return float(f"{value:.9g}") if _rounded(value) == value else value
+    return float(f"{value:.9g}") if float32(value) == value else value
 
 
 def on_the_wire(value: float, whole: bool, bytewise: bool) -> tuple[float, int]:

@@ -6,32 +6,21 @@ A value is sent as the float32 nearest to what was typed, also where the vehicle
 from __future__ import annotations
 
 import math
-import struct
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import NAME_LENGTH, decimal_from_float32, from_the_wire
+from autopilot.wire.parameters import NAME_LENGTH, decimal_from_float32, float32, from_the_wire
 from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
 
 RETRY_US = 500_000
 SENDS = 6
 BURST = 20  # gaps of the list asked for at once
-_FLOAT32 = struct.Struct("<f")
 _ERRORS = {
     mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST: "no such parameter",
     mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE: "out of range",
     mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED: "not permitted",
     mavlink.MAV_PARAM_ERROR_READ_ONLY: "cannot be changed while running",
 }
-
-
-def float32(value: float) -> float:
-    """`value` as the wire carries it; infinite beyond its range."""
-    try:
-        rounded: float = _FLOAT32.unpack(_FLOAT32.pack(value))[0]
-    except OverflowError:
-        return math.copysign(math.inf, value)
-    return rounded
 
 
 class ParameterList:
