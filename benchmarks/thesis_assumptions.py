@@ -17,7 +17,7 @@ Case B, B extended and C, without limits or lag (thesis) and with those of the v
 
 * largest load error, part of the time with a rotor command beyond its limits, or when the flight was lost.
 
-The row marked `flies` is what autopilot/control/thesis.py does; the script flies that too and compares.
+The row marked `flies` is what autopilot/control/laws/thesis.py does; the script flies that too and compares.
 
     python benchmarks/thesis_assumptions.py [--step 0.79 ...] [--hz 250 1000]
 """
@@ -32,8 +32,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.control import thesis
+from autopilot.control.actuators.mixer import mix
 from autopilot.control.command_filter import filter_acceleration, filter_step
+from autopilot.control.laws import thesis
 from autopilot.control.load_attitude import (
     DirectionCommand,
     load_attitude_force,
@@ -47,14 +48,13 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, add, column, from_columns, norm, sub
 from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.mixer import mix
+from autopilot.trajectory.signals import Jet, SignalTable, evaluate, signal_table
 from gcs.analysis.step import Step, StepResponse, step_response
 from missions.fileformat import load_mission
 from missions.model import Signals, Term
-from missions.signals import Jet, SignalTable, evaluate, signal_table
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
-from sitl.truth import load_truth
+from sitl.vehicles import load_truth
 
 PRINTED = (0.61, 15.0, 1.26)  # s, %, s: 4-4
 TOLERANCE = (0.08, 6.0, 0.25)

@@ -12,8 +12,8 @@ from typing import Any
 
 import click
 
-from gcs.display import say
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, EXIT_USAGE, GcsError
+from gcs.shell.display import say
 
 # name: (module in gcs.commands, summary)
 COMMANDS = {
@@ -95,7 +95,7 @@ def _usage(error: click.UsageError) -> str:
 
 
 def _signing_key(text: str) -> bytes:
-    from autopilot.wire.shell import signing_key_option
+    from autopilot.shell.options import signing_key_option
 
     return signing_key_option(text)
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from autopilot.onboard import Onboard
+from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.snapshot import Options
 from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
-from autopilot.telemetry_view import Options
+from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
@@ -20,7 +21,6 @@ from autopilot.wire.mission_items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, TruthQueue
-from missions.legs import expected_duration_s
 from missions.model import Mission
 from sitl.hil import HilSimulator
 

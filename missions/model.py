@@ -114,7 +114,7 @@ class AttitudeRun:
 
     `controlled` is the vehicle (its thrust axis leans) or the load (the line from load to vehicle leans). A
     positive tilt leans towards north or east, and so pulls the load that way; both together lean by the
-    root of the sum of their squares. `missions.swing` has the direction and its derivatives.
+    root of the sum of their squares. `autopilot.trajectory.swing` has the direction and its derivatives.
     """
 
     controlled: Controlled

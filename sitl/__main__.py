@@ -14,8 +14,7 @@ from contextlib import suppress
 
 import click
 
-from autopilot.wire.convert import Home
-from autopilot.wire.shell import (
+from autopilot.shell.options import (
     Address,
     Stop,
     StopRequest,
@@ -29,6 +28,7 @@ from autopilot.wire.shell import (
     setting_option,
     shown,
 )
+from autopilot.wire.convert import Home
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing
 

@@ -16,16 +16,16 @@ from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.parameter_table import ParameterTable
 from sitl.parameter_server import ParameterServer
 from sitl.plant.records import Rotors, Truth
 from sitl.sensors.files import load_profile
 from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
 from sitl.sim_core import SECOND_US, STOPPED, Readings, SimCore, settings_of
-from sitl.truth.files import load_truth
-from sitl.truth.parameters import apply as apply_parameters
-from sitl.truth.parameters import sim_parameters
+from sitl.vehicles.files import load_truth
+from sitl.vehicles.sim_parameters import apply as apply_parameters
+from sitl.vehicles.sim_parameters import sim_parameters
 
 VEHICLE_SYSTEM = 1
 SIMULATOR_COMPONENT = 26

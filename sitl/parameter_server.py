@@ -10,7 +10,7 @@ from collections import deque
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import ParameterError, ParameterTable, decimal_from_float32
+from autopilot.wire.parameter_table import ParameterError, ParameterTable, decimal_from_float32
 
 VALUES_PER_TICK = 4
 STATUSTEXT_BYTES = 50

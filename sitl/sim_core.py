@@ -10,7 +10,7 @@ from collections import deque
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import ZERO, Vec3, add
-from autopilot.wire.parameters import ParameterError, ParameterTable
+from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from sitl.plant.gripper import dropped, takes_hold, without_cable
 from sitl.plant.records import PlantState, Rotors, Truth
 from sitl.plant.step import advance, initial_state

@@ -17,9 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.control.load_attitude import thrust_along
-from autopilot.control.records import Command, Reference, State, Vehicle
-from autopilot.control.thesis import (
+from autopilot.control.laws.thesis import (
     ThesisFilters,
     ThesisGains,
     ThesisMemory,
@@ -27,6 +25,8 @@ from autopilot.control.thesis import (
     quad_attitude,
     with_errors,
 )
+from autopilot.control.load_attitude import thrust_along
+from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, norm, scale, sub, times
 

@@ -6,14 +6,14 @@ from math import radians
 from typing import NamedTuple
 
 from autopilot.control.records import State
-from autopilot.estimation.correct_barometer import correct_barometer
-from autopilot.estimation.correct_direction import correct_direction
-from autopilot.estimation.correct_gnss import correct_gnss
-from autopilot.estimation.correct_load import correct_load
-from autopilot.estimation.correct_magnetic import correct_magnetic
-from autopilot.estimation.correct_pose import correct_pose
-from autopilot.estimation.correct_standing import correct_standing
-from autopilot.estimation.correct_tautened import correct_tautened
+from autopilot.estimation.measurements.barometer import correct_barometer
+from autopilot.estimation.measurements.direction import correct_direction
+from autopilot.estimation.measurements.gnss import correct_gnss
+from autopilot.estimation.measurements.load import correct_load
+from autopilot.estimation.measurements.magnetic import correct_magnetic
+from autopilot.estimation.measurements.pose import correct_pose
+from autopilot.estimation.measurements.standing import correct_standing
+from autopilot.estimation.measurements.tautened import correct_tautened
 from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     CAMERA,
@@ -29,7 +29,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.linear import Vec3, sub
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.parameter_table import ParameterTable
 
 POSITION_STD_TO_FLY = 0.05  # m, with trackers, and beyond what a receiver promises
 ATTITUDE_STD_TO_FLY = 0.05  # rad

@@ -3,7 +3,8 @@
 numba keys its disk cache by the file of the *outermost* function alone: after a change in a callee, or of a
 constant from another module, it would go on serving the old machine code. Kernels are therefore kept in a
 directory named by a hash over their own source file and all files of this project that it imports, directly
-or not, so that a stale entry cannot be met and a change recompiles only what it can reach.
+or not, so that a stale entry cannot be met and a change recompiles only what it can reach. Where the checkout
+lies does not enter the hash: a second clone of the same source finds the machine code of the first.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numba
+from numba.core import caching
 from platformdirs import user_cache_path
 
 _ROOT = Path(__file__).resolve().parents[2]
@@ -48,13 +50,13 @@ def _imported(path: Path) -> frozenset[Path]:
 
 @cache
 def sources_hash(path: Path) -> str:
-    """Of a source file, all that it imports of this project, and where that stands, as numba has it."""
+    """Hash of a source file and of all files of this project that it imports, directly or not."""
     seen, ahead = {path}, [path]
     while ahead:
         fresh = _imported(ahead.pop()) - seen
         seen |= fresh
         ahead += fresh
-    digest = hashlib.sha256(str(_ROOT).encode())
+    digest = hashlib.sha256()
     for name, file in sorted((os.path.relpath(file, _ROOT), file) for file in seen):
         digest.update(name.encode() + b"\0" + _source(file) + b"\0")
     return digest.hexdigest()[:16]
@@ -62,6 +64,48 @@ def sources_hash(path: Path) -> str:
 
 def _folder(path: Path) -> Path:
     return user_cache_path("plumbline") / "kernels" / sources_hash(path)
+
+
+class _ContentLocator:
+    """Tells numba where the machine code of a function is kept: by the content of its sources alone.
+
+    numba's own locators put the directory of the source file into the name: every clone would compile anew.
+    """
+
+    def __init__(self, function: Any, file: str) -> None:
+        self._path = Path(file)
+        self._line = function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _ContentLocator | None:
+        """A locator of a function of this project; None for any other, and where nothing can be written."""
+        if _CHOSEN_BY_USER or not Path(file).is_file() or not Path(file).resolve().is_relative_to(_ROOT):
+            return None
+        locator = cls(function, file)
+        try:
+            locator.ensure_cache_path()
+        except OSError:
+            return None
+        return locator
+
+    def ensure_cache_path(self) -> None:
+        """Make the directory."""
+        self.get_cache_path().mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> Path:
+        """Directory of the machine code."""
+        return _folder(self._path) / self._path.stem
+
+    def get_source_stamp(self) -> str:
+        """What must be unchanged for the machine code to be valid."""
+        return sources_hash(self._path)
+
+    def get_disambiguator(self) -> str:
+        """Tells functions of one name in one file apart."""
+        return str(self._line)
+
+
+caching.CacheImpl._locator_classes.insert(0, _ContentLocator)
 
 
 def is_compiled(path: Path) -> bool:
@@ -75,9 +119,5 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     Fast-math stays off, so that CPython and machine code agree to the bit. Division by zero gives inf or nan
     as IEEE 754 says, in place of an exception.
     """
-    if not _CHOSEN_BY_USER:
-        folder = _folder(Path(function.__code__.co_filename))
-        # read as numba decorates; it is filled from the environment and declares no attributes to a checker
-        vars(numba.config)["CACHE_DIR"] = str(folder)
     compiled: Callable[P, T] = numba.njit(cache=True, error_model="numpy")(function)
     return compiled

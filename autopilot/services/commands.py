@@ -51,7 +51,7 @@ from autopilot.services.requests import (
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import decimal_from_float32
+from autopilot.wire.parameter_table import decimal_from_float32
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED

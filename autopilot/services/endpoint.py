@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from autopilot.services.answers import answer_ping, answer_timesync
 from autopilot.services.commands import CommandService
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
@@ -27,10 +26,9 @@ from autopilot.services.identity import (
 )
 from autopilot.services.links import LinkState, Outgoing
 from autopilot.services.logs import LogService
-from autopilot.services.made_files import information_message, made_files, metadata_message
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.missions import MissionService
-from autopilot.services.parameters import ParameterService
+from autopilot.services.parameter_protocol import ParameterService
 from autopilot.services.records import (
     Announce,
     Decide,
@@ -62,11 +60,13 @@ from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
 from autopilot.services.streams import DEFAULT, OFF
 from autopilot.services.telemetry import GROUPS, LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
+from autopilot.services.timesync import answer_ping, answer_timesync
+from autopilot.services.virtual_files import information_message, made_files, metadata_message
 from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import WireItem
-from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten

@@ -1,7 +1,7 @@
 """Files as the services see them: paths that cannot leave their root, and a card that holds bytes.
 
-The card itself belongs to the shell (`autopilot.card` keeps one in a directory); `MemoryCard` is one without
-a disk, for tests and for flights inside one process.
+The card itself belongs to the shell (`autopilot.shell.sd_card` keeps one in a directory); `MemoryCard` is
+one without a disk, for tests and for flights inside one process.
 """
 
 from __future__ import annotations

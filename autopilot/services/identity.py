@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.parameter_table import ParameterTable
 
 AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 DIALECT_COMPONENT = mavlink.MAV_COMP_ID_USER1

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from autopilot.vehicle.belief import Belief
-from autopilot.wire.parameters import Parameter, ParameterTable
+from autopilot.wire.parameter_table import Parameter, ParameterTable
 
 SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
 LAWS = ("thesis", "lqr", "plumbline")  # CTL_LAW is an index into this

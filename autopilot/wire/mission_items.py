@@ -29,7 +29,7 @@ from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import decimal_from_float32, float32
+from autopilot.wire.parameter_table import decimal_from_float32, float32
 from missions.model import (
     AttitudeRun,
     Axis,

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from gcs.commands.options import PositiveType, connect_option
-from gcs.link import Address
+from gcs.shell.link import Address
 
 
 @click.command("capture")
@@ -29,7 +29,7 @@ def capture_command(out: Path | None, duration_s: float | None, address: Address
 
     The fast messages of the report are asked for, so that gcs report can be made of the log.
     """
-    from gcs.capturing import capture_to
+    from gcs.workflows.capture import capture_to
 
     path = out or Path("flights") / f"capture-{datetime.now():%Y%m%d-%H%M%S}" / "flight.tlog"
     records = capture_to(path, address, duration_s)

@@ -10,8 +10,8 @@ from gcs.clients import command
 from gcs.clients.operation import Operation
 from gcs.clients.vehicle_view import MODES
 from gcs.commands.options import PositiveType, connect_option
-from gcs.link import Address
-from gcs.session import Session
+from gcs.shell.link import Address
+from gcs.shell.session import Session
 
 
 def _send(address: Address, make: Callable[[Session], Operation], begins: bool = False) -> None:
@@ -85,7 +85,7 @@ def takeoff_command(altitude_m: float | None, address: Address) -> None:
 
     The vehicle must be armed, or is armed next.
     """
-    from gcs.flying import vehicle_home
+    from gcs.workflows.fly import vehicle_home
 
     def make(session: Session) -> Operation:
         if altitude_m is None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from gcs.commands.options import json_option, print_json
-from gcs.display import say
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
+from gcs.shell.display import say
 
 _POLL_S = 0.2
 
@@ -59,7 +59,7 @@ def thesis_command(
     from gcs.experiments.plan import experiments
     from gcs.experiments.progress import ExperimentDisplay
     from gcs.experiments.reuse import code_fingerprint
-    from gcs.stopping import StopRequest
+    from gcs.shell.stopping import StopRequest
 
     quiet = quiet or as_json
     thesis.make_directory(out)

@@ -8,8 +8,8 @@ import click
 from click.core import ParameterSource
 
 from gcs.commands.options import AddressType, PositiveType, SettingType, json_option, print_json
-from gcs.display import say
-from gcs.link import DEFAULT_PORT, Address
+from gcs.shell.display import say
+from gcs.shell.link import DEFAULT_PORT, Address
 
 _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to a vehicle that runs already
 
@@ -113,8 +113,8 @@ def fly_command(
                 ctx,
             )
 
-    from gcs.flying import FlightOptions, fly
-    from gcs.reporting import print_record
+    from gcs.workflows.fly import FlightOptions, fly
+    from gcs.workflows.report import print_record
 
     flight = fly(
         FlightOptions(

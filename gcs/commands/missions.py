@@ -14,7 +14,7 @@ from gcs.errors import EXIT_DONE, EXIT_ERROR
 @json_option
 def missions_command(as_json: bool) -> None:
     """List the shipped missions."""
-    from gcs.missions_checked import load
+    from gcs.workflows.check_mission import load
     from missions.fileformat import shipped
 
     missions = [load(name) for name in shipped()]
@@ -47,7 +47,7 @@ def check_command(mission: str, vehicle: str, as_asked: bool, as_json: bool) -> 
     far from the asked path it is, and what it takes of rotors, cable and tilt. With --as-asked the paths are
     judged as the laws thesis and lqr fly them, not shaped to what can be flown.
     """
-    from gcs.missions_checked import load, path_reports, violations
+    from gcs.workflows.check_mission import load, path_reports, violations
 
     loaded = load(mission)
     found = violations(loaded, vehicle, not as_asked)

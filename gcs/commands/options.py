@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from gcs.link import DEFAULT_PORT, Address, AddressError, parse_address
+from gcs.shell.link import DEFAULT_PORT, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import click
 
-from autopilot.wire.parameters import ParameterError, parse_text
+from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Target
-from gcs.clients.parameters import ParameterGet, ParameterList, ParameterSet
+from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
 from gcs.commands.options import connect_option, json_option, print_json, print_table
-from gcs.display import StepDisplay, say
 from gcs.errors import GcsError, RefusedError
 from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
-from gcs.link import Address
-from gcs.session import Session
+from gcs.shell.display import StepDisplay, say
+from gcs.shell.link import Address
+from gcs.shell.session import Session
 
 
 @click.group("param")

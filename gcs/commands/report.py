@@ -25,7 +25,7 @@ def report_command(source: Path, out: Path | None, as_json: bool, quiet: bool) -
     DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. Made are
     summary.json, flight.parquet, pictures and report.html, from the telemetry alone.
     """
-    from gcs.reporting import make_report, print_record
+    from gcs.workflows.report import make_report, print_record
 
     tlog = source / "flight.tlog" if source.is_dir() else source
     if not tlog.is_file():

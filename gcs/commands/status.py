@@ -8,8 +8,8 @@ import click
 
 from gcs.clients.vehicle_view import VehicleView
 from gcs.commands.options import connect_option, json_option, print_json, print_table
-from gcs.link import Address
-from gcs.session import Session
+from gcs.shell.link import Address
+from gcs.shell.session import Session
 
 _LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import click
 
 from gcs.commands.options import SettingType, json_option, print_json
-from gcs.display import say
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
+from gcs.shell.display import say
 
 
 @click.command("sweep")
@@ -98,7 +98,7 @@ def sweep_command(
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
 
     from gcs.experiments.launch import cores
-    from gcs.stopping import StopRequest
+    from gcs.shell.stopping import StopRequest
     from gcs.sweep.plan import make_plan, read_varied
     from gcs.sweep.pool import dask_cluster, own_processes
     from gcs.sweep.report import write_report

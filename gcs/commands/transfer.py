@@ -13,14 +13,14 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import WireItem, encode_mission
 from gcs.clients.missions import MissionClear, MissionDownload, MissionUpload
 from gcs.commands.options import connect_option, json_option, print_json, print_table
-from gcs.display import say
 from gcs.errors import GcsError
-from gcs.flying import vehicle_home
 from gcs.formats.items import command_name
 from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
-from gcs.link import Address
-from gcs.missions_checked import check_items, load_checked
-from gcs.session import Session
+from gcs.shell.display import say
+from gcs.shell.link import Address
+from gcs.shell.session import Session
+from gcs.workflows.check_mission import check_items, load_checked
+from gcs.workflows.fly import vehicle_home
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _FENCE = mavlink.MAV_MISSION_TYPE_FENCE

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 
 from gcs.experiments.plan import SEED, SENSORS, Experiment
-from gcs.processes import Child
+from gcs.shell.processes import Child
 
 LOG_FILE = "gcs.log"
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from gcs.display import LiveBars, is_live, say
 from gcs.experiments.flights import Status
+from gcs.shell.display import LiveBars, is_live, say
 
 if TYPE_CHECKING:
     from rich.progress import TaskID

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import WireItem
-from autopilot.wire.parameters import decimal_from_float32
+from autopilot.wire.parameter_table import decimal_from_float32
 from gcs.errors import GcsError
 
 NO_INT = 2**31 - 1  # a coordinate that is not given

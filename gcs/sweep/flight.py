@@ -1,8 +1,9 @@
 """One whole flight without the wire: the flight that `gcs.closed_loop` flies, some twenty times as fast.
 
 Python runs the ticks at which the supervisor has something to decide, with the functions that fly
-(`autopilot.flight_core.control`, `autopilot.decisions.decide`); all others pass in `gcs.sweep.kernel`. The
-ground station's part is known beforehand: the two instants at which it arms and starts the mission.
+(`autopilot.core.tick.control`, `autopilot.supervisor.requests.decide`); all others pass in
+`gcs.sweep.kernel`. The ground station's part is known beforehand: the two instants at which it arms and
+starts the mission.
 """
 
 from __future__ import annotations
@@ -13,32 +14,18 @@ from math import floor, inf, nan, sqrt
 
 import numpy as np
 
-from autopilot.decisions import arming_complaints, decide, with_plan
+from autopilot.control.actuators.disturbance_observer import nominal
+from autopilot.core.scheduler import divider, is_due
+from autopilot.core.tick import FlightState, Setup, control, initial_state, view_of
 from autopilot.estimation.filter import control_state
-from autopilot.estimation.parting import parted, untied
 from autopilot.estimation.records import ImuReading, new_history
-from autopilot.flight import CARRYING as CARRYING_PHASES
-from autopilot.flight import (
-    IN_AIR,
-    ON_GROUND,
-    Flight,
-    Phase,
-    Plan,
-    View,
-    carries,
-    jet_ahead,
-    leg_time_s,
-)
-from autopilot.flight_core import FlightState, Setup, control, initial_state, view_of
+from autopilot.estimation.release import parted, untied
 from autopilot.geometry.linear import ZERO
-from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Catch, Creep, asked_jet
-from autopilot.observer import nominal
-from autopilot.onboard import Onboard, build_setup, plan_of
-from autopilot.phase_legs import CLEARANCE, TOUCH_SPEED
-from autopilot.scheduler import divider, is_due
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Catch, Creep, asked_jet
+from autopilot.onboard.onboard import Onboard, build_setup, plan_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.requests import Arm, StartMission
-from autopilot.supervisor import (
+from autopilot.supervisor.advance import (
     LIFT_OFF_US,
     LOAD_SUNK,
     PULL_US,
@@ -47,6 +34,22 @@ from autopilot.supervisor import (
     TAUT_LATEST,
     VEHICLE_SUNK,
 )
+from autopilot.supervisor.flight import CARRYING as CARRYING_PHASES
+from autopilot.supervisor.flight import (
+    IN_AIR,
+    ON_GROUND,
+    Flight,
+    MissionPlan,
+    Phase,
+    View,
+    carries,
+    jet_ahead,
+    leg_time_s,
+)
+from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
+from autopilot.supervisor.requests import arming_complaints, decide, with_plan
+from autopilot.trajectory.prepare import Limits
+from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
@@ -61,17 +64,15 @@ from gcs.sweep.link import link_model
 from gcs.sweep.pilot import FUSED_LAWS, Pilot, PilotModel
 from gcs.sweep.plan import simulated
 from gcs.sweep.world import Floats, new_world
-from missions.legs import expected_duration_s
 from missions.model import Mission, Winch
-from missions.planning import Limits
 from sitl.hil import HilSimulator
 from sitl.plant.gripper import dropped, without_cable
 from sitl.sensors.files import load_profile
 from sitl.sensors.profile import Profile
 from sitl.sim_core import settings_of
-from sitl.truth.files import load_truth
-from sitl.truth.parameters import apply as apply_parameters
-from sitl.truth.parameters import sim_parameters
+from sitl.vehicles.files import load_truth
+from sitl.vehicles.sim_parameters import apply as apply_parameters
+from sitl.vehicles.sim_parameters import sim_parameters
 
 GROUND_WINDOW_US = 20_000  # between two turns of the ground station
 LONGEST_STRETCH = 1000  # ticks
@@ -140,7 +141,7 @@ def _profile(name: str) -> Profile:
 
 
 @lru_cache(maxsize=64)
-def _plan(items: tuple[WireItem, ...], limits: Limits) -> Plan:
+def _plan(items: tuple[WireItem, ...], limits: Limits) -> MissionPlan:
     """Shaping paths takes seconds; it depends on nothing else."""
     return plan_of(StoredMission(items), Home(), limits)
 

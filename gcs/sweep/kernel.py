@@ -1,8 +1,8 @@
 """A stretch of flight in one call of machine code: world, estimator, law and mixer, tick after tick.
 
 It ends where the supervisor may have something to decide: at a tick given beforehand, or at the first at
-which `autopilot.supervisor.advance` could see more than the time going by. There Python runs that tick, with
-the very functions that fly.
+which `autopilot.supervisor.advance.advance` could see more than the time going by. There Python runs that
+tick, with the very functions that fly.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from autopilot.estimation.records import EstimatorState, EstimatorTuning, Histor
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import E1, Vec3, add, axpy, column, dot, norm, scale, sub
 from autopilot.geometry.so3 import rotation_from_quat, tilt_angle
-from autopilot.supervisor import ASTRAY, LEAST_GAP, PULLED
-from autopilot.supervisor import SLACK as SLACK_SHARE
+from autopilot.supervisor.advance import ASTRAY, LEAST_GAP, PULLED
+from autopilot.supervisor.advance import SLACK as SLACK_SHARE
 from gcs.sweep.link import LinkModel, estimate, settled, wire_forces
 from gcs.sweep.pilot import Pilot, PilotModel, air_tick, ground_tick
 from gcs.sweep.world import Buffers, Floats, World, WorldModel, tick

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from autopilot.flight import Flight
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.guidance import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
+from autopilot.guidance.legs import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
+from autopilot.supervisor.flight import Flight
+from autopilot.trajectory.shaping import evaluate_asked, evaluate_shaped
+from autopilot.trajectory.signals import Jet, SignalTable
+from autopilot.trajectory.splines import PieceTable
+from autopilot.trajectory.transfer import transfer
+from autopilot.trajectory.waypoint_path import evaluate_path
 from gcs.sweep.world import Floats
-from missions.shaping import evaluate_asked, evaluate_shaped
-from missions.signals import Jet, SignalTable
-from missions.splines import PieceTable
-from missions.transfer import transfer
-from missions.waypoints import evaluate_path
 
 COLUMNS = 21  # position and six derivatives
 
@@ -89,7 +89,7 @@ def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
 
 
 def jets_ahead(flight: Flight, times_s: Floats) -> Floats:
-    """(n, 21) `autopilot.flight.jet_ahead` at n times (s into the present leg), which do not decrease."""
+    """(n, 21) `jet_ahead` at n times (s into the present leg), which do not decrease."""
     found = np.zeros((len(times_s), COLUMNS))
     chain = [flight.legs[0]]
     for after in (*flight.legs[1:], *flight.following):

@@ -11,14 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopilot.estimation.correct_barometer import correct_barometer
-from autopilot.estimation.correct_direction import correct_direction
-from autopilot.estimation.correct_gnss import correct_gnss
-from autopilot.estimation.correct_load import correct_load
-from autopilot.estimation.correct_magnetic import correct_magnetic
-from autopilot.estimation.correct_pose import correct_pose
-from autopilot.estimation.correct_standing import correct_standing
-from autopilot.estimation.correct_tautened import correct_tautened
+from autopilot.core.sensor_inbox import (
+    GREATEST_ACCEL_M_S2,
+    GREATEST_RATE_RAD_S,
+    LEAST_ANGLE_STD_RAD,
+    LEAST_DIRECTION_STD_RAD,
+    LEAST_FIX_STD_M,
+    LEAST_POSITION_STD_M,
+    LEAST_VELOCITY_STD_M_S,
+    OLDEST_READING_S,
+)
 from autopilot.estimation.filter import (
     ATTITUDE_STD_TO_FLY,
     COASTING_S,
@@ -28,6 +30,14 @@ from autopilot.estimation.filter import (
     PROMISE,
 )
 from autopilot.estimation.history import reading_age
+from autopilot.estimation.measurements.barometer import correct_barometer
+from autopilot.estimation.measurements.direction import correct_direction
+from autopilot.estimation.measurements.gnss import correct_gnss
+from autopilot.estimation.measurements.load import correct_load
+from autopilot.estimation.measurements.magnetic import correct_magnetic
+from autopilot.estimation.measurements.pose import correct_pose
+from autopilot.estimation.measurements.standing import correct_standing
+from autopilot.estimation.measurements.tautened import correct_tautened
 from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     CAMERA,
@@ -44,16 +54,6 @@ from autopilot.estimation.records import (
 from autopilot.geometry.frames import quat_enu_flu_from_ned_frd, quat_ned_frd_from_enu_flu
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, scale
-from autopilot.sensor_link import (
-    GREATEST_ACCEL_M_S2,
-    GREATEST_RATE_RAD_S,
-    LEAST_ANGLE_STD_RAD,
-    LEAST_DIRECTION_STD_RAD,
-    LEAST_FIX_STD_M,
-    LEAST_POSITION_STD_M,
-    LEAST_VELOCITY_STD_M_S,
-    OLDEST_READING_S,
-)
 from autopilot.wire.convert import Home
 from autopilot.wire.convert.geodesy import EARTH_RADIUS_M
 from autopilot.wire.convert.scaling import saturated
@@ -333,7 +333,8 @@ def estimate(
 ) -> tuple[EstimatorState, ImuReading]:
     """The estimate after the readings of this tick, and what the inertial unit said last.
 
-    As `sitl.hil`, `autopilot.sensor_link` and `autopilot.estimation.filter.estimate` one after the other.
+    As `sitl.hil`, `autopilot.core.sensor_inbox` and `autopilot.estimation.filter.estimate` one after the
+    other.
     `thrust`, N, is what the rotors are believed to give.
     """
     inertial = inertial_of(inertial, now_us, buffers)

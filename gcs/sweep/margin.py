@@ -15,20 +15,20 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from autopilot.actuation import Actuation, advance, steady
+from autopilot.control.actuators.disturbance_observer import aloft
+from autopilot.control.actuators.rotor_model import Actuation, advance, steady
 from autopilot.control.records import Reference, State, Vehicle
-from autopilot.flight_core import Setup
+from autopilot.core.tick import Setup
 from autopilot.geometry.linear import E1, ZERO, Vec3
-from autopilot.observer import aloft
-from autopilot.onboard import build_setup
+from autopilot.onboard.onboard import build_setup
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from gcs.analysis.axes import Floats
-from gcs.sweep.plan import Plan, simulated
+from gcs.sweep.plan import SweepPlan, simulated
 from sitl.sim_core import settings_of
-from sitl.truth.files import load_truth
-from sitl.truth.parameters import apply as apply_parameters
-from sitl.truth.parameters import sim_parameters
+from sitl.vehicles.files import load_truth
+from sitl.vehicles.sim_parameters import apply as apply_parameters
+from sitl.vehicles.sim_parameters import sim_parameters
 
 STEP = 1e-5  # central differences: truncation and rounding both below 1e-9
 LOST = 1.0 + 1e-7  # spectral radius; what the law carries but does not use has eigenvalue 1
@@ -199,7 +199,9 @@ def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
     return sorted(np.abs(control.feedback(world, law, sign=1).poles()).tolist())
 
 
-def linear_range(plan: Plan, law: str, name: str, nominal_value: float, limits: tuple[float, float]) -> str:
+def linear_range(
+    plan: SweepPlan, law: str, name: str, nominal_value: float, limits: tuple[float, float]
+) -> str:
     """How far the parameter may go from its value as delivered, at most to `limits`; empty if the linear loop
     does not know it. Everything else is as delivered or set for all flights."""
     fixed = {**dict(plan.settings), "CTL_LAW": float(LAWS.index(law))}

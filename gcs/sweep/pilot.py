@@ -10,17 +10,18 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload
 
-from autopilot.actuation import Actuation, ActuationConstants
-from autopilot.actuation import advance as actuate
-from autopilot.control import lqr, quad_position, thesis
+from autopilot.control import quad_position
+from autopilot.control.actuators.disturbance_observer import Observed, ObserverConstants, observe
+from autopilot.control.actuators.mixer import MixerResult, mix
+from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
+from autopilot.control.actuators.rotor_model import advance as actuate
+from autopilot.control.laws import lqr, thesis
+from autopilot.control.laws.interface import Law, LqrLaw, Memory, PlumblineLaw, PlumblineMemory, ThesisLaw
+from autopilot.control.laws.plumbline_tick import SlackConstants, load_position_tick, quad_position_tick
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO
-from autopilot.laws import Law, LqrLaw, Memory, PlumblineLaw, PlumblineMemory, ThesisLaw
-from autopilot.mixer import MixerResult, mix
-from autopilot.observer import Observed, ObserverConstants, observe
-from autopilot.plumbline_tick import SlackConstants, load_position_tick, quad_position_tick
 
 FUSED_LAWS = (ThesisLaw, LqrLaw, PlumblineLaw)
 

@@ -16,14 +16,14 @@ from typing import Any
 
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
-from autopilot.wire.parameters import ParameterError
+from autopilot.wire.parameter_table import ParameterError
 from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
 from missions.fileformat import load_mission
 from sitl.sensors.files import load_profile
 from sitl.sim_core import settings_of
-from sitl.truth.files import load_truth
-from sitl.truth.parameters import sim_parameters
+from sitl.vehicles.files import load_truth
+from sitl.vehicles.sim_parameters import sim_parameters
 
 PLAN_FILE = "plan.json"
 MOST_FLIGHTS = 10_000_000
@@ -63,7 +63,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """A sweep. `sample` settings are drawn by Latin hypercube; 0: the grid of all values is flown."""
 
     mission: str
@@ -114,9 +114,9 @@ class Plan:
         return json.loads(json.dumps(asdict(self)))  # type: ignore[no-any-return]
 
 
-def from_json(values: Mapping[str, Any]) -> Plan:
-    """Inverse of `Plan.to_json`."""
-    return Plan(
+def from_json(values: Mapping[str, Any]) -> SweepPlan:
+    """Inverse of `SweepPlan.to_json`."""
+    return SweepPlan(
         mission=values["mission"],
         vehicle=values["vehicle"],
         sensors=values["sensors"],
@@ -182,7 +182,7 @@ def make_plan(
     varied: Sequence[Varied],
     settings: Mapping[str, float],
     sample: int,
-) -> Plan:
+) -> SweepPlan:
     """The plan, or PlanError with what is wrong with it."""
     names = [v.name for v in varied]
     for name in names:
@@ -198,7 +198,7 @@ def make_plan(
         load_profile(sensors)
     except ValueError as error:
         raise PlanError(str(error)) from None
-    plan = Plan(
+    plan = SweepPlan(
         mission,
         vehicle,
         sensors,
@@ -235,7 +235,7 @@ def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
             raise PlanError(str(error)) from None
 
 
-def store_plan(directory: Path, plan: Plan, command: str, version: str, code: str) -> None:
+def store_plan(directory: Path, plan: SweepPlan, command: str, version: str, code: str) -> None:
     """Write plan.json; PlanError if the directory holds another plan, or flights of other code."""
     path = directory / PLAN_FILE
     wanted = {"plan": plan.to_json(), "code": code}
@@ -256,7 +256,7 @@ def store_plan(directory: Path, plan: Plan, command: str, version: str, code: st
     path.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
 
 
-def load_plan(directory: Path) -> Plan:
+def load_plan(directory: Path) -> SweepPlan:
     """The plan of a sweep's directory."""
     try:
         return from_json(json.loads((directory / PLAN_FILE).read_text(encoding="utf-8"))["plan"])

@@ -9,7 +9,7 @@ import numpy as np
 
 from gcs.analysis.axes import Floats
 from gcs.report.style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, RED, key, new_figure, save, style
-from gcs.sweep.plan import Plan
+from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Cells, Flights, cells
 
 LAW_COLOURS = {"plumbline": BLUE, "thesis": ORANGE, "lqr": GREEN}
@@ -17,7 +17,9 @@ _MOST_NUMBERS = 144  # cells of a map up to which each has its number written in
 _ERROR_LIMITS_MM = (1.0, 1000.0)  # of the colours
 
 
-def draw_map(path: Path, flights: Flights, plan: Plan, names: tuple[str, str], units: dict[str, str]) -> None:
+def draw_map(
+    path: Path, flights: Flights, plan: SweepPlan, names: tuple[str, str], units: dict[str, str]
+) -> None:
     """Share of success, median and worst error of one law over two parameters."""
     from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 
@@ -78,7 +80,7 @@ def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) 
         ax.text(i, j, text, ha="center", va="center", fontsize=8, color="white" if dark else INK)
 
 
-def draw_curve(path: Path, laws: list[Flights], plan: Plan, name: str, units: dict[str, str]) -> None:
+def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, units: dict[str, str]) -> None:
     """Share of success and error over one parameter, all laws."""
     with style():
         figure = new_figure(11.0, 3.7)

@@ -6,7 +6,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from gcs.display import LiveBars, is_live, say
+from gcs.shell.display import LiveBars, is_live, say
 
 if TYPE_CHECKING:
     from rich.progress import TaskID

@@ -13,21 +13,21 @@ from typing import Any
 
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.parameters import Parameter, ParameterTable
+from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.sweep.margin import linear_range
-from gcs.sweep.plan import PLAN_FILE, Plan
+from gcs.sweep.plan import PLAN_FILE, SweepPlan
 from gcs.sweep.plots import draw_curve, draw_map
 from gcs.sweep.results import Flights, flights_of, reach
 from gcs.sweep.store import Store
-from sitl.truth.files import load_truth
-from sitl.truth.parameters import sim_parameters
+from sitl.vehicles.files import load_truth
+from sitl.vehicles.sim_parameters import sim_parameters
 
 PAGE_FILE = "report.html"
 _TEMPLATE = "sweep.html"
 _MOST_PAIRS = 10
 
 
-def write_report(directory: Path, plan: Plan) -> Path:
+def write_report(directory: Path, plan: SweepPlan) -> Path:
     """Pictures and page from the flights that are stored; the page's path."""
     from jinja2 import Environment
 
@@ -67,7 +67,7 @@ def write_report(directory: Path, plan: Plan) -> Path:
     return page
 
 
-def margins(plan: Plan, laws: list[Flights], tables: tuple[ParameterTable, ...]) -> list[dict[str, str]]:
+def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, ...]) -> list[dict[str, str]]:
     """For each law and varied parameter: from where to where all is well, and what linear theory says."""
     rows = []
     for flights in laws:
@@ -112,7 +112,7 @@ def _law(flights: Flights) -> dict[str, Any]:
     }
 
 
-def _tables(plan: Plan) -> tuple[ParameterTable, ...]:
+def _tables(plan: SweepPlan) -> tuple[ParameterTable, ...]:
     return (sim_parameters(load_truth(plan.vehicle)), autopilot_parameters(load_belief(plan.vehicle)))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcs.analysis.axes import Floats
-from gcs.sweep.plan import Plan
+from gcs.sweep.plan import SweepPlan
 
 if TYPE_CHECKING:
     import pyarrow
@@ -58,7 +58,7 @@ class Reach:
     some_to: float
 
 
-def flights_of(table: pyarrow.Table, plan: Plan) -> list[Flights]:
+def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     """The table law by law, in the order of the plan."""
     law = np.array(table.column("law").to_pylist(), dtype=object)
     outcome = np.array(table.column("outcome").to_pylist(), dtype=object)
@@ -80,7 +80,7 @@ def flights_of(table: pyarrow.Table, plan: Plan) -> list[Flights]:
     return found
 
 
-def levels(plan: Plan, name: str) -> Floats:
+def levels(plan: SweepPlan, name: str) -> Floats:
     """The values that a parameter takes on, or the centres of the bins that its drawn values fall into."""
     varied = next(v for v in plan.varied if v.name == name)
     if plan.sample and varied.continuous:
@@ -93,7 +93,7 @@ def _nearest(values: Floats, centres: Floats) -> NDArray[np.intp]:
     return np.asarray(np.argmin(np.abs(values[:, None] - centres[None, :]), axis=1))
 
 
-def cells(flights: Flights, plan: Plan, names: tuple[str, ...]) -> Cells:
+def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
     """The figures over the parameters named, everything else thrown together."""
     axes = tuple(levels(plan, name) for name in names)
     shape = tuple(len(axis) for axis in axes)
@@ -116,7 +116,7 @@ def cells(flights: Flights, plan: Plan, names: tuple[str, ...]) -> Cells:
     )
 
 
-def reach(flights: Flights, plan: Plan, name: str, nominal: float) -> Reach:
+def reach(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> Reach:
     """How far a parameter may go from `nominal` (or the value flown that is nearest to it)."""
     centres = levels(plan, name)
     level = _nearest(flights.values[name], centres)

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from gcs.sweep.plan import Plan, store_plan
+from gcs.sweep.plan import SweepPlan, store_plan
 from gcs.sweep.pool import fly_all
 from gcs.sweep.progress import SweepDisplay
 from gcs.sweep.store import Row, Store
@@ -31,7 +31,7 @@ class Swept:
 
 
 def sweep(
-    plan: Plan,
+    plan: SweepPlan,
     directory: Path,
     command: str,
     version: str,

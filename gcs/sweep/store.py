@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gcs.sweep.flight import Flown
-from gcs.sweep.plan import Case, Plan
+from gcs.sweep.plan import Case, SweepPlan
 
 if TYPE_CHECKING:
     import pyarrow
@@ -28,13 +28,13 @@ _TEXTS = ("law", "outcome", "reason", "lost_phase")
 _WHOLE = ("index", "seed", "slack_events")
 
 
-def columns(plan: Plan) -> tuple[str, ...]:
+def columns(plan: SweepPlan) -> tuple[str, ...]:
     """The columns of the table: which flight it is, what was varied, what became of it."""
     figures = tuple(f.name for f in fields(Flown) if f.name != "texts")
     return ("index", "law", "seed", *(v.name for v in plan.varied), *figures, "wall_s")
 
 
-def schema(plan: Plan) -> pyarrow.Schema:
+def schema(plan: SweepPlan) -> pyarrow.Schema:
     """Types of the columns."""
     import pyarrow as pa
 
@@ -47,7 +47,7 @@ def schema(plan: Plan) -> pyarrow.Schema:
     return pa.schema([(name, kind(name)) for name in columns(plan)], metadata=metadata)
 
 
-def row_of(plan: Plan, case: Case, flown: Flown, wall_s: float) -> Row:
+def row_of(plan: SweepPlan, case: Case, flown: Flown, wall_s: float) -> Row:
     """The row of a flight."""
     figures = {f.name: getattr(flown, f.name) for f in fields(Flown) if f.name != "texts"}
     varied = {v.name: value for v, value in zip(plan.varied, case.varied, strict=True)}
@@ -57,7 +57,7 @@ def row_of(plan: Plan, case: Case, flown: Flown, wall_s: float) -> Row:
 class Store:
     """The flights of a sweep's directory."""
 
-    def __init__(self, directory: Path, plan: Plan) -> None:
+    def __init__(self, directory: Path, plan: SweepPlan) -> None:
         self._directory = directory
         self._plan = plan
         self._schema = schema(plan)

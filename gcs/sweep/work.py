@@ -12,7 +12,7 @@ from autopilot.wire.convert import Home
 from autopilot.wire.mission_items import encode_mission
 from gcs.experiments.reuse import code_fingerprint
 from gcs.sweep.flight import Boarding, Flown, boarding, fly
-from gcs.sweep.plan import Case, Plan, PlanError
+from gcs.sweep.plan import Case, PlanError, SweepPlan
 from gcs.sweep.store import Row, row_of
 from missions.fileformat import load_mission
 from missions.model import Mission
@@ -24,12 +24,12 @@ Clock = Callable[[], float]  # seconds
 class Work:
     """All that a worker must know, wherever it runs."""
 
-    plan: Plan
+    plan: SweepPlan
     mission: Mission
     boardings: dict[str, Boarding]  # by law
 
 
-def prepare(plan: Plan) -> Work:
+def prepare(plan: SweepPlan) -> Work:
     """The work of a plan; flies the beginning of one flight for each law, which also compiles its kernels.
 
     The instants of arming and starting are those of the settings that all flights share. A vehicle that is
@@ -37,7 +37,7 @@ def prepare(plan: Plan) -> Work:
     """
     mission = load_mission(plan.mission)
     cases = {law: Case(0, law, plan.seeds[0], ()) for law in plan.laws}
-    bare = Plan(plan.mission, plan.vehicle, plan.sensors, plan.laws, plan.seeds, (), plan.settings)
+    bare = SweepPlan(plan.mission, plan.vehicle, plan.sensors, plan.laws, plan.seeds, (), plan.settings)
     boardings = {}
     for law, case in cases.items():
         try:
@@ -69,7 +69,7 @@ def batches(cases: Sequence[Case], size: int) -> list[tuple[Case, ...]]:
     return [*groups, tuple(group)] if group else groups
 
 
-def fingerprint(plan: Plan) -> str:
+def fingerprint(plan: SweepPlan) -> str:
     """A hash of all that decides what happens in the flights, but for the plan."""
     digest = hashlib.sha256(code_fingerprint().encode())
     spec = find_spec("gcs.sweep")

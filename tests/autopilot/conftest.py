@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from autopilot.decisions import ACCEPTED as ACCEPTANCE
-from autopilot.decisions import decide, with_plan
+from autopilot.control.laws.interface import build_law
 from autopilot.estimation.filter import Readings, estimate, estimator_tuning
 from autopilot.estimation.records import (
     TRACKED_SIZE,
@@ -25,16 +24,17 @@ from autopilot.estimation.records import (
     blank_state,
     new_history,
 )
-from autopilot.flight import Flight, Phase, Plan, Settings, View, settings_from
 from autopilot.geometry.linear import ZERO, Vec3, add, norm, sub
 from autopilot.geometry.so3 import Quat
-from autopilot.guidance import LOAD_POSITION, QUAD_POSITION, Hold
-from autopilot.laws import build_law
-from autopilot.onboard import Onboard
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Hold
+from autopilot.onboard.onboard import Onboard
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, Takeoff
-from autopilot.supervisor import advance
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.flight import Flight, MissionPlan, Phase, Settings, View, settings_from
+from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
+from autopilot.supervisor.requests import decide, with_plan
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
@@ -45,7 +45,7 @@ from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator
 from sitl.plant.records import PlantState
-from sitl.truth.files import load_truth
+from sitl.vehicles.files import load_truth
 
 Array = NDArray[Any]
 TICK_S = 0.004
@@ -257,7 +257,7 @@ class Sky:
     def __init__(self, *steps: Step, settings: Settings = SETTINGS) -> None:
         items = encode_steps(steps, Home()) if steps else ()
         located = located_steps(items, Home())
-        plan = Plan(tuple(s.step for s in located), tuple(s.last for s in located), len(items))
+        plan = MissionPlan(tuple(s.step for s in located), tuple(s.last for s in located), len(items))
         self.flight = with_plan(Flight(), plan)
         self.settings = settings
         self.now_us = 0

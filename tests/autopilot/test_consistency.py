@@ -27,8 +27,8 @@ from autopilot.estimation.records import (
     SIGHT,
     VELOCITY,
 )
-from autopilot.flight import Phase
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
+from autopilot.supervisor.flight import Phase
 from missions.model import Takeoff, Waypoint
 
 from .conftest import Array, Craft

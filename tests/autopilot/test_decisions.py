@@ -9,12 +9,12 @@ from typing import Any, get_args
 
 import pytest
 
-from autopilot.decisions import ACCEPTED as YES
-from autopilot.decisions import arming_complaints, decide
-from autopilot.flight import IN_AIR, ON_GROUND, Flight, Phase, Plan, Selected
-from autopilot.guidance import Hold, Transfer
+from autopilot.guidance.legs import Hold, Transfer
 from autopilot.services import identity, requests
-from autopilot.supervisor import advance, enter
+from autopilot.supervisor.advance import advance, enter
+from autopilot.supervisor.flight import IN_AIR, ON_GROUND, Flight, MissionPlan, Phase, Selected
+from autopilot.supervisor.requests import ACCEPTED as YES
+from autopilot.supervisor.requests import arming_complaints, decide
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
@@ -24,7 +24,7 @@ DENIED = mavlink.MAV_RESULT_DENIED
 LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 R = requests
 
-PLAN = Plan(
+PLAN = MissionPlan(
     (
         model.Takeoff(2.0),
         model.Speed(1.0),
@@ -99,7 +99,7 @@ REQUESTS: list[Any] = [
 ]
 
 
-def flight_in(phase: Phase, on_mission: bool, plan: Plan) -> Flight:
+def flight_in(phase: Phase, on_mission: bool, plan: MissionPlan) -> Flight:
     """A flight in the first leg of a phase; on the mission's waypoint if it is on a mission."""
     step = 2 if plan.steps else 0
     selected = Selected.MISSION if on_mission else Selected.NOTHING
@@ -119,12 +119,12 @@ def test_every_request_is_asked() -> None:
     assert {type(request) for request in REQUESTS} == set(get_args(requests.Request))
 
 
-@pytest.mark.parametrize("plan", [PLAN, Plan()], ids=["mission", "no mission"])
+@pytest.mark.parametrize("plan", [PLAN, MissionPlan()], ids=["mission", "no mission"])
 @pytest.mark.parametrize("on_mission", [False, True])
 @pytest.mark.parametrize("released", [False, True])
 @pytest.mark.parametrize("phase", Phase)
 def test_every_request_in_every_phase_gets_a_verdict_and_a_refusal_changes_nothing(
-    phase: Phase, released: bool, on_mission: bool, plan: Plan
+    phase: Phase, released: bool, on_mission: bool, plan: MissionPlan
 ) -> None:
     for request in REQUESTS:
         before = flight_in(phase, on_mission and bool(plan.steps), plan)
@@ -197,7 +197,7 @@ def test_arming_and_choosing_what_to_fly_come_in_either_order(what: Any, ask_fir
 
 def test_a_mission_that_is_gone_is_not_begun_by_arming() -> None:
     chosen, _ = decide(Flight(plan=PLAN), R.StartMission(None), view(), SETTINGS)
-    gone = replace(chosen, plan=Plan())
+    gone = replace(chosen, plan=MissionPlan())
     after, verdict = decide(gone, R.Arm(True, False), view(), SETTINGS)
     assert (after, verdict.result, verdict.text) == (gone, DENIED, "Mission denied: there is none")
 

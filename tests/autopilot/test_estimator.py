@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from autopilot.estimation.correct_load import correct_load
-from autopilot.estimation.correct_pose import correct_pose
 from autopilot.estimation.filter import Readings, complaints, estimate
 from autopilot.estimation.history import carry_back, past3, past4, row_before
+from autopilot.estimation.measurements.load import correct_load
+from autopilot.estimation.measurements.pose import correct_pose
 from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     ACCEL_BIAS,

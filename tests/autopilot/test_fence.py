@@ -7,8 +7,6 @@ from typing import Any
 
 import pytest
 
-from autopilot.decisions import decide
-from autopilot.flight import Phase, Settings
 from autopilot.geometry.linear import norm, sub
 from autopilot.services.requests import (
     Arm,
@@ -21,6 +19,8 @@ from autopilot.services.requests import (
     SetMode,
     StartMission,
 )
+from autopilot.supervisor.flight import Phase, Settings
+from autopilot.supervisor.requests import decide
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon
 from autopilot.wire.mission_items import LocatedStep

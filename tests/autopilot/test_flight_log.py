@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from autopilot.flight_log import FAST, MOST_WAITING, SLOW, TAIL_US, FlightLog, LogChunk
-from autopilot.onboard import Onboard
+from autopilot.onboard.flight_log import FAST, MOST_WAITING, SLOW, TAIL_US, FlightLog, LogChunk
+from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.snapshot import Options
 from autopilot.services.identity import Identity
-from autopilot.telemetry_view import Options
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home

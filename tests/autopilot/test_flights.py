@@ -6,8 +6,8 @@ import io
 
 import pytest
 
-from autopilot.flight import Phase
 from autopilot.geometry.linear import norm, sub
+from autopilot.supervisor.flight import Phase
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter

@@ -10,9 +10,8 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.flight import limits_from
 from autopilot.geometry.linear import Vec3, norm
-from autopilot.guidance import (
+from autopilot.guidance.legs import (
     LOAD_ATTITUDE,
     LOAD_POSITION,
     QUAD_ATTITUDE,
@@ -34,11 +33,12 @@ from autopilot.guidance import (
     slow_leg,
     transfer_leg,
 )
+from autopilot.supervisor.flight import limits_from
+from autopilot.trajectory.shaping import shape, unshaped
+from autopilot.trajectory.waypoint_path import Passage, passage
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from missions.model import Signals, Sine, Term
-from missions.shaping import shape, unshaped
-from missions.waypoints import Passage, passage
 
 HERE, THERE = (1.0, -2.0, 3.0), (2.0, 1.0, 2.5)
 SIGNALS = Signals(4.0, (Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))

@@ -10,10 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.flight import Guide, Phase, pace_of, setpoint
-from autopilot.following import NOWHERE, Circle, Follow, Pace, Posture, Wish, begin_following, governed
 from autopilot.geometry.linear import ZERO, Vec3, norm, sub
-from autopilot.guidance import LOAD_POSITION, transfer_leg
+from autopilot.guidance.legs import LOAD_POSITION, transfer_leg
+from autopilot.guidance.setpoint_follower import (
+    NOWHERE,
+    Circle,
+    Follow,
+    FollowLimits,
+    PositionSetpoint,
+    Posture,
+    begin_following,
+    governed,
+)
+from autopilot.onboard.snapshot import mode_of
 from autopilot.services import identity
 from autopilot.services.requests import (
     Arm,
@@ -28,7 +37,7 @@ from autopilot.services.requests import (
     SetMode,
     Takeoff,
 )
-from autopilot.telemetry_view import mode_of
+from autopilot.supervisor.flight import Guide, Phase, pace_of, setpoint
 from autopilot.wire.dialect import plumbline as m
 from missions import model
 
@@ -37,7 +46,7 @@ from .conftest import ACCEPTED, CABLE_LENGTH, SETTINGS, STEP_US, TICK_S, Craft, 
 OFFBOARD = SetMode(identity.OFFBOARD, 0)
 POSCTL = SetMode(identity.POSCTL, 0)
 DENIED, LATER = m.MAV_RESULT_DENIED, m.MAV_RESULT_TEMPORARILY_REJECTED
-PACE = Pace(1.5, 5.0, 1.5, 13.1)
+PACE = FollowLimits(1.5, 5.0, 1.5, 13.1)
 
 
 def at(*position: float, **more: Any) -> FollowSetpoint:
@@ -67,7 +76,9 @@ def offboard(request: Any) -> Sky:
 # ---- the motion
 
 
-def led(asked: Wish | Circle, seconds: float, leg: Follow | None = None, begin_us: int = 0) -> list[Any]:
+def led(
+    asked: PositionSetpoint | Circle, seconds: float, leg: Follow | None = None, begin_us: int = 0
+) -> list[Any]:
     """Jets at every 20 ms on the way."""
     leg = leg or begin_following((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
     found = []
@@ -88,7 +99,11 @@ def test_no_derivative_jumps_whatever_is_asked(asked: list[Vec3], kinds: list[bo
     leg = begin_following(((0.0, 0.0, 5.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
     now_us = 0
     for vector, is_place in zip(asked, kinds, strict=False):
-        wish = Wish(vector, NOWHERE, NOWHERE, now_us) if is_place else Wish(velocity=vector, since_us=now_us)
+        wish = (
+            PositionSetpoint(vector, NOWHERE, NOWHERE, now_us)
+            if is_place
+            else PositionSetpoint(velocity=vector, since_us=now_us)
+        )
         for _ in range(10):
             now_us += 20_000
             after = leg.onward(0.02, wish, PACE, now_us)
@@ -102,7 +117,7 @@ def test_no_derivative_jumps_whatever_is_asked(asked: list[Vec3], kinds: list[bo
 @given(at_s=st.floats(0.0, 9.7), place=vectors, is_place=st.booleans())
 def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: Vec3, is_place: bool) -> None:
     before = transfer_leg((0.0, 0.0, 3.0), (10.0, 0.0, 3.0), 3.0, PACE.accel, LOAD_POSITION)
-    wish = Wish(place) if is_place else Wish(velocity=place)
+    wish = PositionSetpoint(place) if is_place else PositionSetpoint(velocity=place)
     *jets, _ = led(wish, 3.0, begin_following(before.jet(at_s), PACE.rate))
     # 300 of them: 1.50 m/s^2 and 5.9 m/s^3; with a point begun at the velocity alone 1.63 and 16.5
     assert max(norm(jet[2]) for jet in jets) < 1.05 * PACE.accel
@@ -115,7 +130,7 @@ def test_it_comes_to_rest_over_the_floor_wherever_it_was_led(
     height: float, wish: Vec3, seconds: float
 ) -> None:
     leg = begin_following(((0.0, 0.0, height), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
-    *_, leg = led(Wish(velocity=wish), seconds, leg)
+    *_, leg = led(PositionSetpoint(velocity=wish), seconds, leg)
     legs, end = leg.stopped(0.013, PACE.accel)
     last = leg.jet(0.013)
     for leg in legs:
@@ -131,7 +146,7 @@ def test_it_comes_to_rest_over_the_floor_wherever_it_was_led(
 
 
 def test_derivatives_are_those_of_the_motion() -> None:
-    *_, leg = led(Wish((3.0, -2.0, 4.0)), 1.0)
+    *_, leg = led(PositionSetpoint((3.0, -2.0, 4.0)), 1.0)
     h = 1e-4
     for n in range(6):
         change = sub(leg.jet(0.1 + h)[n], leg.jet(0.1 - h)[n])
@@ -144,7 +159,7 @@ def test_derivatives_are_those_of_the_motion() -> None:
 
 
 def test_a_far_place_is_reached_within_speed_and_acceleration_and_not_overshot() -> None:
-    *jets, leg = led(Wish((12.0, 0.0, 3.0)), 15.0)
+    *jets, leg = led(PositionSetpoint((12.0, 0.0, 3.0)), 15.0)
     assert norm(sub(leg.jet(0.0)[0], (12.0, 0.0, 3.0))) < 1e-3
     assert max(norm(jet[1]) for jet in jets) < 1.001 * PACE.speed
     assert max(norm(jet[2]) for jet in jets) < 1.001 * PACE.accel
@@ -152,24 +167,24 @@ def test_a_far_place_is_reached_within_speed_and_acceleration_and_not_overshot()
 
 
 def test_a_velocity_is_reached_and_held_and_stops() -> None:
-    *_, leg = led(Wish((math.nan, math.nan, 2.0), (2.0, 1.0, math.nan)), 6.0)
+    *_, leg = led(PositionSetpoint((math.nan, math.nan, 2.0), (2.0, 1.0, math.nan)), 6.0)
     assert norm(sub(leg.jet(0.0)[1], (2.0, 1.0, 0.0))) < 1e-2
-    *_, leg = led(Wish(velocity=ZERO), 6.0, leg)
+    *_, leg = led(PositionSetpoint(velocity=ZERO), 6.0, leg)
     assert norm(leg.jet(0.0)[1]) < 1e-3
     still = leg.jet(0.0)[0]
-    *_, leg = led(Wish(velocity=ZERO), 5.0, leg)
+    *_, leg = led(PositionSetpoint(velocity=ZERO), 5.0, leg)
     assert norm(sub(leg.jet(0.0)[0], still)) < 1e-3
 
 
 def test_no_velocity_leads_below_the_floor() -> None:
     leg = begin_following(((0.0, 0.0, 3.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
-    *jets, leg = led(Wish(velocity=(0.0, 0.0, -3.0)), 12.0, leg)
+    *jets, leg = led(PositionSetpoint(velocity=(0.0, 0.0, -3.0)), 12.0, leg)
     assert 0.27 < min(jet[0][2] for jet in jets) <= leg.jet(0.0)[0][2] + 0.03
     assert leg.jet(0.0)[0][2] == pytest.approx(0.3, abs=0.02)
 
 
 def test_a_place_that_moves_is_followed_without_lag() -> None:
-    *_, leg = led(Wish(ZERO, (1.0, 0.0, 0.0)), 10.0)
+    *_, leg = led(PositionSetpoint(ZERO, (1.0, 0.0, 0.0)), 10.0)
     # the last update was at 9.98 s
     assert leg.jet(0.0)[0][0] == pytest.approx(9.98, abs=5e-3)
 
@@ -186,7 +201,7 @@ def test_a_circle_is_flown_on_its_radius() -> None:
 def test_the_governor_never_asks_for_more_than_its_acceleration(
     x: Vec3, v: Vec3, place: Vec3, now: int
 ) -> None:
-    point = governed(x, v, Wish(place, v, x, 0), PACE, now)
+    point = governed(x, v, PositionSetpoint(place, v, x, 0), PACE, now)
     assert all(map(math.isfinite, (*point[0], *point[1], *point[2])))
     assert norm(point[2]) <= PACE.accel * 1.000001
 
@@ -225,7 +240,7 @@ def test_a_relative_setpoint_is_from_where_the_load_is() -> None:
     sky = offboard(at(0.0, 0.0, 2.0))
     assert sky.ask(at(1.0, math.nan, math.nan, relative=True)).result == ACCEPTED
     asked = sky.flight.offboard.asked
-    assert isinstance(asked, Wish)
+    assert isinstance(asked, PositionSetpoint)
     assert asked.position[0] == pytest.approx(sky.view.x_load[0] + 1.0)
     assert math.isnan(asked.position[1])
 
@@ -234,7 +249,7 @@ def test_setpoints_for_the_vehicle_are_a_cable_above_those_for_the_load() -> Non
     sky = Sky(settings=SETTINGS.__class__(**{**_fields(SETTINGS), "guides_vehicle": True})).airborne()
     sky.ask(at(0.0, 0.0, 5.0))
     asked = sky.flight.offboard.asked
-    assert isinstance(asked, Wish)
+    assert isinstance(asked, PositionSetpoint)
     assert asked.position[2] == pytest.approx(5.0 - CABLE_LENGTH)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from autopilot.flight import Phase
-from autopilot.onboard import plan_of
+from autopilot.onboard.onboard import plan_of
 from autopilot.services.mission_store import StoredMission
+from autopilot.supervisor.flight import Phase
 from autopilot.wire.convert import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.mission_items import WireItem, located_steps

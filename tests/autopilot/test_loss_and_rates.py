@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.loss import Loss
-from autopilot.scheduler import RateError, divider, is_due
+from autopilot.core.scheduler import RateError, divider, is_due
+from autopilot.onboard.packet_loss import Loss
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.flight import Phase
-from autopilot.onboard import Onboard
+from autopilot.onboard.onboard import Onboard
+from autopilot.supervisor.flight import Phase
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home, hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
 from autopilot.wire.dialect import plumbline as mavlink

@@ -9,13 +9,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from autopilot.decisions import with_plan
-from autopilot.flight import Phase, asked_setpoint, jet_ahead
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance import Hold, Pass, Run
-from autopilot.onboard import Onboard
+from autopilot.guidance.legs import Hold, Pass, Run
+from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.snapshot import Options
 from autopilot.services.requests import Arm, Pause, StartMission
-from autopilot.telemetry_view import Options
+from autopilot.supervisor.flight import Phase, asked_setpoint, jet_ahead
+from autopilot.supervisor.requests import with_plan
+from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter, read_tlog
@@ -26,7 +27,6 @@ from gcs.closed_loop import Conditions, fly
 from missions import model
 from missions.fileformat import load_mission
 from missions.model import Delay, Signals, Step, Takeoff, Term, Waypoint
-from missions.planning import PENDING, REFUSE, SLOW_DOWN, prepare
 
 from .conftest import ACCEPTED, SETTINGS, STEP_US, Craft, Sky
 

@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from autopilot.decisions import decide
-from autopilot.flight import Phase
-from autopilot.guidance import QUAD_POSITION
+from autopilot.guidance.legs import QUAD_POSITION
 from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
-from autopilot.supervisor import enter
+from autopilot.supervisor.advance import enter
+from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.requests import decide
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint
 from missions.model import Release as ReleaseStep

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from autopilot.flight import Flight, Phase
 from autopilot.geometry.linear import ZERO, norm
-from autopilot.guidance import CATCH_S, Catch, Hold
-from autopilot.supervisor import advance
+from autopilot.guidance.legs import CATCH_S, Catch, Hold
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.flight import Flight, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Signals, Sine, Takeoff, Term
 

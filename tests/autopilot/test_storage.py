@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.flight_log import LogChunk
+from autopilot.onboard.flight_log import LogChunk
 from autopilot.services.mission_store import StoredMission
-from autopilot.storage import (
+from autopilot.shell.storage import (
     CARD_DIRECTORY,
     MISSION_FILE,
     PARAMETER_FILE,
@@ -21,7 +21,7 @@ from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.mission_items import encode_steps, located_steps
-from autopilot.wire.parameters import ParameterTable
+from autopilot.wire.parameter_table import ParameterTable
 from missions.fileformat import load_mission, shipped
 
 HOME = Home()

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from autopilot.flight import CARRYING, IN_AIR, ON_GROUND, Event, Flight, Phase, Plan
-from autopilot.following import Stream, Wish
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance import LOAD_POSITION, Brake, Calm, Creep, Hold, Run, Swing
+from autopilot.guidance.legs import LOAD_POSITION, Brake, Calm, Creep, Hold, Run, Swing
+from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
-from autopilot.supervisor import TRANSITIONS, advance, enter, happen
+from autopilot.supervisor.advance import TRANSITIONS, advance, enter, happen
+from autopilot.supervisor.flight import CARRYING, IN_AIR, ON_GROUND, Event, Flight, MissionPlan, Phase
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
 
@@ -90,7 +90,7 @@ def table() -> dict[tuple[Phase, Event], Phase]:
 def test_each_entry_of_the_table_and_each_that_is_not_there(phase: Phase, event: Event) -> None:
     expected = table().get((phase, event))
     assert TRANSITIONS.get((phase, event)) == expected
-    flight = Flight(phase=phase, plan=Plan(STEPS, (0, 1, 2), 3), takeoff_altitude_m=2.0, speed_m_s=1.0)
+    flight = Flight(phase=phase, plan=MissionPlan(STEPS, (0, 1, 2), 3), takeoff_altitude_m=2.0, speed_m_s=1.0)
     after = happen(flight, event, hanging(5_000_000), SETTINGS)
     if expected is None:
         assert after is None
@@ -363,14 +363,14 @@ TROUBLES: dict[str, tuple[dict[str, Any], str]] = {
 
 def under_way(phase: Phase) -> Flight:
     """A flight at the beginning of a phase, over (1, 0, 2)."""
-    plan = Plan(STEPS, (0, 1, 2), 3)
+    plan = MissionPlan(STEPS, (0, 1, 2), 3)
     held = Flight(
         phase=Phase.HOLD,
         plan=plan,
         step=1,
         takeoff_altitude_m=4.0,
         speed_m_s=1.0,
-        offboard=Stream(Wish(HERE), 0),
+        offboard=Stream(PositionSetpoint(HERE), 0),
     )
     return enter(held, phase, hanging(x=HERE), SETTINGS)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from autopilot.flight import Phase
-from autopilot.guidance import Hold, Swing
+from autopilot.guidance.legs import Hold, Swing
+from autopilot.supervisor.flight import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.fileformat import load_mission
 from missions.model import AttitudeRun, Land, Takeoff

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from autopilot.flight import Flight, Phase
-from autopilot.guidance import Hold, Reel, Slow, reel_leg, top_of
+from autopilot.core.winch import cable_now, commanded_rate
+from autopilot.guidance.legs import Hold, Reel, Slow, reel_leg, top_of
 from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
-from autopilot.supervisor import enter
-from autopilot.winch import cable_now, commanded_rate
+from autopilot.supervisor.advance import enter
+from autopilot.supervisor.flight import Flight, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Waypoint, Winch
 

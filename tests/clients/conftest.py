@@ -31,7 +31,7 @@ import pytest
 from autopilot.wire.codec import decode
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.samples import CARRIED
-from gcs.link import LOOPBACK, free_port
+from gcs.shell.link import LOOPBACK, free_port
 
 PROGRAMS = Path(__file__).with_name("programs")
 LONG_S = 300.0  # of a busy machine

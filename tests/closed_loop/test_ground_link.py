@@ -22,7 +22,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.mission_items import encode_steps
 from gcs.clients.missions import MissionDownload, MissionUpload
 from gcs.clients.operation import GROUND, Operation, Target
-from gcs.clients.parameters import ParameterList
+from gcs.clients.parameter_transfer import ParameterList
 from missions.model import Land, Takeoff, Waypoint
 
 TICK_US = 4_000

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.onboard import Onboard
+from autopilot.onboard.onboard import Onboard
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink

@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from autopilot.control import load_attitude, quad_attitude, quad_position, thesis
+from autopilot.control import load_attitude, quad_attitude, quad_position
+from autopilot.control.laws import thesis
 from autopilot.control.records import Command, Reference, Vehicle
-from missions.flatness import flat_outputs
+from autopilot.trajectory.flatness import flat_outputs
 
 ZERO = (0.0, 0.0, 0.0)
 HEADING = (1.0, 0.0, 0.0)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
-from autopilot.control import command_filter, quad_position, thesis
+from autopilot.control import command_filter, quad_position
+from autopilot.control.actuators.mixer import mix
+from autopilot.control.laws import thesis
 from autopilot.control.records import Reference, Vehicle
-from autopilot.mixer import mix
 
 SCIPY = 1e-10  # lsim's own matrix exponential, over 500 steps
 

@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from autopilot.control import lqr
+from autopilot.control.actuators.mixer import mix
+from autopilot.control.laws import lqr
 from autopilot.control.linear_model import PHI_L, THETA_L, second_order, state_space
 from autopilot.control.records import Reference, State, Vehicle
 from autopilot.geometry.linear import ZERO
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.mixer import mix
+from autopilot.trajectory.signals import evaluate, signal_table
 from gcs.analysis.step import Step, step_response
 from missions.fileformat import load_mission
 from missions.model import Signals
-from missions.signals import evaluate, signal_table
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
-from sitl.truth import load_truth
+from sitl.vehicles import load_truth
 
 Array = NDArray[np.float64]
 PRINTED = np.array(json.loads((Path(__file__).parent / "printed_gains.json").read_text())["K"])
@@ -274,7 +274,7 @@ def test_compiled_and_plain_agree_to_the_bit(model: SimpleNamespace, regulator: 
 
 
 def test_other_laws_do_not_pay_for_the_solver() -> None:
-    check = "import sys, autopilot.laws; sys.exit('control' in sys.modules)"
+    check = "import sys, autopilot.control.laws.interface; sys.exit('control' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0
 
 

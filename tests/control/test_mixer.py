@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
+from autopilot.control.actuators.mixer import ALL_ROTORS, MixerResult, mix, thrust_and_moment
 from autopilot.control.records import Vehicle
-from autopilot.mixer import ALL_ROTORS, MixerResult, mix, thrust_and_moment
 
 BEBOP = Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
 INF = float("inf")

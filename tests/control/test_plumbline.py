@@ -17,24 +17,28 @@ import pytest
 from numpy.typing import NDArray
 
 import autopilot
-from autopilot import actuation, observer, prediction, rotor_lag
-from autopilot.actuation import actuation_constants
-from autopilot.control import direction_jet, load_motion, plumbline
+from autopilot.control import direction_jet, load_motion
+from autopilot.control.actuators import disturbance_observer as observer
+from autopilot.control.actuators import lag_compensation as rotor_lag
+from autopilot.control.actuators import predictor as prediction
+from autopilot.control.actuators import rotor_model as actuation
+from autopilot.control.actuators.mixer import mix
+from autopilot.control.actuators.rotor_model import actuation_constants
+from autopilot.control.laws import plumbline
+from autopilot.control.laws.interface import PlumblineLaw, build_law
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment
 from autopilot.control.records import Jet, Reference, State, Vehicle
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.laws import PlumblineLaw, build_law
-from autopilot.mixer import mix
+from autopilot.trajectory.flatness import flat_outputs
+from autopilot.trajectory.signals import evaluate, signal_table
 from autopilot.vehicle.belief import BeliefError, load_belief
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
 from missions.fileformat import load_mission
-from missions.flatness import flat_outputs
 from missions.model import Signals
-from missions.signals import evaluate, signal_table
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
-from sitl.truth import load_truth
+from sitl.vehicles import load_truth
 
 Array = NDArray[np.float64]
 ROOM = Path(autopilot.__file__).parent

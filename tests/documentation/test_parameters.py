@@ -9,9 +9,9 @@ from pathlib import Path
 
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.parameters import ParameterTable
-from sitl.truth.files import load_truth
-from sitl.truth.parameters import sim_parameters
+from autopilot.wire.parameter_table import ParameterTable
+from sitl.vehicles.files import load_truth
+from sitl.vehicles.sim_parameters import sim_parameters
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 HEAD = """# Parameters

@@ -16,7 +16,7 @@ from pymavlink import mavwp
 from autopilot.wire.convert import Home
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import WireItem, encode_mission
-from autopilot.wire.parameters import parse_text
+from autopilot.wire.parameter_table import parse_text
 from gcs.clients.operation import Target
 from gcs.formats.items import NO_INT, FormatError
 from gcs.formats.missions import judge, read_foreign, write_foreign

@@ -11,7 +11,7 @@ from gcs.clients import command
 from gcs.clients.connection import Connection
 from gcs.clients.missions import MissionClear, MissionDownload, MissionUpload
 from gcs.clients.operation import GROUND, Status, Target
-from gcs.clients.parameters import ParameterGet, ParameterList, ParameterSet
+from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
 
 TARGET = Target(1, 1)
 

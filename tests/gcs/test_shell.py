@@ -16,15 +16,15 @@ import pytest
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
-from gcs import processes as processes_module
 from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient
-from gcs.display import FlightDisplay
 from gcs.errors import GcsError, NoVehicleError
-from gcs.flight_loops import run_lockstep, run_wall_clock
-from gcs.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
-from gcs.processes import Processes
-from gcs.stopping import StopRequest
+from gcs.shell import processes as processes_module
+from gcs.shell.display import FlightDisplay
+from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
+from gcs.shell.processes import Processes
+from gcs.shell.stopping import StopRequest
+from gcs.workflows.flight_loops import run_lockstep, run_wall_clock
 
 WAIT_S = 10.0  # for what takes milliseconds on an idle machine
 TICK_US = 20_000
@@ -285,7 +285,7 @@ def test_children_share_our_core_and_we_get_ours_back(tmp_path):
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="PR_SET_PDEATHSIG is Linux's")
 def test_nothing_outlives_a_killed_gcs(tmp_path):
     program = (
-        "import sys; from pathlib import Path; from gcs.processes import Processes\n"
+        "import sys; from pathlib import Path; from gcs.shell.processes import Processes\n"
         f"child = Processes().start('timeit', {LASTING!r}, Path(sys.argv[1]))\n"
         "print(child.pid, flush=True); sys.stdin.read()"
     )

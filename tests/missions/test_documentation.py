@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from missions.feasibility import VehicleLimits, check, peaks
+from autopilot.trajectory.feasibility import VehicleLimits, check, peaks
 from missions.fileformat import load_mission, parse_mission, shipped
 from missions.model import Land, Takeoff
 from missions.schema import ITEMS, SineSpec, TermSpec

@@ -8,9 +8,10 @@ from math import cos, inf, pi, radians, sqrt
 
 import pytest
 
-from missions.feasibility import VehicleLimits, check, peaks
+from autopilot.trajectory.feasibility import VehicleLimits, check, peaks
+from autopilot.trajectory.timeline import SET_DOWN_S, TAUTEN_S, expected_duration_s, legs
+from autopilot.trajectory.transfer import transfer_duration
 from missions.fileformat import load_mission, shipped
-from missions.legs import SET_DOWN_S, TAUTEN_S, expected_duration_s, legs
 from missions.model import (
     AttitudeRun,
     Delay,
@@ -25,7 +26,6 @@ from missions.model import (
     Term,
     Waypoint,
 )
-from missions.transfer import transfer_duration
 
 LIMITS = VehicleLimits()
 WithAmplitude = Callable[[str, str, float], Mission]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from missions.flatness import FlatState, flat_outputs, unit_derivatives_4
+from autopilot.trajectory.flatness import FlatState, flat_outputs, unit_derivatives_4
+from autopilot.trajectory.signals import Jet, evaluate, signal_table
 from missions.model import Sine, Term
-from missions.signals import Jet, evaluate, signal_table
 
 # The published values are printed with nine decimals.
 PRINTED = 5.1e-10

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from missions.legs import expected_duration_s
+from autopilot.trajectory.timeline import expected_duration_s
 from missions.model import Delay, Land, Mission, Signals, Speed, Takeoff, Term, Waypoint
 
 

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from missions.demand import Bounds, commanded, demand, slopes
+from autopilot.trajectory.convex import NO_ROWS, Goal, Problem
+from autopilot.trajectory.peaks import Body
+from autopilot.trajectory.prepare import AS_ASKED, REFUSE, SLOW_DOWN, Limits, prepare, slow_down, trouble_of
+from autopilot.trajectory.rotor_demand import Bounds, commanded, demand, slopes
+from autopilot.trajectory.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, shape, unshaped
+from autopilot.trajectory.splines import Array, Basis
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Term
-from missions.optimise import NO_ROWS, Goal, Problem
-from missions.planning import AS_ASKED, REFUSE, SLOW_DOWN, Limits, prepare, slow_down, trouble_of
-from missions.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, shape, unshaped
-from missions.splines import Array, Basis
-from missions.survey import Body
 
 BODY = Body(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.02, 0.012)
 BOUNDS = Bounds(0.294, 1.666, 0.294, cos(radians(45.0)), 0.02)

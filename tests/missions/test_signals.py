@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from autopilot.trajectory.signals import REST, evaluate, joints, signal_table
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Term
-from missions.signals import REST, evaluate, joints, signal_table
 
 # Both sides are sums of a few rounded cosines: relative to amplitude * (greatest frequency)^n this leaves
 # some hundred units of rounding, mostly from the phases of up to 300 rad.

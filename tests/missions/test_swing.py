@@ -7,7 +7,7 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from missions.swing import swing
+from autopilot.trajectory.swing import swing
 
 NORTH, EAST, DURATION = radians(12.0), radians(-5.0), 1.5
 RUN = (NORTH, EAST, DURATION)

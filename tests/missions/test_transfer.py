@@ -8,7 +8,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from missions.transfer import PEAK_ACCELERATION, PEAK_SPEED, transfer, transfer_duration
+from autopilot.trajectory.transfer import PEAK_ACCELERATION, PEAK_SPEED, transfer, transfer_duration
 
 P0, P1 = (1.0, -2.0, 3.0), (4.0, 2.0, 2.5)
 # Horner with alternating coefficients up to 24024 on half the interval leaves some twelve digits, relative

@@ -12,13 +12,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.linear import Vec3
-from missions.demand import Bounds, commanded, demand
+from autopilot.trajectory.peaks import Body, survey_transfer
+from autopilot.trajectory.prepare import REFUSE, Limits, prepare
+from autopilot.trajectory.rotor_demand import Bounds, commanded, demand
+from autopilot.trajectory.splines import Array
+from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.waypoint_path import (
+    TURN_S,
+    MinimumSnap,
+    Passage,
+    evaluate_path,
+    passage,
+    passage_jets,
+)
 from missions.model import Land, Speed, Step, Takeoff, Waypoint
-from missions.planning import REFUSE, Limits, prepare
-from missions.splines import Array
-from missions.survey import Body, survey_transfer
-from missions.transfer import transfer_duration
-from missions.waypoints import TURN_S, MinimumSnap, Passage, evaluate_path, passage, passage_jets
 
 BODY = Body(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.02, 0.012)
 BOUNDS = Bounds(0.294, 1.666, 0.294, cos(radians(45.0)), 0.02)

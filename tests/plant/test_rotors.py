@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from sitl.plant.rotors import decay, limited, thrust_and_moment
 from sitl.plant.step import advance, advance_many
-from sitl.truth.parameters import apply, sim_parameters
+from sitl.vehicles.sim_parameters import apply, sim_parameters
 
 CALM = (0.0, 0.0, 0.0)
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-import sitl.truth
-from autopilot.wire.parameters import ParameterError
-from sitl.truth import TruthFileError, load_truth, shipped
-from sitl.truth.parameters import apply, sim_parameters
+import sitl.vehicles
+from autopilot.wire.parameter_table import ParameterError
+from sitl.vehicles import TruthFileError, load_truth, shipped
+from sitl.vehicles.sim_parameters import apply, sim_parameters
 
-BEBOP = (Path(sitl.truth.__file__).parent / "bebop.toml").read_text()
+BEBOP = (Path(sitl.vehicles.__file__).parent / "bebop.toml").read_text()
 
 
 def _broken(tmp_path, old, new):

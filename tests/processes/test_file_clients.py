@@ -16,7 +16,7 @@ import pytest
 
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
-from gcs.link import LOOPBACK, free_port
+from gcs.shell.link import LOOPBACK, free_port
 
 if TYPE_CHECKING:
     from conftest import Program

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from gcs.link import LOOPBACK, free_port
+from gcs.shell.link import LOOPBACK, free_port
 
 if TYPE_CHECKING:
     from conftest import Program

@@ -35,7 +35,7 @@ from autopilot.services.requests import (
 )
 from autopilot.wire.convert import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameters import Parameter
+from autopilot.wire.parameter_table import Parameter
 
 NAN = math.nan
 OK, DENIED, UNSUPPORTED = (

@@ -17,7 +17,7 @@ from autopilot.services.telemetry import STREAMS
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.parameters import Parameter, ParameterTable
+from autopilot.wire.parameter_table import Parameter, ParameterTable
 
 GCS_BEAT = m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 

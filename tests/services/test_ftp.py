@@ -15,7 +15,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pymavlink.mavftp import MAVFTP
 
-from autopilot.card import DirectoryCard
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, FileError, Limits, MemoryCard, Trouble, path_of
 from autopilot.services.ftp import (
@@ -30,8 +29,9 @@ from autopilot.services.ftp import (
     packet_of,
     payload_of,
 )
-from autopilot.services.made_files import mission_pack, parameter_pack
 from autopilot.services.records import Peer, Send, Verdict
+from autopilot.services.virtual_files import mission_pack, parameter_pack
+from autopilot.shell.sd_card import DirectoryCard
 from autopilot.wire.dialect import plumbline as mavlink
 
 TICK_US = 4000

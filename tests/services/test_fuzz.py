@@ -21,7 +21,7 @@ from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import MissionItemError, WireItem, encode_steps, located_steps
-from autopilot.wire.parameters import ParameterError, decimal_from_float32
+from autopilot.wire.parameter_table import ParameterError, decimal_from_float32
 from autopilot.wire.signing import NEWEST, Signing
 from missions.model import Takeoff, Waypoint
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from pymavlink import mavutil
 
-from autopilot import decisions
 from autopilot.services.heartbeat import heartbeat_message, load_heartbeat_message
 from autopilot.services.identity import (
     ARDUPILOT,
@@ -20,6 +19,7 @@ from autopilot.services.identity import (
     available_modes_messages,
     identity_of,
 )
+from autopilot.supervisor import requests as decisions
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink

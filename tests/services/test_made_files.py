@@ -9,12 +9,12 @@ from typing import Any
 from autopilot.services.file_tree import checksum
 from autopilot.services.files import path_of
 from autopilot.services.identity import Identity
-from autopilot.services.made_files import GENERAL, PARAMETER_TEXTS, made_files
 from autopilot.services.mission_store import StoredMission
+from autopilot.services.virtual_files import GENERAL, PARAMETER_TEXTS, made_files
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.parameters import Parameter
+from autopilot.wire.parameter_table import Parameter
 
 
 def made(table: Any) -> Any:

@@ -8,7 +8,7 @@ import struct
 import pytest
 
 from autopilot.services.identity import ParameterEncoding
-from autopilot.services.parameters import (
+from autopilot.services.parameter_protocol import (
     DOES_NOT_EXIST,
     LIST_PACE_US,
     OUT_OF_RANGE,
@@ -19,7 +19,7 @@ from autopilot.services.parameters import (
 from autopilot.services.records import ParameterChanged, Peer
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.parameters import Parameter, ParameterTable
+from autopilot.wire.parameter_table import Parameter, ParameterTable
 
 REAL32, INT32 = m.MAV_PARAM_TYPE_REAL32, m.MAV_PARAM_TYPE_INT32
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from autopilot.wire.parameters import ParameterError
+from autopilot.wire.parameter_table import ParameterError
 
 G = 9.81
 # Free flight of a point mass is a polynomial of degree two in time, which the integrator gets exactly: what

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gcs.sweep.plan import Plan, Varied
+from gcs.sweep.plan import SweepPlan, Varied
 
 SHORT = """
 title = "Up, aside and down"
@@ -45,10 +45,10 @@ def delivery(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture
-def plan(short: str) -> Plan:
+def plan(short: str) -> SweepPlan:
     """Six flights, of which those with the long delay are lost."""
     delays = Varied("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
-    return Plan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
+    return SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
 
 
 class AtOnce(Executor):

@@ -7,8 +7,7 @@ import pytest
 
 from autopilot.estimation.filter import complaints
 from autopilot.estimation.records import CAMERA, RECEIVER, TRACKER, Doubt, blank_state
-from autopilot.flight import Flight, jet_ahead, limits_from
-from autopilot.guidance import (
+from autopilot.guidance.legs import (
     LOAD_POSITION,
     Brake,
     Creep,
@@ -20,7 +19,11 @@ from autopilot.guidance import (
     Transfer,
     asked_jet,
 )
-from autopilot.onboard import Onboard
+from autopilot.onboard.onboard import Onboard
+from autopilot.supervisor.flight import Flight, jet_ahead, limits_from
+from autopilot.trajectory.prepare import prepare
+from autopilot.trajectory.shaping import Shaped, unshaped
+from autopilot.trajectory.waypoint_path import Passage
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.closed_loop import Conditions
@@ -30,9 +33,6 @@ from gcs.sweep.legs import jets, jets_ahead
 from gcs.sweep.link import settled
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Takeoff, Term, Waypoint
-from missions.planning import prepare
-from missions.shaping import Shaped, unshaped
-from missions.waypoints import Passage
 from sitl.hil import HilSimulator
 
 MOST_TICKS = 20_000

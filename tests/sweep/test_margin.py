@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from gcs.sweep.margin import linear_range
-from gcs.sweep.plan import Plan
+from gcs.sweep.plan import SweepPlan
 
 ROOT = Path(__file__).parents[2]
 
 
 def limits(law: str, name: str, nominal: float, to: tuple[float, float]) -> str:
-    return linear_range(Plan("hover", "bebop", "lab", (law,), (1,), (), ()), law, name, nominal, to)
+    return linear_range(SweepPlan("hover", "bebop", "lab", (law,), (1,), (), ()), law, name, nominal, to)
 
 
 def test_delay_of_the_thesis_cascade_is_that_of_the_margin_tool() -> None:
@@ -36,5 +36,5 @@ def test_what_the_linear_loop_does_not_know_has_no_limit() -> None:
 
 
 def test_a_gain_of_no_damping_is_no_place_to_be() -> None:
-    plan = Plan("hover", "bebop", "lab", ("thesis",), (1,), (), (("NGC_KOMEGA", 0.0),))
+    plan = SweepPlan("hover", "bebop", "lab", ("thesis",), (1,), (), (("NGC_KOMEGA", 0.0),))
     assert linear_range(plan, "thesis", "SIM_ACT_DELAY_MS", 0.0, (0.0, 40.0)) == "nowhere"

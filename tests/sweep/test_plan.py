@@ -6,7 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from gcs.sweep.plan import Plan, PlanError, Varied, from_json, load_plan, make_plan, read_varied, store_plan
+from gcs.sweep.plan import (
+    PlanError,
+    SweepPlan,
+    Varied,
+    from_json,
+    load_plan,
+    make_plan,
+    read_varied,
+    store_plan,
+)
 
 
 def test_ranges_and_lists() -> None:
@@ -38,7 +47,7 @@ def test_what_is_no_variation_is_refused_with_its_text(text: str) -> None:
     assert caught.value.exit_code == 2
 
 
-def planned(short: str, varied: list[Varied], settings: dict[str, float], sample: int = 0) -> Plan:
+def planned(short: str, varied: list[Varied], settings: dict[str, float], sample: int = 0) -> SweepPlan:
     return make_plan(short, "bebop", "lab", ["thesis"], [1], varied, settings, sample)
 
 
@@ -94,11 +103,11 @@ def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) ->
     assert list(from_json(plan.to_json()).cases()) == cases
 
 
-def test_a_directory_holds_one_plan(plan: Plan, tmp_path: Path) -> None:
+def test_a_directory_holds_one_plan(plan: SweepPlan, tmp_path: Path) -> None:
     store_plan(tmp_path, plan, "gcs sweep", "1", "code")
     store_plan(tmp_path, plan, "gcs sweep again", "1", "code")
     assert load_plan(tmp_path) == plan
-    other = Plan(plan.mission, "bebop", "lab", ("lqr",), (1,), (), ())
+    other = SweepPlan(plan.mission, "bebop", "lab", ("lqr",), (1,), (), ())
     with pytest.raises(PlanError, match="another sweep"):
         store_plan(tmp_path, other, "gcs sweep", "1", "code")
     with pytest.raises(PlanError, match="other code"):

@@ -14,14 +14,14 @@ from click.testing import CliRunner
 
 from gcs.cli import gcs
 from gcs.sweep import pool, run
-from gcs.sweep.plan import Plan, load_plan
+from gcs.sweep.plan import SweepPlan, load_plan
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, flights_of, reach
 from gcs.sweep.store import Store, columns
 from tests.sweep.conftest import AtOnce
 
 
-def swept(plan: Plan, directory: Path, stopped: object = False) -> run.Swept:
+def swept(plan: SweepPlan, directory: Path, stopped: object = False) -> run.Swept:
     workers = nullcontext((AtOnce(), 1))
     return run.sweep(plan, directory, "gcs sweep", "1", workers, stopped, quiet=True, fresh=False)
 
@@ -44,16 +44,16 @@ def without_clock(path: Path) -> list[dict[str, Any]]:
 
 
 @pytest.fixture(scope="module")
-def whole(short: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path, run.Swept]:
+def whole(short: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[SweepPlan, Path, run.Swept]:
     from gcs.sweep.plan import Varied
 
     delays = Varied("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
-    plan = Plan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
+    plan = SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
     directory = tmp_path_factory.mktemp("whole")
     return plan, directory, swept(plan, directory)
 
 
-def test_table_has_a_row_for_each_flight(whole: tuple[Plan, Path, run.Swept]) -> None:
+def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
     plan, directory, done = whole
     assert (done.flights, done.flown, done.completed, done.whole) == (6, 6, 4, True)
     table = pq.read_table(directory / "flights.parquet")
@@ -69,7 +69,7 @@ def test_table_has_a_row_for_each_flight(whole: tuple[Plan, Path, run.Swept]) ->
 
 
 def test_a_sweep_that_was_stopped_goes_on(
-    whole: tuple[Plan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, complete, _ = whole
     monkeypatch.setattr(pool, "BATCH", 1)
@@ -81,7 +81,7 @@ def test_a_sweep_that_was_stopped_goes_on(
     assert swept(plan, tmp_path).flown == 0
 
 
-def test_a_sweep_that_was_killed_goes_on(whole: tuple[Plan, Path, run.Swept], tmp_path: Path) -> None:
+def test_a_sweep_that_was_killed_goes_on(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
     plan, complete, _ = whole
     rows = pq.read_table(complete / "flights.parquet").to_pylist()
     store = Store(tmp_path, plan)
@@ -96,14 +96,14 @@ def test_a_sweep_that_was_killed_goes_on(whole: tuple[Plan, Path, run.Swept], tm
     assert without_clock(tmp_path) == without_clock(complete)
 
 
-def test_report_holds_map_curve_and_margin(whole: tuple[Plan, Path, run.Swept]) -> None:
+def test_report_holds_map_curve_and_margin(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
     plan, directory, _ = whole
     page = write_report(directory, plan).read_text(encoding="utf-8")
     assert (directory / "curve-sim_act_delay_ms.png").stat().st_size > 5000
     assert "SIM_ACT_DELAY_MS" in page and "0 … 4" in page and "data:image/png" in page
 
 
-def test_shares_and_reach(whole: tuple[Plan, Path, run.Swept]) -> None:
+def test_shares_and_reach(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
     plan, directory, _ = whole
     (flights,) = flights_of(Store(directory, plan).read(), plan)
     found = cells(flights, plan, ("SIM_ACT_DELAY_MS",))
@@ -152,7 +152,7 @@ def test_wrong_usage_is_one_line_and_exit_code_2(short: str, arguments: list[str
     assert says in result.stderr and result.stderr.count("\n") == 1
 
 
-def test_a_dask_cluster_flies_the_same(whole: tuple[Plan, Path, run.Swept], tmp_path: Path) -> None:
+def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     plan, complete, _ = whole
 

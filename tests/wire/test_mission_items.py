@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from autopilot.geometry.frames import ned_from_enu
 from autopilot.geometry.linear import norm
+from autopilot.trajectory.signals import evaluate, signal_table
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import EARTH_RADIUS_M, Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
@@ -44,7 +45,6 @@ from missions.model import (
     Waypoint,
     Winch,
 )
-from missions.signals import evaluate, signal_table
 
 HOME = Home(47.397742, 8.545594, 488.0)
 FLOAT32 = 2.0**-24  # half a step of float32, relative

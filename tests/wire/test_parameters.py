@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.wire.parameters import (
+from autopilot.wire.parameter_table import (
     Parameter,
     ParameterError,
     ParameterTable,

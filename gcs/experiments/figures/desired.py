@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from autopilot.trajectory.signals import evaluate, signal_table
 from gcs.analysis.axes import Floats
 from gcs.experiments.figures.canvas import (
     AXES,
@@ -24,7 +25,6 @@ from gcs.experiments.figures.canvas import (
 from gcs.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, draw, new_figure
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Term
-from missions.signals import evaluate, signal_table
 
 _QUANTITIES = (
     ("position_m", "position (m)", 0.1),

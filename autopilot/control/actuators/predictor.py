@@ -1,0 +1,175 @@
+"""Where vehicle and load will be when the command of this tick comes into force.
+
+| symbol | code name | frame | unit | equation |
+|---|---|---|---|---|
+| x_L, v_L, q, q' | x_load .. q_cable_dot | I | | (2-30)-(2-33) |
+| R, Omega | quat, omega | B->I, B | , rad/s | (2-34), (2-35) |
+| f, M | thrust, moment | B | N, N m | `actuation` |
+| D | air | I | N | drag of the vehicle and a push that stays |
+
+The model of the taut cable, (2-31) with (2-36), or of the vehicle alone where the cable is slack, is
+integrated by the midpoint rule over the commands that are on their way, each for the time in which it is in
+force; the rotors' lag is exact at the ends and the middle of a piece. A cable that would have to push
+leaves both to fall. Not in the model: the ground, drag of the load.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants, after_delay, lagged
+from autopilot.control.load_motion import Drag, air_force
+from autopilot.control.records import State, Vehicle
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, add, axpy, column, cross, dot, scale, sub, times
+from autopilot.geometry.s2 import normalise, tangent
+from autopilot.geometry.so3 import (
+    Quat,
+    quat_derivative,
+    quat_from_rotation,
+    quat_normalise,
+    rotation_from_quat,
+)
+
+
+class Ahead(NamedTuple):
+    """The state at the instant at which a command comes into force, and what the rotors give then."""
+
+    state: State
+    thrust: float  # N
+    moment: Vec3  # N m, body
+
+
+class _Motion(NamedTuple):
+    x: Vec3  # of the load while taut, else of the vehicle
+    v: Vec3
+    q: Vec3
+    q_dot: Vec3
+    quat: Quat
+    omega: Vec3
+
+
+@kernel
+def _shifted(m: _Motion, h: float, rate: _Motion) -> _Motion:
+    p, d = m.quat, rate.quat
+    quat = (p[0] + h * d[0], p[1] + h * d[1], p[2] + h * d[2], p[3] + h * d[3])
+    q = normalise(axpy(h, rate.q, m.q))
+    return _Motion(
+        axpy(h, rate.x, m.x),
+        axpy(h, rate.v, m.v),
+        q,
+        tangent(q, axpy(h, rate.q_dot, m.q_dot)),
+        quat_normalise(quat),
+        axpy(h, rate.omega, m.omega),
+    )
+
+
+@kernel
+def _rates(
+    m: _Motion, thrust: float, moment: Vec3, taut: float, push: Vec3, drag: Drag, vehicle: Vehicle
+) -> _Motion:
+    """Time derivative; the motion of `load_motion`, but the cable does not push."""
+    J, q = vehicle.inertia, m.q
+    v_quad = axpy(-vehicle.cable_length, m.q_dot, m.v) if taut > 0.0 else m.v
+    b3 = column(rotation_from_quat(m.quat), 2)
+    F = axpy(thrust, b3, add(air_force(v_quad, drag), push))
+    if taut > 0.0:
+        s = dot(m.q_dot, m.q_dot)
+        share = vehicle.quad_mass + vehicle.load_mass
+        pull = (dot(q, F) - vehicle.quad_mass * vehicle.cable_length * s) / share
+        # pull = -T / m_L
+        pull = min(pull, 0.0)
+        a = scale(pull, q)
+        across = scale(-1.0 / (vehicle.quad_mass * vehicle.cable_length), tangent(q, F))
+        q_ddot = axpy(-s, q, across)
+    else:
+        a = scale(1.0 / vehicle.quad_mass, F)
+        q_ddot = (0.0, 0.0, 0.0)
+    turning = sub(moment, cross(m.omega, times(J, m.omega)))
+    return _Motion(
+        m.v,
+        (a[0], a[1], a[2] - vehicle.gravity),
+        m.q_dot,
+        q_ddot,
+        quat_derivative(m.quat, m.omega),
+        (turning[0] / J[0], turning[1] / J[1], turning[2] / J[2]),
+    )
+
+
+@kernel
+def _glide(
+    m: _Motion,
+    actuation: Actuation,
+    row: int,
+    half: float,
+    h: float,
+    taut: float,
+    push: Vec3,
+    drag: Drag,
+    vehicle: Vehicle,
+) -> _Motion:
+    """h seconds under command `row`, of whose approach `half` is left after h/2."""
+    begin = _rates(m, actuation.thrust, actuation.moment, taut, push, drag, vehicle)
+    thrust, moment = lagged(actuation.thrust, actuation.moment, actuation.queue, row, half)
+    middle = _shifted(m, 0.5 * h, begin)
+    return _shifted(m, h, _rates(middle, thrust, moment, taut, push, drag, vehicle))
+
+
+@kernel
+def stay(state: State, actuation: Actuation, constants: ActuationConstants) -> Ahead:
+    """A vehicle that the ground holds stays as it is, whatever its rotors do."""
+    thrust, moment = after_delay(actuation, constants)
+    return Ahead(state, thrust, moment)
+
+
+@kernel
+def predict(
+    state: State,
+    taut: float,
+    actuation: Actuation,
+    constants: ActuationConstants,
+    period: float,
+    push: Vec3,
+    drag: Drag,
+    vehicle: Vehicle,
+) -> Ahead:
+    """The state after the delay of `constants`, under the commands on their way and a steady `push` (N).
+
+    taut = 0.0: of the vehicle alone; load and cable stay as they are.
+    """
+    if not (constants.late > 0.0 or constants.whole > 0):
+        return Ahead(state, actuation.thrust, actuation.moment)
+    x, v = state.x_quad, state.v_quad
+    if taut > 0.0:
+        x, v = state.x_load, state.v_load
+    m = _Motion(x, v, state.q_cable, state.q_cable_dot, quat_from_rotation(state.R), state.omega_body)
+    thrust, moment = actuation.thrust, actuation.moment
+    if constants.late > 0.0:
+        row = constants.whole
+        m = _glide(m, actuation, row, constants.kept_half_late, constants.late, taut, push, drag, vehicle)
+        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept_late)
+    for i in range(constants.whole):
+        row = constants.whole - 1 - i
+        at = Actuation(actuation.queue, thrust, moment)
+        m = _glide(m, at, row, constants.kept_half, period, taut, push, drag, vehicle)
+        thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept)
+    x_load, v_load, x_quad, v_quad = state.x_load, state.v_load, m.x, m.v
+    q, q_dot = state.q_cable, state.q_cable_dot
+    if taut > 0.0:
+        L = vehicle.cable_length
+        x_load, v_load, q, q_dot = m.x, m.v, m.q, m.q_dot
+        # what the estimate says the cable's ends are apart stays
+        x_quad = add(state.x_quad, sub(sub(m.x, state.x_load), scale(L, sub(m.q, state.q_cable))))
+        v_quad = add(state.v_quad, sub(sub(m.v, state.v_load), scale(L, sub(m.q_dot, state.q_cable_dot))))
+    ahead = State(
+        x_load,
+        v_load,
+        q,
+        q_dot,
+        x_quad,
+        v_quad,
+        rotation_from_quat(m.quat),
+        m.omega,
+        state.a_quad,
+    )
+    return Ahead(ahead, thrust, moment)

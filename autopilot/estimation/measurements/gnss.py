@@ -1,0 +1,257 @@
+"""Correction by a satellite navigation receiver: position, with an error that is partly slow, and velocity.
+
+The first fix starts the vehicle, which must then stand on the ground: levelled by the accelerometer, headed
+by the magnetometer, at the height of its gear, with the load where the crew laid it.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from autopilot.estimation.correction import (
+    Past,
+    heard,
+    inject,
+    look_back,
+    position_row,
+    vehicle_at,
+    velocity_row,
+    with_aids,
+    with_load,
+    with_vehicle,
+)
+from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.history import renew
+from autopilot.estimation.measurements.magnetic import correct_magnetic, magnetic_north
+from autopilot.estimation.measurements.pose import spread_out
+from autopilot.estimation.records import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    CAMERA,
+    FIX,
+    GNSS,
+    NOBODY,
+    POSITION,
+    QUAT,
+    RECEIVER,
+    SIZE,
+    TRACKER,
+    V_QUAD,
+    VELOCITY,
+    X_QUAD,
+    AidEstimate,
+    EstimatorState,
+    EstimatorTuning,
+    GnssReading,
+    History,
+    LoadEstimate,
+    VehicleEstimate,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, cross, from_columns, sub
+from autopilot.geometry.s2 import normalise, tangent
+from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
+
+FIXES_BEFORE_RESET = 8.0
+CLIMB_WORSE = 1.7  # deviation of the climb over that of the level speed
+STANDING_STD = 0.02  # m, of the height of a standing vehicle
+STARTING_SPEED_STD = 0.2  # m/s
+ANYWHERE_STD = 100.0  # m: the first fix says where
+MAGNETIC_FRESH_S = 0.2
+# A slow error that returns to zero makes the best estimate of the place half of the first and half of the
+# last fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was,
+# be carried by the velocities: so the drift is believed to return to zero ten times as slowly as it wanders.
+PLAIN_REVERSION = 0.1
+
+
+@kernel
+def level_heading(accel: Vec3, field: Vec3, north: Vec3) -> tuple[Vec3, Vec3, Vec3]:
+    """R whose third row is the measured vertical and which turns the measured field to `north`."""
+    up_b = normalise(accel)
+    north_b = normalise(tangent(up_b, field))
+    west_b = cross(up_b, north_b)
+    body = (north_b, west_b, up_b)  # rows: the axes magnetic north, west, up, seen from the body
+    world = from_columns(north, (-north[1], north[0], 0.0), (0.0, 0.0, 1.0))
+    return (
+        apply_transposed(body, world[0]),
+        apply_transposed(body, world[1]),
+        apply_transposed(body, world[2]),
+    )
+
+
+@kernel
+def with_slow(aids: AidEstimate, horizontal: float, vertical: float, reversion: float) -> AidEstimate:
+    """The aids with the deviations of the receiver's slow error."""
+    return AidEstimate(
+        aids.mounting,
+        aids.heading,
+        aids.barometer,
+        aids.gnss,
+        horizontal,
+        vertical,
+        reversion,
+        aids.debt,
+        aids.field,
+        aids.magnetic_age,
+        aids.barometer_age,
+        aids.rejected,
+    )
+
+
+@kernel
+def laid(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
+    """The load where it was laid: ahead of the standing vehicle, on its ground."""
+    load, vehicle = state.load, state.vehicle
+    ahead = rotation_from_quat(vehicle.quat_wxyz)
+    x = vehicle.x_quad
+    x_load = (
+        x[0] + tuning.laid_forward * ahead[0][0],
+        x[1] + tuning.laid_forward * ahead[1][0],
+        x[2] - tuning.gear_height + tuning.load_height,
+    )
+    return LoadEstimate(
+        x_load,
+        ZERO,
+        load.q_cable,
+        load.q_cable_dot,
+        load.across,
+        tuning.cable_length,
+        (tuning.laid_std * tuning.laid_std, 0.0, 0.0),
+        0.0,
+        0.0,
+        load.pull,
+        0.0,
+        0.0,
+        load.age_s,
+        0.0,
+        CAMERA,
+    )
+
+
+@kernel
+def start_by_fix(
+    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The standing vehicle, all but placed by the fix: that the ordinary correction does."""
+    old, accel, g = state.vehicle, state.last_imu.accel, tuning.gravity
+    R = level_heading(accel, state.aids.field, magnetic_north(tuning.declination))
+    quat = quat_from_rotation(R)
+    bias_var = tuning.accel_bias_std * tuning.accel_bias_std
+    tilt_var = (bias_var + tuning.accel_std * tuning.accel_std) / (g * g)
+    spread_out(
+        history, ANYWHERE_STD * ANYWHERE_STD, STARTING_SPEED_STD * STARTING_SPEED_STD, tilt_var, tuning
+    )
+    P = history.covariance
+    P[POSITION + 2, POSITION + 2] = STANDING_STD * STANDING_STD
+    P[ATTITUDE + 2, ATTITUDE + 2] = 1.0
+    # a bias of the accelerometer tilts what it levels
+    for j in range(3):
+        about_x, about_y = -R[1][j] * bias_var / g, R[0][j] * bias_var / g
+        P[ATTITUDE, ACCEL_BIAS + j], P[ACCEL_BIAS + j, ATTITUDE] = about_x, about_x
+        P[ATTITUDE + 1, ACCEL_BIAS + j], P[ACCEL_BIAS + j, ATTITUDE + 1] = about_y, about_y
+    for i in range(3):
+        slow = state.aids.horizontal_slow if i < 2 else state.aids.vertical_slow
+        P[GNSS + i, GNSS + i] = slow * slow
+    x_quad = (fix.position[0], fix.position[1], tuning.gear_height)
+    vehicle = VehicleEstimate(
+        x_quad,
+        ZERO,
+        quat,
+        old.omega_body,
+        old.gyro_bias,
+        old.accel_bias,
+        old.accel_quad,
+        fix.age_s,
+        0.0,
+        RECEIVER,
+    )
+    renew(history, X_QUAD, 3, (x_quad[0], x_quad[1], x_quad[2], 0.0))
+    renew(history, V_QUAD, 3, (0.0, 0.0, 0.0, 0.0))
+    renew(history, QUAT, 4, quat)
+    state = with_vehicle(state, vehicle, state.resets + 1.0)
+    state = correct_magnetic(state, history, state.aids.field, 0.0, tuning)
+    if state.load.source != TRACKER:
+        state = with_load(state, laid(state, tuning), state.resets)
+    return state
+
+
+@kernel
+def restart_by_fix(
+    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """Position and velocity as widely known as after a long silence, so that the fix decides them."""
+    P = history.covariance
+    for i in range(3):
+        P[POSITION + i, POSITION + i] += ANYWHERE_STD * ANYWHERE_STD
+        P[VELOCITY + i, VELOCITY + i] += 1.0
+    v = state.vehicle
+    return with_vehicle(state, vehicle_at(v, v.age_s, 0.0), state.resets + 1.0)
+
+
+@kernel
+def fix_row(history: History, past: Past, k: int, n: int) -> None:
+    """Row of component k of a fix: position and slow error, then velocity."""
+    if k < 3:
+        position_row(history, past, k, n)
+        history.row[GNSS + k] = 1.0
+    else:
+        velocity_row(history, past, k - 3, n)
+
+
+@kernel
+def correct_gnss(
+    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The state after the fix; `history` is corrected along with it.
+
+    Ignored where a tracker places the vehicle.
+    """
+    if state.vehicle.source == TRACKER:
+        return state
+    state = heard(state, fix.age_s, SIZE)
+    n = state.size
+    share = tuning.rtk_white if fix.rtk > 0.0 else tuning.gnss_white
+    slow = sqrt(1.0 - share * share)
+    aids = with_slow(
+        state.aids,
+        slow * fix.horizontal_std,
+        slow * fix.vertical_std,
+        1.0 if fix.rtk > 0.0 else PLAIN_REVERSION,
+    )
+    state = with_aids(state, aids)
+    starting = state.vehicle.source == NOBODY
+    if starting:
+        if not aids.magnetic_age <= MAGNETIC_FRESH_S:
+            return state
+        state = start_by_fix(state, history, fix, tuning)
+    past = look_back(state, history, tuning, fix.age_s)
+    innovation = sub(fix.position, add(past.x_quad, state.aids.gnss))
+    difference = sub(fix.velocity, past.v_quad)
+    level, climb = share * fix.horizontal_std, share * fix.vertical_std
+    speed = tuning.rtk_speed_std if fix.rtk > 0.0 else tuning.gnss_speed_std
+    worse = CLIMB_WORSE * speed
+    position_var = (level * level, level * level, climb * climb)
+    velocity_var = (speed * speed, speed * speed, worse * worse)
+    off = 0.0
+    for k in range(6):
+        fix_row(history, past, k, n)
+        own = position_var[k] if k < 3 else velocity_var[k - 3]
+        away = innovation[k] if k < 3 else difference[k - 3]
+        off += away * away / (spread(history, n) + own)
+    # written so that NaN is refused
+    if not off <= 6.0 * tuning.gate_sigma * tuning.gate_sigma:
+        vehicle = state.vehicle
+        if vehicle.rejected + 1.0 < FIXES_BEFORE_RESET:
+            refused = vehicle_at(vehicle, vehicle.age_s, vehicle.rejected + 1.0)
+            return with_vehicle(state, refused, state.resets)
+        return restart_by_fix(state, history, fix, tuning)
+    begin(history)
+    nis = 0.0
+    for k in range(6):
+        fix_row(history, past, k, n)
+        own = position_var[k] if k < 3 else velocity_var[k - 3]
+        nis += absorb(history, innovation[k] if k < 3 else difference[k - 3], own, n)
+    history.consistency[FIX, 0] += 1.0
+    history.consistency[FIX, 1] += nis
+    state = inject(state, history)
+    return with_vehicle(state, vehicle_at(state.vehicle, fix.age_s, 0.0), state.resets)

@@ -1,0 +1,78 @@
+"""Correction by a cable that comes taut: the load lies, so the vehicle is a cable's length over the ground.
+
+A plain receiver and a barometer know the height to decimetres; here it is measured once, and that the vehicle
+does not climb.
+"""
+
+from __future__ import annotations
+
+from autopilot.estimation.correction import inject, look_back, with_aids
+from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.measurements.load import load_position_row, load_velocity_row
+from autopilot.estimation.records import (
+    CAMERA,
+    RECEIVER,
+    AidEstimate,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+    LoadEstimate,
+)
+from autopilot.estimation.tautness import PULL_SLACK, loosely_tied
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3
+
+LYING_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
+RESTING_STD = 0.05  # m/s, of its climb
+
+
+@kernel
+def _owing(a: AidEstimate, debt: Vec3) -> AidEstimate:
+    return AidEstimate(
+        a.mounting,
+        a.heading,
+        a.barometer,
+        a.gnss,
+        a.horizontal_slow,
+        a.vertical_slow,
+        a.reversion,
+        debt,
+        a.field,
+        a.magnetic_age,
+        a.barometer_age,
+        a.rejected,
+    )
+
+
+@kernel
+def correct_tautened(
+    state: EstimatorState, history: History, before: LoadEstimate, tuning: EstimatorTuning
+) -> EstimatorState:
+    """The state after a prediction; `before` is the load as it was.
+
+    The cable that comes taut tells height and climb; climb is told on while it pulls and the load still lies.
+    The laws are told at once: they are about to lift the load off this ground.
+    """
+    load = state.load
+    if state.vehicle.source != RECEIVER or load.source != CAMERA or load.taut == 0.0:
+        return state
+    tied = before.taut == 0.0
+    pulls = load.pull > PULL_SLACK * tuning.load_mass * tuning.gravity
+    if not tied and not (pulls and loosely_tied(load, state.memory_s)):
+        return state
+    n, debt = state.size, state.aids.debt
+    past = look_back(state, history, tuning, 0.0)
+    begin(history)
+    if tied:
+        innovation, variance = before.x_load[2] - load.x_load[2], LYING_STD * LYING_STD
+        load_position_row(history, past, load.length, 2, n)
+        limit = tuning.gate_sigma * tuning.gate_sigma * (spread(history, n) + variance)
+        if not innovation * innovation <= limit:
+            return state
+        absorb(history, innovation, variance, n)
+    climb = past.v_quad[2] + load.length * past.q_cable_dot[2]
+    load_velocity_row(history, past, load.length, 2, n)
+    absorb(history, -climb, RESTING_STD * RESTING_STD, n)
+    state = inject(state, history)
+    owed = state.aids.debt
+    return with_aids(state, _owing(state.aids, (owed[0], owed[1], debt[2])))

@@ -1,0 +1,446 @@
+"""Legs: what load or vehicle is asked to do from one moment to the next, each a function of the time in it.
+
+A leg is data. The supervisor strings legs together; the flight core asks the present one for its setpoint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import comb, inf, pi, sqrt
+
+from autopilot.control.records import Jet
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, sub
+from autopilot.guidance.setpoint_follower import Follow, Posture
+from autopilot.trajectory.shaping import Shaped
+from autopilot.trajectory.swing import swing
+from autopilot.trajectory.transfer import PEAK_SPEED, transfer, transfer_duration
+from autopilot.trajectory.waypoint_path import Passage, evaluate_path
+from autopilot.wire.dialect import plumbline as mavlink
+
+QUAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
+LOAD_ATTITUDE = mavlink.PLUMBLINE_CONTROL_LOAD_ATTITUDE
+LOAD_POSITION = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
+QUAD_POSITION = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
+
+LEAST_SWINGS = 1.2  # a move of the load takes at least so many periods of its pendulum, however short it is
+CATCH_S = 0.15  # in which the slack of a cable is taken up in the air
+CALM_SHARE = 0.6  # of the least duration of a move: how long calming a swing takes
+SHORTEST_RAMP_S = 0.3  # in which the winch comes to its rate
+STEEPEST_LEAN = 0.7  # sine of the cable's lean that a swinging load is asked for at most
+
+# Taylor coefficients of transfer's s(u): of u^7 ... u^13
+_STEP = tuple((7 + k, float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k)) for k in range(7))
+
+
+def _rest(position: Vec3) -> Jet:
+    return (position, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
+
+
+def _moved(anchor: Vec3, jet: Jet) -> Jet:
+    x, v, a, j, s, c, p = jet
+    return (add(anchor, x), v, a, j, s, c, p)
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Stay at a point for `duration_s` (infinite: until told otherwise)."""
+
+    position: Vec3
+    duration_s: float = inf
+    control_mode: int = LOAD_POSITION
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        return _rest(self.position)
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """From rest to rest along a straight line."""
+
+    begin: Vec3
+    end: Vec3
+    duration_s: float
+    control_mode: int = LOAD_POSITION
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        return transfer(self.begin, self.end, self.duration_s, t)
+
+
+@dataclass(frozen=True, slots=True)
+class Brake:
+    """From motion to rest: the velocity that the motion would go on with fades away.
+
+    x' = (v_0 + a_0 t) (1 - s(t / duration)) with the s of `autopilot.trajectory.transfer`, so that
+    position, velocity and acceleration go on without a jump and every derivative is zero in the end.
+    """
+
+    begin: Vec3
+    velocity: Vec3
+    acceleration: Vec3
+    duration_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def end(self) -> Vec3:
+        """Where the motion ends."""
+        return self._position(1.0)
+
+    def _position(self, u: float) -> Vec3:
+        """x at t = u duration: x' integrated term by term."""
+        along, bent = u, 0.5 * u * u
+        for power, c in _STEP:
+            along -= c * u ** (power + 1) / (power + 1)
+            bent -= c * u ** (power + 2) / (power + 2)
+        T = self.duration_s
+        return axpy(bent * T * T, self.acceleration, axpy(along * T, self.velocity, self.begin))
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        if t >= self.duration_s:
+            return _rest(self.end)
+        t = max(t, 0.0)
+        # the fading factor 1 - s with its derivatives is a transfer from 1 to 0
+        w = [d[0] for d in transfer((1.0, 0.0, 0.0), ZERO, self.duration_s, t)]
+        v = axpy(t, self.acceleration, self.velocity)
+        # Leibniz; of v only the first derivative, a_0, is not zero
+        later = [scale(w[0], v)]
+        later += [axpy(n * w[n - 1], self.acceleration, scale(w[n], v)) for n in range(1, 6)]
+        x = self._position(t / self.duration_s)
+        return (x, later[0], later[1], later[2], later[3], later[4], later[5])
+
+
+@dataclass(frozen=True, slots=True)
+class Slow:
+    """A stop along the path of another leg: its time goes on ever more slowly and comes to rest.
+
+    x(t) = y(sigma(t)), sigma' = 1 - s(t / stop) with the s of `autopilot.trajectory.transfer`: every
+    derivative goes on without a jump and is zero in the end, the path is that of the leg, and no part of it
+    is flown faster.
+    `elapsed_s` of the stop are over when this leg begins.
+    """
+
+    leg: Leg
+    begin_s: float  # time in `leg` at which the stop begins
+    stop_s: float
+    elapsed_s: float = 0.0
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """What is left of the stop."""
+        return self.stop_s - self.elapsed_s
+
+    @property
+    def end(self) -> Vec3:
+        """Where the motion ends."""
+        return self.leg.jet(self._time(self.stop_s))[0]
+
+    def _time(self, t: float) -> float:
+        """sigma: 1 - s integrated term by term."""
+        u = t / self.stop_s
+        gone = u
+        for power, c in _STEP:
+            gone -= c * u ** (power + 1) / (power + 1)
+        return self.begin_s + gone * self.stop_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg; Faa di Bruno's formula."""
+        t = t + self.elapsed_s
+        if t >= self.stop_s:
+            return _rest(self.end)
+        t = max(t, 0.0)
+        a, b, c, d, e, f = (w[0] for w in transfer((1.0, 0.0, 0.0), ZERO, self.stop_s, t)[:6])
+        x, *y = self.leg.jet(self._time(t))
+        weights: tuple[tuple[float, ...], ...] = (
+            (a,),
+            (b, a * a),
+            (c, 3.0 * a * b, a**3),
+            (d, 3.0 * b * b + 4.0 * a * c, 6.0 * a * a * b, a**4),
+            (
+                e,
+                10.0 * b * c + 5.0 * a * d,
+                15.0 * a * b * b + 10.0 * a * a * c,
+                10.0 * a**3 * b,
+                a**5,
+            ),
+            (
+                f,
+                10.0 * c * c + 15.0 * b * d + 6.0 * a * e,
+                15.0 * b**3 + 60.0 * a * b * c + 15.0 * a * a * d,
+                45.0 * a * a * b * b + 20.0 * a**3 * c,
+                15.0 * a**4 * b,
+                a**6,
+            ),
+        )
+        later = []
+        for row in weights:
+            total = ZERO
+            for weight, derivative in zip(row, y, strict=False):
+                total = axpy(weight, derivative, total)
+            later.append(total)
+        return (x, later[0], later[1], later[2], later[3], later[4], later[5])
+
+
+@dataclass(frozen=True, slots=True)
+class Catch:
+    """The cable is slack in the air: the vehicle falls with its load and parts from it until it is taut.
+
+    The thrust can only part them faster, never brake that: they part at `closing_m_s`, or as fast as takes up
+    the slack in CATCH_S where that is faster, since meanwhile both fall. What is asked depends on the state
+    and not on time: `meeting`. `anchor` is where the vehicle was.
+    """
+
+    anchor: Vec3
+    length_m: float  # of the cable
+    closing_m_s: float
+    duration_s: float = inf
+    control_mode: int = QUAD_POSITION
+
+    def jet(self, t: float) -> Jet:
+        """The anchor at rest."""
+        return _rest(self.anchor)
+
+    def meeting(self, x_quad: Vec3, v_quad: Vec3, x_load: Vec3, v_load: Vec3, gravity: float) -> Jet:
+        """Motion asked of the vehicle. Only the climb is asked for: with hardly any thrust, turning would
+        need more of it than falling allows."""
+        cable = sub(x_load, x_quad)
+        distance = norm(cable)
+        q = scale(1.0 / max(distance, 1e-6), cable)
+        wanted = max(self.closing_m_s, (self.length_m - distance) / CATCH_S)
+        climb = v_quad[2] + (dot(q, sub(v_load, v_quad)) - wanted) * q[2]
+        return (x_quad, (v_quad[0], v_quad[1], climb), (0.0, 0.0, -gravity), ZERO, ZERO, ZERO, ZERO)
+
+
+@dataclass(frozen=True, slots=True)
+class Creep:
+    """Along a straight line at constant speed, without end: until something is touched or pulled taut."""
+
+    begin: Vec3
+    velocity: Vec3
+    control_mode: int
+    duration_s: float = inf
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        return (add(self.begin, scale(t, self.velocity)), self.velocity, ZERO, ZERO, ZERO, ZERO, ZERO)
+
+
+@dataclass(frozen=True, slots=True)
+class Reel:
+    """The winch lowers the load (raises it: `speed` negative) while the vehicle is held at height `top_m`.
+
+    The cable is as long as the load is below that. The rate rises to `speed` along the s of
+    `autopilot.trajectory.transfer` in `ramp_s`, stays for `cruise_s`, and falls as it rose.
+    """
+
+    begin: Vec3
+    top_m: float
+    speed: float
+    ramp_s: float
+    cruise_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From rest to rest."""
+        return 2.0 * self.ramp_s + self.cruise_s
+
+    @property
+    def end(self) -> Vec3:
+        """Where the load is left."""
+        x = self.begin
+        return (x[0], x[1], x[2] - self.speed * (self.ramp_s + self.cruise_s))
+
+    def _ramp(self, t: float) -> tuple[float, ...]:
+        """What the cable grows by in `t` seconds of the first ramp, for a rate of 1, and six derivatives."""
+        u = t / self.ramp_s
+        grown = sum(c * u ** (power + 1) / (power + 1) for power, c in _STEP)
+        return (self.ramp_s * grown, *(w[0] for w in transfer(ZERO, (1.0, 0.0, 0.0), self.ramp_s, t)[:6]))
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        left = self.duration_s - t
+        if left <= 0.0:
+            return _rest(self.end)
+        whole = self.ramp_s + self.cruise_s
+        if t <= self.ramp_s:
+            w = self._ramp(max(t, 0.0))
+        elif left >= self.ramp_s:
+            w = (t - 0.5 * self.ramp_s, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        else:
+            back = self._ramp(left)
+            w = (whole - back[0], *((-1.0) ** (n + 1) * back[n] for n in range(1, 7)))
+        x, down = self.begin, -self.speed
+        later = [(0.0, 0.0, down * w[n]) for n in range(1, 7)]
+        at = (x[0], x[1], x[2] + down * w[0])
+        return (at, later[0], later[1], later[2], later[3], later[4], later[5])
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """The signals of a mission as they are flown, from where the load hung when they began."""
+
+    anchor: Vec3
+    path: Shaped
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From getting ready for the signals to coming to rest after them."""
+        return self.path.lead_s + self.path.duration_s + self.path.tail_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        return _moved(self.anchor, self.path.jet(t - self.path.lead_s))
+
+    def asked(self, t: float) -> Jet:
+        """The same of the path that was asked for."""
+        return _moved(self.anchor, self.path.asked(t - self.path.lead_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """A stretch of a path through waypoints, past the last of which it goes on.
+
+    `offset` is by how much the load hung beside the beginning of the path; it fades away in `fade_s`.
+    """
+
+    path: Passage
+    offset: Vec3
+    fade_s: float
+    control_mode: int = LOAD_POSITION
+
+    @property
+    def duration_s(self) -> float:
+        """From one waypoint to the next."""
+        return self.path.end_s - self.path.begin_s
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        at = self.path.begin_s + t
+        x, v, a, j, s, c, p = evaluate_path(self.path.table, at)
+        y = transfer(self.offset, ZERO, self.fade_s, at)
+        return (
+            add(x, y[0]),
+            add(v, y[1]),
+            add(a, y[2]),
+            add(j, y[3]),
+            add(s, y[4]),
+            add(c, y[5]),
+            add(p, y[6]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """An attitude of vehicle or load swung out and back. Only the height of `anchor` is held meanwhile."""
+
+    anchor: Vec3
+    tilt_north_rad: float
+    tilt_east_rad: float
+    duration_s: float
+    control_mode: int
+
+    def jet(self, t: float) -> Jet:
+        """The anchor at rest: of its position the height alone is tracked."""
+        return _rest(self.anchor)
+
+    def upward(self, t: float) -> Vec3:
+        """Unit vector, ENU: the thrust axis asked for, or the direction from load to vehicle."""
+        return swing(self.tilt_north_rad, self.tilt_east_rad, self.duration_s, t)[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Calm:
+    """Take the swing out of the load: the cable's lean goes on as it was and fades away.
+
+    p = (p_0 + p_0' t) (1 - s(t / duration)), p the horizontal part of the unit vector from load to vehicle, s
+    that of `autopilot.trajectory.transfer`. As in a swing only the height of `anchor` is held meanwhile.
+    `ends_step`: the mission step that left the load swinging is over with it.
+    """
+
+    anchor: Vec3
+    lean: Vec3
+    lean_rate: Vec3
+    ends_step: bool
+    duration_s: float
+    control_mode: int = LOAD_ATTITUDE
+
+    def jet(self, t: float) -> Jet:
+        """The anchor at rest: of its position the height alone is tracked."""
+        return _rest(self.anchor)
+
+    def upward(self, t: float) -> Vec3:
+        """Unit vector, ENU: the direction from load to vehicle."""
+        rest = transfer((1.0, 0.0, 0.0), ZERO, self.duration_s, t)[0][0]
+        x, y, _ = scale(rest, axpy(t, self.lean_rate, self.lean))
+        shrink = min(1.0, STEEPEST_LEAN / max(sqrt(x * x + y * y), 1e-9))
+        x, y = shrink * x, shrink * y
+        return (x, y, sqrt(1.0 - x * x - y * y))
+
+
+Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Reel | Run | Pass | Swing | Calm | Follow | Posture
+
+
+def asked_jet(leg: Leg, t: float) -> Jet:
+    """What was asked for where the leg flies something near it; else what it flies."""
+    return leg.asked(t) if isinstance(leg, Run) else leg.jet(t)
+
+
+def least_move_s(cable_length: float, gravity: float) -> float:
+    """Least duration (s) of a move that carries the load.
+
+    A limit of the acceleration alone lets a short move be quick: 5 cm would take 0.7 s, and its higher
+    derivatives turn the vehicle over. Measured with the cascade of the thesis and true rotor limits at 0.7 m
+    of cable: lost below 0.9 s, tension down to a third at 1.3 s, no rotor at its limit from 2 s on.
+    """
+    return LEAST_SWINGS * 2.0 * pi * sqrt(cable_length / gravity)
+
+
+def brake_leg(begin: Vec3, velocity: Vec3, acceleration: Vec3, accel_limit: float, least_s: float) -> Brake:
+    """A stop that takes the velocity away with no more than about `accel_limit` (m/s^2)."""
+    duration = max(least_s, PEAK_SPEED * norm(velocity) / accel_limit)
+    return Brake(begin, velocity, acceleration, duration)
+
+
+def slow_leg(leg: Leg, t: float, accel_limit: float, least_s: float) -> Slow:
+    """A stop on the path of `leg`, `t` seconds into it, that slows down with no more than about `accel_limit`
+    (m/s^2). Of a stop that is under way: the rest of it."""
+    if isinstance(leg, Slow):
+        return replace(leg, elapsed_s=min(leg.elapsed_s + t, leg.stop_s))
+    return Slow(leg, t, max(least_s, PEAK_SPEED * norm(leg.jet(t)[1]) / accel_limit))
+
+
+def transfer_leg(begin: Vec3, end: Vec3, speed: float, accel: float, control_mode: int) -> Transfer:
+    """A transfer whose peak speed and acceleration stay within the limits given."""
+    distance = norm(sub(end, begin))
+    return Transfer(begin, end, transfer_duration(distance, speed, accel), control_mode)
+
+
+def reel_leg(begin: Vec3, length: float, wanted: float, speed: float, accel: float) -> Reel:
+    """The winch makes a cable of `length` m `wanted` m long within speed and acceleration given; the load
+    hangs at `begin`, the vehicle stays."""
+    longer = abs(wanted - length)
+    # a ramp takes PEAK_SPEED rate / accel and half of that way; short ways do not reach the rate
+    rate = min(speed, sqrt(longer * accel / PEAK_SPEED))
+    ramp = max(PEAK_SPEED * rate / accel, SHORTEST_RAMP_S)
+    rate = min(rate, longer / ramp)
+    sign = 1.0 if wanted > length else -1.0
+    return Reel(begin, begin[2] + length, sign * rate, ramp, longer / rate - ramp)
+
+
+def top_of(leg: Leg) -> float | None:
+    """Height at which the vehicle is held while the winch works; None where it rests."""
+    if isinstance(leg, Slow):
+        return top_of(leg.leg)
+    return leg.top_m if isinstance(leg, Reel) else None
+
+
+def carry_leg(begin: Vec3, end: Vec3, speed: float, accel: float, least_s: float) -> Transfer:
+    """A transfer of the load within the limits given, and no quicker than `least_s` unless there is no way
+    to go."""
+    distance = norm(sub(end, begin))
+    duration = max(least_s, transfer_duration(distance, speed, accel)) if distance > 0.0 else 0.0
+    return Transfer(begin, end, duration, LOAD_POSITION)

@@ -1,0 +1,315 @@
+"""Following what is asked from moment to moment: setpoints of a stream, a stick, a circle.
+
+Whatever is asked (a jump included) passes two stages. The governor moves a point r towards it within a speed
+and an acceleration; the smoother lets the load follow that point with derivatives up to the sixth that never
+jump:
+
+    (1 + D/w)^7 x = r,   D = d/dt.
+
+Its response to an impulse is nowhere negative, so the load is no faster and no more accelerated than the
+point, and does not overshoot where the point does not. It lags by 7/w; what moves by itself (a place with a
+velocity, a circle) is therefore aimed at where it will be by then. While r is accelerated constantly,
+
+    x(t) = r - 7 r'/w + 28 r''/w^2 + exp(-w t) sum_k c_k t^k / k!,
+
+with c_k = (D + w)^k of the difference at t = 0: nothing is integrated, and a leg begun anew at any time goes
+on from the jet of the one before.
+
+| symbol   | here     | unit  |
+|----------|----------|-------|
+| x        | jet      | m     |
+| r        | point    | m     |
+| w        | rate     | rad/s |
+| k_p, k_v | K_P, K_V | 1/s   |
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import atan, ceil, comb, cos, exp, inf, isnan, nan, sin, sqrt
+
+from autopilot.control.records import Jet
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
+from autopilot.wire.dialect import plumbline as mavlink
+
+ORDER = 7  # of the smoother: x and its derivatives 1 ... 6 are continuous
+K_P = 1.2  # 1/s, speed asked for each metre that the governor's point is away
+K_V = 4.0 * K_P  # 1/s, critically damped with K_P
+BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned: the rest is for what is not planned
+SMOOTH_SHARE = 3.5  # rate of the smoother over that of the pendulum
+FADED = 40.0  # periods 1/w of the smoother, after which it has arrived but for rounding
+FLOOR_M = 0.3  # height over home below which no setpoint takes the load
+
+_BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(ORDER))
+_OF_INPUT = tuple(float(comb(ORDER, k)) for k in range(ORDER))  # of (1 + D/w)^7, but for the last
+_FACTORIAL = (1.0, 1.0, 2.0, 6.0, 24.0, 120.0, 720.0)
+NEVER_US = 2**62
+NOWHERE: Vec3 = (nan, nan, nan)
+Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
+
+
+@dataclass(frozen=True, slots=True)
+class PositionSetpoint:
+    """What a stream asks of the load, ENU from home; NaN: nothing is asked on this axis.
+
+    A position with a velocity moves on with it from `since_us`.
+    """
+
+    position: Vec3 = NOWHERE
+    velocity: Vec3 = NOWHERE
+    accel: Vec3 = NOWHERE
+    since_us: int = 0
+
+    @property
+    def is_place(self) -> bool:
+        """Whether it asks for a place that does not move, and for nothing else."""
+        moves = any(v != 0.0 and not isnan(v) for v in (*self.velocity, *self.accel))
+        return not moves and not all(map(isnan, self.position))
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A level circle flown at `rate` (rad/s, positive counter-clockwise seen from above)."""
+
+    centre: Vec3
+    radius: float
+    rate: float
+    phase: float  # angle from east at which it begins
+    since_us: int
+    ramp_s: float  # in which the rate is reached
+    ends_us: int = NEVER_US  # when it has been flown
+
+    def seen(self, now_us: int, rate: float) -> tuple[Vec3, Vec3, Vec3]:
+        """Position, velocity and acceleration that a smoother of this rate turns into the circle."""
+        t = max(0.0, (now_us - self.since_us) * 1e-6)
+        begun = t < self.ramp_s
+        gone = 0.5 * t * t / self.ramp_s if begun else t - 0.5 * self.ramp_s
+        turning = self.rate * (t / self.ramp_s if begun else 1.0)
+        share = turning / rate
+        angle = self.phase + self.rate * gone + ORDER * atan(share)
+        radius = self.radius * (1.0 + share * share) ** (0.5 * ORDER)
+        x, y = radius * cos(angle), radius * sin(angle)
+        along = (-turning * y, turning * x, 0.0)
+        return add(self.centre, (x, y, 0.0)), along, (-turning * turning * x, -turning * turning * y, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSetpoint:
+    """An attitude asked of the vehicle: its thrust axis, ENU, and the thrust in newtons; None: what keeps the
+    height."""
+
+    upward: Vec3
+    thrust_n: float | None
+
+
+Asked = PositionSetpoint | Circle | AttitudeSetpoint
+
+
+@dataclass(frozen=True, slots=True)
+class FollowLimits:
+    """Limits of the governor and the rate of the smoother."""
+
+    speed: float  # m/s, towards a position
+    fastest: float  # m/s, of a velocity that is asked for
+    accel: float  # m/s^2
+    rate: float  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
+class Follow:
+    """The load on its way after the governor's point, which goes on at constant acceleration.
+
+    `onward` is the same motion begun anew later; until then each moment of it is known.
+    """
+
+    begin: Jet
+    point: Point
+    rate: float
+    duration_s: float = inf
+    control_mode: int = mavlink.PLUMBLINE_CONTROL_LOAD_POSITION
+    _weights: tuple[tuple[float, ...], ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        w = self.rate
+        steady = self._steady(0.0)
+        axes = []
+        for axis in range(3):
+            e = [self.begin[n][axis] - (steady[n][axis] if n < 3 else 0.0) for n in range(ORDER)]
+            row = [sum(_BINOMIAL[k][j] * w ** (k - j) * e[j] for j in range(k + 1)) for k in range(ORDER)]
+            axes.append(tuple(row))
+        object.__setattr__(self, "_weights", tuple(axes))
+
+    def _steady(self, t: float) -> Point:
+        """r - 7 r'/w + 28 r''/w^2 and its derivatives 1, 2."""
+        x, v, a = self.point
+        lag = ORDER / self.rate
+        bend = 0.5 * ORDER * (ORDER + 1) / (self.rate * self.rate) - lag * t + 0.5 * t * t
+        return axpy(bend, a, axpy(t - lag, v, x)), axpy(t - lag, a, v), a
+
+    def jet(self, t: float) -> Jet:
+        """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
+        t = max(t, 0.0)
+        fade = exp(-self.rate * t)
+        powers = [t**k / _FACTORIAL[k] for k in range(ORDER)]
+        steady = self._steady(t)
+        columns = []
+        for axis in range(3):
+            c = list(self._weights[axis])
+            column = []
+            for n in range(ORDER):
+                gone = fade * sum(a * b for a, b in zip(c, powers, strict=True))
+                column.append(gone + (steady[n][axis] if n < 3 else 0.0))
+                c = [(c[k + 1] if k + 1 < ORDER else 0.0) - self.rate * c[k] for k in range(ORDER)]
+            columns.append(column)
+        x, y, z = columns
+        rows = [(x[n], y[n], z[n]) for n in range(ORDER)]
+        return (rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+
+    def coasting(self, t: float, rate: float) -> Follow:
+        """The motion from `t` seconds into this leg on, its point going on at the velocity it has."""
+        x, v, a = self.point
+        return Follow(self.jet(t), (axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), ZERO), rate)
+
+    def stopped(self, t: float, accel: float) -> tuple[tuple[Follow, ...], Vec3]:
+        """From `t` seconds into this leg on to rest, and where that is.
+
+        The point slows down at `accel` (m/s^2), downwards as fast as keeps it over the floor. The legs last
+        whole microseconds, as the clock has it, and the last one until only rounding is left of the motion.
+        """
+        x, v, a = self.point
+        x, v = axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v)
+        level, drop = (v[0], v[1], 0.0), (0.0, 0.0, v[2])
+        least_s = norm(v) / accel
+        level_s = drop_s = _up_to_us(least_s)
+        height = max(x[2] - FLOOR_M, 0.0)
+        if v[2] < 0.0 and -0.5 * v[2] * least_s > height:
+            drop_s = _up_to_us(max(2.0 * height, -v[2] / accel * -v[2]) / -v[2])
+            lift = -v[2] / drop_s
+            level_s = _up_to_us(norm(level) / sqrt(max(accel * accel - lift * lift, 0.25 * accel * accel)))
+        legs: list[Follow] = []
+        jet, gone_s = self.jet(t), 0.0
+        for until_s in sorted({level_s, drop_s}):
+            push = ZERO
+            if gone_s < level_s:
+                push = axpy(-1.0 / level_s, level, push)
+            if gone_s < drop_s:
+                push = axpy(-1.0 / drop_s, drop, push)
+            lasts = _whole_us(until_s - gone_s)
+            if lasts <= 0.0:
+                continue
+            leg = Follow(jet, (x, v, push), self.rate, lasts)
+            x, v = axpy(0.5 * lasts * lasts, push, axpy(lasts, v, x)), axpy(lasts, push, v)
+            jet, gone_s = leg.jet(lasts), until_s
+            legs.append(leg)
+        return (*legs, Follow(jet, (x, ZERO, ZERO), self.rate, _whole_us(FADED / self.rate))), x
+
+    def onward(self, t: float, asked: PositionSetpoint | Circle, pace: FollowLimits, now_us: int) -> Follow:
+        """The motion from `t` seconds into this leg on, towards what is asked at `now_us`."""
+        x, v, a = self.point
+        point = governed(axpy(0.5 * t * t, a, axpy(t, v, x)), axpy(t, a, v), asked, pace, now_us)
+        return Follow(self.jet(t), point, pace.rate)
+
+
+def _whole_us(seconds: float) -> float:
+    return round(seconds * 1e6) * 1e-6
+
+
+def _up_to_us(seconds: float) -> float:
+    return ceil(seconds * 1e6) * 1e-6
+
+
+def begin_following(jet: Jet, rate: float) -> Follow:
+    """A motion that goes on from `jet` until something is asked.
+
+    The point is where (1 + D/w)^7 x says, as far as the jet tells. A point that disagreed with the jet by no
+    more than its acceleration would throw the load: the smoother answers with ten times as much.
+    """
+    point = []
+    for n in range(3):
+        asked = ZERO
+        for k in range(ORDER - n):
+            asked = axpy(_OF_INPUT[k] / rate**k, jet[n + k], asked)
+        point.append(asked)
+    return Follow(jet, (point[0], point[1], point[2]), rate)
+
+
+def towards(distance: Vec3, accel: float) -> Vec3:
+    """Velocity (m/s) at which a point is approached that must be reached at rest: K_P of the distance near
+    it, and what a deceleration of `accel` allows far from it."""
+    away = norm(distance)
+    bend = accel / (K_P * K_P)
+    if away <= bend:
+        return scale(K_P, distance)
+    return scale(sqrt(2.0 * accel * (away - 0.5 * bend)) / away, distance)
+
+
+def _at_most(v: Vec3, limit: float) -> Vec3:
+    size = norm(v)
+    return v if size <= limit else scale(limit / size, v)
+
+
+def _or_zero(v: Vec3) -> Vec3:
+    return (0.0 if isnan(v[0]) else v[0], 0.0 if isnan(v[1]) else v[1], 0.0 if isnan(v[2]) else v[2])
+
+
+def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLimits, now_us: int) -> Point:
+    """The governor's point: where it is, how fast, and how it is to be accelerated from now on."""
+    if isinstance(asked, Circle):
+        place, along, push = asked.seen(now_us, pace.rate)
+        distance = sub(place, x)
+    else:
+        along = _at_most(_or_zero(asked.velocity), pace.fastest)
+        push = _at_most(_or_zero(asked.accel), pace.accel)
+        age = (now_us - asked.since_us) * 1e-6 + ORDER / pace.rate
+        aim = axpy(age, along, asked.position)
+        # an axis on which no position is asked for is as near as can be
+        distance = _or_zero(sub(aim, x))
+        if aim[2] < FLOOR_M:
+            distance = (distance[0], distance[1], FLOOR_M - x[2])
+            along = (along[0], along[1], max(along[2], 0.0))
+    wanted = add(along, _at_most(towards(distance, BRAKE_SHARE * pace.accel), pace.speed))
+    # no faster down than stops at the floor
+    height = max(x[2] - FLOOR_M, 0.0)
+    slowest = -norm(towards((0.0, 0.0, height), BRAKE_SHARE * pace.accel))
+    near_floor = min(wanted[2], v[2]) < slowest
+    wanted = (wanted[0], wanted[1], max(wanted[2], slowest))
+    asked_for = axpy(K_V, sub(wanted, v), push)
+    if not near_floor:
+        return x, v, _at_most(asked_for, pace.accel)
+    # braking over the floor comes first, what is left is for the rest
+    lift = max(-pace.accel, min(asked_for[2], pace.accel))
+    level = _at_most((asked_for[0], asked_for[1], 0.0), sqrt(pace.accel * pace.accel - lift * lift))
+    return x, v, (level[0], level[1], lift)
+
+
+@dataclass(frozen=True, slots=True)
+class Posture:
+    """The vehicle leans as it is asked to; nobody looks after the position of the load."""
+
+    lean: AttitudeSetpoint
+    anchor: Vec3
+    duration_s: float = inf
+    control_mode: int = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
+
+    def jet(self, t: float) -> Jet:
+        """The anchor at rest: its height is kept where no thrust is asked for."""
+        return (self.anchor, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
+
+    def upward(self, t: float) -> Vec3:
+        """Unit vector, ENU: the thrust axis asked for."""
+        return self.lean.upward
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """What was heard last of one source, and when."""
+
+    asked: Asked | None = None
+    at_us: int = -1
+
+    def alive(self, now_us: int, within_us: int) -> bool:
+        """Whether something was heard in that time."""
+        return self.at_us >= 0 and now_us - self.at_us <= within_us
+
+
+SILENT = Stream()

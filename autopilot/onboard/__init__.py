@@ -1,0 +1,1 @@
+"""The whole autopilot without sockets."""

@@ -1,0 +1,424 @@
+"""The whole autopilot without its sockets: datagrams in, datagrams out.
+
+The simulator link drives it: each new tick of sensors runs the flight core once. What ground stations send
+waits until the shell hands it over, between two ticks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from autopilot.control.laws.interface import (
+    believed_actuation,
+    believed_drag,
+    believed_observer,
+    believed_vehicle,
+    build_law,
+)
+from autopilot.core.health import Condition, battery_constants, follow
+from autopilot.core.scheduler import RateError, divider
+from autopilot.core.sensor_inbox import Tick, read_tick
+from autopilot.core.tick import Setup, initial_state, step, view_of, with_cable
+from autopilot.core.warmup import rehearse
+from autopilot.core.winch import as_reeled, commanded_rate
+from autopilot.estimation.filter import control_state, estimator_tuning
+from autopilot.estimation.records import new_history
+from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
+from autopilot.onboard.packet_loss import Loss
+from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
+from autopilot.onboard.snapshot import Options, make_snapshot
+from autopilot.services.endpoint import VehicleEndpoint
+from autopilot.services.files import LOG_FOLDER, Card, FileError
+from autopilot.services.heartbeat import heartbeat_message
+from autopilot.services.identity import AUTOPILOT_COMPONENT, Identity
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.records import (
+    AreasChanged,
+    Event,
+    Link,
+    MissionChanged,
+    ParameterChanged,
+    SigningChanged,
+    TimesyncAnswered,
+    Verdict,
+    WorldSaved,
+)
+from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
+from autopilot.services.snapshot import Snapshot
+from autopilot.supervisor.flight import ON_GROUND, MissionPlan, Phase, carries, settings_from
+from autopilot.supervisor.requests import decide, with_plan
+from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.fence import read_fence, read_rally
+from autopilot.wire.mission_items import WireItem, located_steps, unflown
+from autopilot.wire.parameter_table import ParameterTable
+from autopilot.wire.signing import Signing
+from missions.model import Step, Waypoint
+
+GROUND_WINDOW_US = 20_000
+_REBOOT = mavlink.MAVLink_command_long_message(
+    1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+)
+MOST_NAMED = 8  # items in one text
+AT_ONCE_STEPS = 30  # of a mission that is prepared between two ticks on the ground; some 0.4 s
+LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
+
+
+class Work(NamedTuple):
+    """The paths of a mission, to be prepared; plain data, so that another process can do it."""
+
+    steps: tuple[Step, ...]
+    sequence: tuple[int, ...]
+    limits: Limits
+
+    def done(self) -> Prepared:
+        """What comes of it; takes from a millisecond to some seconds."""
+        return prepare(self.steps, self.sequence, self.limits)
+
+
+def build_setup(table: ParameterTable, control_every: int) -> Setup:
+    """What the flight core is given, from the parameters and the ticks between two runs of the law."""
+    law, vehicle = build_law(table), believed_vehicle(table)
+    return Setup(
+        vehicle=vehicle,
+        limited=table["VEH_ROTOR_LIM"],
+        law=law,
+        actuation=believed_actuation(table),
+        observer=believed_observer(table, vehicle),
+        drag=believed_drag(table),
+        tuning=estimator_tuning(table),
+        settings=settings_from(table, law.ramp_lag_s),
+        control_every=control_every,
+    )
+
+
+def plan_of(mission: StoredMission, home: Home, limits: Limits | None) -> MissionPlan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet."""
+    steps = located_steps(mission.items, home)
+    flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
+    prepared = PENDING if limits is None else prepare(flown, sequence, limits)
+    return MissionPlan(flown, sequence, len(mission.items), prepared)
+
+
+class Onboard:
+    """One autopilot. `receive_sensors` moves its clock; nothing else does."""
+
+    def __init__(
+        self,
+        parameters: ParameterTable,
+        identity: Identity,
+        options: Options,
+        mission: StoredMission | None,
+        card: Card | None = None,
+        signing: Signing | None = None,
+    ) -> None:
+        self.parameters = parameters
+        self.endpoint = VehicleEndpoint(
+            identity, options.home, parameters, mission, card, signing, options.boot_unix_us
+        )
+        self.now_us = 0
+        self.tick = -1
+        self.fault = ""  # why the vehicle cannot be flown at all
+        self._options = options
+        self._state = initial_state()
+        self._history = new_history()
+        self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
+        self._answer = b""
+        self._last: Tick | None = None
+        self._gps: HilGps | None = None
+        self._condition = Condition()
+        self._battery = battery_constants(parameters)
+        self._shortest_us = 0  # between two ticks so far
+        self._version = parameters.version
+        self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
+        self._received_loss, self._sent_loss = Loss(0), Loss(1)
+        self._next_question_us = 0
+        self._world = WorldParameters(parameters)
+        self._reboot = False  # the simulator is asked to begin anew
+        self._setup = build_setup(parameters, 1)
+        self.work: Work | None = None  # what waits for `finish`
+        self._prepared_for = self._setup.settings.limits
+        self._take_plan(self.endpoint.mission)
+        self._log: FlightLog | None = None
+        if options.log:
+            release = ".".join(map(str, identity.version))
+            self._log = FlightLog(parameters, release, options.boot_unix_us)
+            self.endpoint.on_text = self._log_text
+
+    # ---- simulator link
+
+    def receive_sensors(self, datagram: bytes) -> bytes | None:
+        """The answer to a datagram of sensors: a new one to a new tick, the same again to a repeated one.
+
+        None for anything else: garbage, or a tick that is over.
+        """
+        tick = read_tick(datagram, self._options.home, self._setup.tuning.imu_age)
+        if tick is None:
+            return None
+        if tick.now_us < self.now_us or (self.tick >= 0 and tick.now_us > self.now_us + LEAP_US):
+            self.out_of_time += 1
+            return None
+        self.out_of_time = 0
+        if tick.now_us == self.now_us and self.tick >= 0:
+            return self._answer
+        self._run(tick)
+        command = hil_actuator_controls_message(
+            tick.now_us,
+            self._state.mixed.forces,
+            self.armed,
+            self._options.lockstep,
+            self._state.flight.released,
+            commanded_rate(self._state.flight, tick.now_us, self._shortest_us * 1e-6),
+        )
+        aside = self._world.messages(self.now_us)
+        if self._reboot:
+            aside.append(_REBOOT)
+        self._answer = b"".join(map(self._writer.frame, (command, *aside)))
+        return self._answer
+
+    @property
+    def phase(self) -> Phase:
+        """The phase of flight."""
+        return self._state.flight.phase
+
+    @property
+    def armed(self) -> bool:
+        """Whether rotors may turn."""
+        return self.phase not in (Phase.DISARMED, Phase.FAILSAFE)
+
+    def _run(self, tick: Tick) -> None:
+        period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
+        self.tick += 1
+        self.now_us = tick.now_us
+        self._last = tick
+        if tick.gps is not None:
+            self._gps = tick.gps
+        for message in tick.aside:
+            self._hear_simulator(message)
+        if period_us > 0 and not 0 < self._shortest_us <= period_us:
+            # ticks may be lost in real time: the shortest step is that of the sensors' rate
+            self._shortest_us = period_us
+            self._follow_parameters()
+        elif self.parameters.version != self._version:
+            self._follow_parameters()
+        if self.fault:
+            return
+        dt = period_us * 1e-6
+        self._state, report = step(
+            self._state, self._history, tick.readings, self._setup, tick.now_us, self.tick, dt
+        )
+        self._condition = follow(
+            self._condition, tick, self._state.mixed.forces, self._battery, tick.now_us, dt
+        )
+        for severity, text in report.texts:
+            self.endpoint.say(severity, text)
+        for seq in report.reached:
+            last = self._state.flight.mission_done and seq == report.reached[-1]
+            self.endpoint.item_reached(seq, last)
+        if self._log is not None:
+            rate_hz = self.parameters["LOG_RATE_HZ"]
+            self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self._log_sample)
+            self.endpoint.files.protected = self._log.path
+
+    def _hear_simulator(self, message: Any) -> None:
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+            self.endpoint.say(message.severity, message.text)
+            return
+        name = self._world.receive(message)
+        if name is not None:
+            self.endpoint.parameter_changed(name)
+
+    # ---- flight log
+
+    def take_log(self, least_bytes: int = 1) -> LogChunk | None:
+        """What is to be stored of the flight log, once it is so much or the log has ended."""
+        return None if self._log is None else self._log.take(least_bytes)
+
+    def end_log(self) -> None:
+        """The program ends: the last of the log can be taken."""
+        if self._log is not None:
+            self._log.end()
+
+    def give_up_log(self, why: str) -> None:
+        """The shell could not store the log."""
+        if self._log is not None:
+            self._log.give_up()
+        self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Flight log lost: {why}")
+
+    def _log_names(self) -> set[str]:
+        try:
+            return {entry.name for entry in self.endpoint.files.card.entries(LOG_FOLDER)}
+        except FileError:
+            return set()
+
+    def _log_sample(self) -> Sample:
+        imu = self._last.readings.imu if self._last else None
+        return Sample(self._snapshot(), imu, self._state.estimator)
+
+    def _log_text(self, severity: int, text: str) -> None:
+        if self._log is not None:
+            self._log.say(self.now_us, severity, text)
+
+    # ---- parameters
+
+    def _follow_parameters(self) -> None:
+        self._version = self.parameters.version
+        try:
+            rate_hz = self.parameters["CTL_RATE_HZ"]
+            every = divider(1e6 / self._shortest_us, rate_hz, "CTL_RATE_HZ") if self._shortest_us else 1
+        except RateError as error:
+            self.fault = str(error)
+            self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
+            return
+        self.fault = ""
+        self._setup = build_setup(self.parameters, every)
+        self._battery = battery_constants(self.parameters)
+        # a mission under way keeps the paths that it began with
+        if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
+            self._prepare()
+
+    # ---- ground
+
+    def add_link(self, link: Link) -> None:
+        """A link that always gets telemetry."""
+        self.endpoint.add_link(link, self.now_us)
+
+    def receive_ground(self, datagram: bytes, link: Link) -> list[Event]:
+        """Handle a datagram from a ground station; what must be stored comes back as events."""
+        if self._received_loss.drops(datagram, self.parameters["SIM_LOSS_PCT"]):
+            return []
+        events = self.endpoint.receive(datagram, link, self.now_us, self._decide)
+        for event in events:
+            match event:
+                case MissionChanged(mission):
+                    self._take_plan(mission)
+                case AreasChanged(kind, items):
+                    self.take_areas(kind, items)
+                case ParameterChanged(name, value):
+                    self._world.changed(name, value)
+                case TimesyncAnswered() | SigningChanged() | WorldSaved():
+                    pass  # the shell waits for the one and stores the other
+        return [event for event in events if not self._world.owns(event)]
+
+    def ground_datagrams(self) -> list[tuple[Link, bytes]]:
+        """What is due on the ground links at this tick."""
+        percent = self.parameters["SIM_LOSS_PCT"]
+        sent = self.endpoint.poll(self._snapshot, self.now_us)
+        if percent > 0.0:
+            sent = [
+                (link, datagram) for link, datagram in sent if not self._sent_loss.drops(datagram, percent)
+            ]
+        return sent
+
+    def question(self, link: Link) -> bytes | None:
+        """TIMESYNC for a ground station that shares our clock, at the first tick of each window; else None.
+
+        The shell sends it after `ground_datagrams` and lets the clock stand until it is answered.
+        """
+        if self.now_us < self._next_question_us:
+            return None
+        self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
+        return self.endpoint.datagram(link, mavlink.MAVLink_timesync_message(0, self.now_us * 1000))
+
+    def restore_world(self, values: Mapping[str, float]) -> None:
+        """What the simulator's parameters were saved as; it is told when it is there."""
+        self._world.restore(values)
+
+    def stranded_heartbeat(self, link: Link) -> bytes:
+        """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
+        snapshot = self._snapshot()._replace(system_status=mavlink.MAV_STATE_CRITICAL)
+        if snapshot.armed:
+            snapshot = snapshot._replace(system_status=mavlink.MAV_STATE_EMERGENCY)
+        return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
+
+    def rehearse(self) -> None:
+        """Call every kernel once, so that none is compiled in flight."""
+        rehearse(self._setup)
+        waypoints = (Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0))
+        Work(waypoints, (0, 1), self._setup.settings.limits).done()
+
+    def _decide(self, request: object) -> Verdict:
+        if isinstance(request, ChangeSigningKey):
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "disarm first")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, ResetParameters):
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "Reset of parameters denied: armed")
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if isinstance(request, Reboot) and not request.shutdown:
+            if self.armed:
+                return Verdict(mavlink.MAV_RESULT_DENIED, "Reboot denied: armed")
+            # the world begins anew, and when its clock does, so does the shell with us
+            self._reboot = True
+            return Verdict(mavlink.MAV_RESULT_ACCEPTED)
+        if self.fault:
+            return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
+        state = self._state
+        estimator, flight = state.estimator, state.flight
+        settings = with_cable(self._setup, flight).settings
+        seen = as_reeled(control_state(estimator), estimator, flight.reel_rate)
+        view = view_of(estimator, seen, settings, self.now_us, carrying=carries(flight))
+        flight, verdict = decide(flight, request, view, settings)
+        self._state = state._replace(flight=flight)
+        return verdict
+
+    def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
+        """Another fence, other rally points."""
+        self.endpoint.set_areas(kind, items)
+        flight = self._state.flight
+        if kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            flight = replace(flight, fence=read_fence(items, self._options.home), breach="")
+        else:
+            flight = replace(flight, rally=read_rally(items, self._options.home))
+        self._state = self._state._replace(flight=flight)
+
+    def _take_plan(self, mission: StoredMission) -> None:
+        plan = plan_of(mission, self._options.home, None)
+        self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
+        self._prepare()
+        kept = unflown(mission.items)
+        if kept:
+            numbers = ", ".join(map(str, kept[:MOST_NAMED])) + (" ..." if len(kept) > MOST_NAMED else "")
+            self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
+
+    def _prepare(self) -> None:
+        """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
+        plan, limits = self._state.flight.plan, self._setup.settings.limits
+        self._prepared_for = limits
+        self.work = Work(plan.steps, plan.sequence, limits)
+        self._have_prepared(PENDING)
+        short = self._state.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
+        if self._options.clock_waits or short:
+            self.finish(self.work, self.work.done())
+
+    def finish(self, work: Work, prepared: Prepared) -> None:
+        """Take what came of `work`, unless there is other work by now."""
+        if work is not self.work:
+            return
+        self.work = None
+        for note in prepared.notes:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
+        self._have_prepared(prepared)
+
+    def _have_prepared(self, prepared: Prepared) -> None:
+        flight = self._state.flight
+        flight = replace(flight, plan=replace(flight.plan, prepared=prepared))
+        self._state = self._state._replace(flight=flight)
+
+    def _snapshot(self) -> Snapshot:
+        return make_snapshot(
+            self._state,
+            with_cable(self._setup, self._state.flight),
+            self._options,
+            self.endpoint.mission,
+            self._condition,
+            self._battery,
+            self._gps,
+            self.parameters["MAV_FAKE_GPS"] == 1.0,
+            self.now_us,
+        )

@@ -1,0 +1,87 @@
+"""The simulator's SIM_* parameters, shown to ground stations as if they were ours.
+
+They are learned over the simulator link, once it is up; a ground station's PARAM_SET is handed on, and what
+the simulator then says is what holds. They describe a world, not the autopilot, and are stored only where
+PREFLIGHT_STORAGE asks for it; then they are set again in every simulator that is met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from autopilot.services.records import Event, ParameterChanged
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_from_float32
+
+SIMULATOR_COMPONENT = 26
+RETRY_US = 500_000
+LIST_ASKS = 6  # a simulator that never answers has no parameters
+_ANYTHING = 1e9
+
+
+class WorldParameters:
+    """The mirror of the simulator's table in ours."""
+
+    def __init__(self, table: ParameterTable) -> None:
+        self._table = table
+        self._heard: set[str] = set()
+        self._expected: int | None = None  # how many there are
+        self._asks = 0
+        self._ask_us = 0
+        self._restored: Mapping[str, float] = {}
+        self._wanted: dict[str, tuple[float, int]] = {}  # value, and when it is sent (again)
+
+    def owns(self, event: Event) -> bool:
+        """Whether an event concerns a parameter of the simulator, which it stores itself or not at all."""
+        return isinstance(event, ParameterChanged) and event.name in self._table.learned
+
+    def changed(self, name: str, value: float) -> None:
+        """A ground station set a parameter."""
+        if name in self._table.learned:
+            self._wanted[name] = (value, 0)
+
+    def restore(self, values: Mapping[str, float]) -> None:
+        """Set these in the simulator as soon as it has told that it has them."""
+        self._restored = values
+
+    def receive(self, message: Any) -> str | None:
+        """Take a message of the simulator in; the name of a value that differs from what we have told."""
+        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
+            return None
+        name: str = message.param_id
+        value = decimal_from_float32(message.param_value)
+        self._expected = message.param_count
+        self._heard.add(name)
+        self._wanted.pop(name, None)
+        if name in self._table.learned:
+            if self._table[name] == value:
+                return None
+            self._table.set(name, value)
+            return name
+        if name in self._table or not name.startswith("SIM_") or not abs(value) <= _ANYTHING:
+            return None
+        text = "Of the simulator, which knows its range"
+        self._table.learn(Parameter(name, value, -_ANYTHING, _ANYTHING, "", text))
+        saved = self._restored.get(name, value)
+        if saved != value:
+            self._wanted[name] = (saved, 0)
+        return None
+
+    def messages(self, now_us: int) -> list[Any]:
+        """What goes to the simulator beside the answer to this tick."""
+        messages: list[Any] = []
+        complete = self._expected is not None and len(self._heard) >= self._expected
+        if not complete and self._asks < LIST_ASKS and now_us >= self._ask_us:
+            self._asks += 1
+            self._ask_us = now_us + RETRY_US
+            messages.append(mavlink.MAVLink_param_request_list_message(1, SIMULATOR_COMPONENT))
+        for name, (value, send_us) in self._wanted.items():
+            if now_us >= send_us:
+                self._wanted[name] = (value, now_us + RETRY_US)
+                messages.append(
+                    mavlink.MAVLink_param_set_message(
+                        1, SIMULATOR_COMPONENT, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32
+                    )
+                )
+        return messages

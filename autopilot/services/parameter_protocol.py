@@ -1,0 +1,151 @@
+"""The parameter protocol: list, read and set of a `ParameterTable`, every value a float32, or whole numbers
+an INT32 where the identity says so.
+
+Lists go out at a steady pace for each link; whoever misses an index asks for it again. A set is answered with
+the value that is really stored, to every link if it is a new one, so that no ground station shows an old one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.services.identity import ALL_REAL, ParameterEncoding
+from autopilot.services.records import (
+    Decide,
+    Link,
+    Output,
+    ParameterChanged,
+    Peer,
+    Say,
+    Send,
+    WorldSaved,
+)
+from autopilot.services.streams import NEVER_US
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameter_table import ParameterError, ParameterTable, from_the_wire, on_the_wire
+
+_BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
+LIST_PACE_US = 2000  # between two values of a list: 500 a second
+LIST_BURST = 8  # of them at once, where ticks are longer than that
+
+# MAV_PARAM_ERROR; the last is newer than the dialect's copy of the enum
+DOES_NOT_EXIST = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
+OUT_OF_RANGE = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+READ_ONLY = mavlink.MAV_PARAM_ERROR_READ_ONLY
+TYPE_MISMATCH = 7
+_TYPE_NAMES = {mavlink.MAV_PARAM_TYPE_REAL32: "REAL32", mavlink.MAV_PARAM_TYPE_INT32: "INT32"}
+
+
+class ParameterService:
+    """Serves one table to any number of links."""
+
+    def __init__(self, table: ParameterTable, encoding: ParameterEncoding = ALL_REAL) -> None:
+        self.table = table
+        self._encoding = encoding
+        self._lists: dict[Link, tuple[int, int]] = {}  # next index, and when
+
+    def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """Begin the list for this link, from the start if one is under way."""
+        self._lists[peer.link] = (0, now_us)
+        return []
+
+    def receive_request_read(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """One value, by index or by name."""
+        index, names = message.param_index, self.table.names
+        if index == _BY_NAME:
+            if message.param_id in self.table:
+                return [Send(peer.link, self.value_message(message.param_id))]
+        elif 0 <= index < len(names):
+            return [Send(peer.link, self.value_message(names[index]))]
+        return [self._error(message.param_id, index, DOES_NOT_EXIST, peer)]
+
+    def receive_set(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """Store a value, or say why not; either way the answer is the value in force."""
+        name = message.param_id
+        if name not in self.table:
+            return [self._error(name, _BY_NAME, DOES_NOT_EXIST, peer)]
+        kind = self._carried(name)[1]
+        if message.param_type not in (kind, mavlink.MAV_PARAM_TYPE_REAL32):
+            why = f"{name}: type {message.param_type} was sent; it is {_TYPE_NAMES[kind]} ({kind})"
+            return self._refused(name, TYPE_MISMATCH, why, peer)
+        before = self.table[name]
+        value = from_the_wire(message.param_value, message.param_type)
+        try:
+            self.table.describe(name).checked(value)
+        except ParameterError as error:
+            return self._refused(name, OUT_OF_RANGE, str(error), peer)
+        try:
+            after = self.table.set(name, value)
+        except ParameterError as error:  # in range, but fixed while running
+            return self._refused(name, READ_ONLY, str(error), peer)
+        if after == before:
+            return [Send(peer.link, self.value_message(name))]
+        return [Send(None, self.value_message(name)), ParameterChanged(name, after)]
+
+    def reset(self) -> list[Output]:
+        """Every parameter back to its default, but for those that are fixed while running."""
+        outputs: list[Output] = []
+        kept = 0
+        for name, value in self.table.changed().items():
+            default = self.table.describe(name).default
+            try:
+                self.table.set(name, default)
+            except ParameterError:
+                kept += 1
+                continue
+            if self.table[name] != value:
+                outputs += [Send(None, self.value_message(name)), ParameterChanged(name, default)]
+        text = f"{len(outputs) // 2} parameters are at their default again"
+        if kept:
+            text += f"; {kept} are fixed while running"
+        return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
+
+    def world(self) -> WorldSaved:
+        """What the simulator's parameters are now."""
+        return WorldSaved({name: self.table[name] for name in sorted(self.table.learned)})
+
+    def value_message(self, name: str) -> Any:
+        """PARAM_VALUE of the value in force."""
+        table = self.table
+        return mavlink.MAVLink_param_value_message(
+            name.encode(), *self._carried(name), len(table.names), table.index(name)
+        )
+
+    def _carried(self, name: str) -> tuple[float, int]:
+        whole = self._encoding.integers and self.table.describe(name).integer
+        return on_the_wire(self.table[name], whole, self._encoding.bytewise)
+
+    def next_timer(self) -> int:
+        """When `poll` has something to send, in us."""
+        return min((at_us for _, at_us in self._lists.values()), default=NEVER_US)
+
+    def poll(self, now_us: int) -> list[Output]:
+        """The values of the lists under way whose time has come."""
+        outputs: list[Output] = []
+        names = self.table.names
+        for link, (index, at_us) in list(self._lists.items()):
+            if at_us > now_us:
+                continue
+            count = min((now_us - at_us) // LIST_PACE_US + 1, LIST_BURST)
+            outputs += [Send(link, self.value_message(name)) for name in names[index : index + count]]
+            self._lists[link] = (index + count, at_us + count * LIST_PACE_US)
+            if index + count >= len(names):
+                del self._lists[link]
+        return outputs
+
+    def forget(self, link: Link) -> None:
+        """The link is gone: no list for it."""
+        self._lists.pop(link, None)
+
+    def _error(self, name: str, index: int, error: int, peer: Peer) -> Output:
+        message = mavlink.MAVLink_param_error_message(
+            peer.system, peer.component, name.encode("ascii", errors="replace"), index, error
+        )
+        return Send(peer.link, message)
+
+    def _refused(self, name: str, error: int, why: str, peer: Peer) -> list[Output]:
+        return [
+            Say(mavlink.MAV_SEVERITY_WARNING, why),
+            self._error(name, self.table.index(name), error, peer),
+            Send(peer.link, self.value_message(name)),
+        ]

@@ -1,0 +1,184 @@
+"""The contents of the files that are made when they are read: packed parameters, the mission, metadata.
+
+`param.pck` and `mission.dat` are ArduPilot's formats, which MAVProxy and pymavlink read; the metadata are
+the JSON files of MAVLink's component information protocol, from which QGroundControl takes texts, units and
+ranges.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from autopilot.services.file_tree import Maker, checksum
+from autopilot.services.files import Path
+from autopilot.services.identity import Identity
+from autopilot.services.mission_store import StoredMission
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
+from autopilot.wire.parameter_table import ParameterTable
+
+PARAMETERS: Path = ("@PARAM", "param.pck")
+MISSION: Path = ("@MISSION", "mission.dat")
+GENERAL: Path = ("etc", "extras", "component_general.json")
+PARAMETER_TEXTS: Path = ("etc", "extras", "parameters.json")
+
+_MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
+_INT32_TYPE, _FLOAT_TYPE, _HAS_DEFAULT = 3, 4, 0x10
+_LONGEST_COMMON = 15  # letters of a name that the one before it may lend, a field of four bits
+_HEAD = struct.Struct("<HHH")
+_MISSION_MAGIC = 0x763D
+_MISSION_HEAD = struct.Struct("<5H")
+_ITEM = struct.Struct("<ffffiifHHBBBBBB")  # MISSION_ITEM_INT as it travels
+_FLOAT32_MAX = 3.4028234663852886e38
+_PARAMETER_METADATA = 1  # COMP_METADATA_TYPE
+
+
+def parameter_pack(table: ParameterTable, query: Mapping[str, str], integers: bool = False) -> bytes:
+    """All parameters; `withdefaults=1` adds the defaults, `start` and `count` choose a part.
+
+    A record is type and flags, length of the name and how much of it is that of the name before, the rest of
+    the name, the value, and its default where that differs.
+    """
+    defaults = query.get("withdefaults") == "1"
+    start, count = _whole(query.get("start"), 0), _whole(query.get("count"), len(table))
+    names = table.names[start : start + count]
+    packed = [_HEAD.pack(_MAGIC_WITH_DEFAULTS if defaults else _MAGIC, len(names), len(table))]
+    before = b""
+    for text in names:
+        name = text.encode()
+        common = min(_shared(before, name), _LONGEST_COMMON, len(name) - 1)
+        value, default = table[text], table.describe(text).default
+        flags = _HAS_DEFAULT if defaults and default != value else 0
+        rest = name[common:]
+        numbers = (value, default) if flags else (value,)
+        kind, letter = (_INT32_TYPE, "i") if integers and table.describe(text).integer else (_FLOAT_TYPE, "f")
+        packed.append(bytes((kind | flags, common | (len(rest) - 1) << 4)) + rest)
+        carried = map(round if letter == "i" else _within_float32, numbers)
+        packed.append(struct.pack(f"<{len(numbers)}{letter}", *carried))
+        before = name
+    return b"".join(packed)
+
+
+def mission_pack(items: tuple[WireItem, ...]) -> bytes:
+    """The items as MISSION_ITEM_INT, one behind the other."""
+    head = _MISSION_HEAD.pack(_MISSION_MAGIC, mavlink.MAV_MISSION_TYPE_MISSION, 0, 0, len(items))
+    return head + b"".join(
+        _ITEM.pack(
+            item.param1,
+            item.param2,
+            item.param3,
+            item.param4,
+            item.x,
+            item.y,
+            item.z,
+            seq,
+            item.command,
+            0,
+            0,
+            item.frame,
+            item.current,
+            item.autocontinue,
+            mavlink.MAV_MISSION_TYPE_MISSION,
+        )
+        for seq, item in enumerate(items)
+    )
+
+
+def parameter_texts(table: ParameterTable, integers: bool = False) -> bytes:
+    """Metadata of the parameters; those of another process without a range, which only it knows."""
+    listed = []
+    for name in table.names:
+        known = table.describe(name)
+        record: dict[str, Any] = {
+            "name": name,
+            "type": "Int32" if integers and known.integer else "Float",
+            "shortDesc": known.text,
+            "units": known.unit,
+            "group": name.partition("_")[0],
+            "decimalPlaces": 0 if known.integer else 6,
+            "rebootRequired": known.fixed,
+        }
+        if name not in table.learned:
+            record |= {"default": known.default, "min": known.low, "max": known.high}
+        listed.append({key: value for key, value in record.items() if _tellable(value)})
+    return _json({"version": 3, "parameters": listed})
+
+
+def general(identity: Identity, table: ParameterTable) -> bytes:
+    """Which metadata there are, and where."""
+    texts = parameter_texts(table, identity.integers)
+    return _json(
+        {
+            "version": 1,
+            "vendorName": "Plumbline",
+            "modelName": "quadrotor with a load on a cable",
+            "firmwareVersion": ".".join(map(str, identity.version)),
+            "metadataTypes": [
+                {"type": _PARAMETER_METADATA, "uri": _uri(PARAMETER_TEXTS), "fileCrc": checksum(texts)}
+            ],
+        }
+    )
+
+
+def made_files(
+    identity: Identity, table: ParameterTable, mission: Callable[[], StoredMission]
+) -> dict[Path, Maker]:
+    """All of them by path; `mission` tells the mission in force."""
+    return {
+        PARAMETERS: lambda query: parameter_pack(table, query, identity.integers),
+        MISSION: lambda query: mission_pack(mission().items),
+        GENERAL: lambda query: general(identity, table),
+        PARAMETER_TEXTS: lambda query: parameter_texts(table, identity.integers),
+    }
+
+
+def metadata_message(identity: Identity, table: ParameterTable, now_us: int) -> Any:
+    """COMPONENT_METADATA: where the general file is."""
+    crc = checksum(general(identity, table))
+    return mavlink.MAVLink_component_metadata_message(_boot_ms(now_us), crc, _uri(GENERAL).encode())
+
+
+def information_message(identity: Identity, table: ParameterTable, now_us: int) -> Any:
+    """COMPONENT_INFORMATION, the older form of COMPONENT_METADATA."""
+    crc = checksum(general(identity, table))
+    return mavlink.MAVLink_component_information_message(
+        _boot_ms(now_us), crc, _uri(GENERAL).encode(), 0, b""
+    )
+
+
+def _boot_ms(now_us: int) -> int:
+    return now_us // 1000 & 0xFFFFFFFF
+
+
+def _uri(path: Path) -> str:
+    return f"mftp:///{'/'.join(path)}"
+
+
+def _json(record: Any) -> bytes:
+    return json.dumps(record, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _tellable(value: Any) -> bool:
+    return not (isinstance(value, float) and not math.isfinite(value))
+
+
+def _shared(a: bytes, b: bytes) -> int:
+    """How many bytes at their beginnings are equal."""
+    count = 0
+    for x, y in zip(a, b, strict=False):
+        if x != y:
+            break
+        count += 1
+    return count
+
+
+def _whole(text: str | None, otherwise: int) -> int:
+    return int(text) if text is not None and text.isascii() and text.isdigit() else otherwise
+
+
+def _within_float32(value: float) -> float:
+    return math.copysign(math.inf, value) if abs(value) > _FLOAT32_MAX else value

@@ -1,0 +1,1 @@
+"""The autopilot's side effects: options, storage, sockets, processes."""

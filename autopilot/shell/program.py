@@ -1,0 +1,509 @@
+"""The `autopilot` program: sockets, storage and signals around `autopilot.onboard.onboard`."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import click
+from platformdirs import user_state_path
+
+from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.snapshot import Options
+from autopilot.services.identity import AUTOPILOT_COMPONENT, identity_of
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.records import (
+    AreasChanged,
+    Event,
+    Link,
+    MissionChanged,
+    ParameterChanged,
+    SigningChanged,
+    TimesyncAnswered,
+    WorldSaved,
+)
+from autopilot.shell.options import (
+    Address,
+    Stop,
+    StopRequest,
+    address_option,
+    be_punctual,
+    datagram_socket,
+    home_option,
+    reason,
+    receive,
+    set_timeout,
+    setting_option,
+    shown,
+    signing_key_option,
+)
+from autopilot.shell.path_worker import Aside
+from autopilot.shell.storage import Storage, StorageError
+from autopilot.shell.tcp_server import TcpServer
+from autopilot.vehicle.belief import BeliefError, load_belief
+from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem
+from autopilot.wire.parameter_table import ParameterError
+
+LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal flights are equal
+_GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
+_BEAT_S = 1.0  # between two heartbeats while the clock stands
+_SLOW_SHARE = 0.8  # of the wall clock, below which the vehicle's is slow
+_SILENCE_S = 3.0  # of the simulator, until it is said
+_GROUND_RESEND_S = 0.5
+_MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
+_GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
+_RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
+_GROUND_LINK: Link = "ground"
+_LOG_BYTES = 8192  # of the flight log that are stored at once
+
+
+class AutopilotError(Exception):
+    """What ends the program with one line."""
+
+
+def _open(address: Address, what: str) -> socket.socket:
+    try:
+        sock = datagram_socket(address)
+        # no traffic but to where we are pointed, and answers to it
+        sock.bind(("127.0.0.1" if _is_loopback(address[0]) else "", 0))
+    except OSError as error:
+        raise AutopilotError(f"{what} {shown(address)}: {reason(error)}") from None
+    return sock
+
+
+def _listen(address: Address) -> TcpServer:
+    try:
+        return TcpServer(address)
+    except OSError as error:
+        raise AutopilotError(f"TCP clients {shown(address)}: {reason(error)}") from None
+
+
+def _is_loopback(host: str) -> bool:
+    return host == "localhost" or host.startswith("127.")
+
+
+class GroundStations:
+    """Sockets towards ground stations, one for each address that we were pointed at.
+
+    Whoever else speaks to such a socket is a link of its own and is answered where it is.
+    """
+
+    def __init__(self, addresses: tuple[Address, ...], tcp: TcpServer | None = None) -> None:
+        self._tcp = tcp
+        self._sockets = [_open(address, "ground station") for address in addresses]
+        self._links: list[Link] = [(i, address) for i, address in enumerate(addresses)]
+
+    def join(self, onboard: Onboard) -> None:
+        """Serve the configured links from now on."""
+        for link in self._links:
+            onboard.add_link(link)
+        if self._tcp is not None:
+            self._tcp.join(onboard)
+
+    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
+        """Hand over what came and send what is due."""
+        if self._tcp is not None:
+            self._tcp.exchange(onboard, handle)
+        for i, sock in enumerate(self._sockets):
+            for _ in range(_MOST_AT_ONCE):
+                arrived = receive(sock, socket.MSG_DONTWAIT)
+                if arrived is None:
+                    break
+                datagram, sender = arrived
+                handle(onboard.receive_ground(datagram, (i, sender)))
+        self.send(onboard)
+
+    def send(self, onboard: Onboard) -> None:
+        """Send what is due."""
+        self._send(onboard.ground_datagrams(), onboard)
+
+    def beat(self, onboard: Onboard) -> None:
+        """A heartbeat while the clock stands and nothing is due."""
+        links = (*self._links, *(self._tcp.links() if self._tcp else ()))
+        self._send([(link, onboard.stranded_heartbeat(link)) for link in links], onboard)
+
+    def _send(self, datagrams: list[tuple[Link, bytes]], onboard: Onboard) -> None:
+        for link, datagram in datagrams:
+            i, address = link  # type: ignore[misc]
+            if self._tcp is not None and i == "tcp":  # type: ignore[has-type]
+                self._tcp.send(link, datagram, onboard)
+                continue
+            with suppress(OSError):  # nobody listens there yet, or the network is full: lost
+                self._sockets[i].sendto(datagram, address)  # type: ignore[has-type]
+
+    def close(self) -> None:
+        for sock in self._sockets:
+            sock.close()
+        if self._tcp is not None:
+            self._tcp.close()
+
+
+class GroundInStep:
+    """One ground station that shares our clock: every 20 ms we wait until it has caught up."""
+
+    def __init__(self, address: Address) -> None:
+        self._socket = _open(address, "ground station")
+        self._address = address
+
+    def join(self, onboard: Onboard) -> None:
+        """Serve the link from now on."""
+        onboard.add_link(_GROUND_LINK)
+        set_timeout(self._socket, _GROUND_RESEND_S)
+
+    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
+        """Send what is due; at the end of a window wait for the ground station's word on it."""
+        for _, datagram in onboard.ground_datagrams():
+            self._send(datagram)
+        ask = onboard.question(_GROUND_LINK)
+        if ask is None:
+            return
+        self._send(ask)
+        stamp = onboard.now_us * 1000
+        asked = time.monotonic()
+        while True:
+            stop.check()
+            arrived = receive(self._socket)
+            if arrived is None:
+                if time.monotonic() - asked > _GROUND_GONE_S:
+                    raise AutopilotError(f"the ground station was silent for {_GROUND_GONE_S:g} s; stopping")
+                self._send(ask)
+                continue
+            if arrived[1] != self._address:
+                continue
+            events = onboard.receive_ground(arrived[0], _GROUND_LINK)
+            handle(events)
+            if any(isinstance(event, TimesyncAnswered) and event.ts1 == stamp for event in events):
+                return
+
+    def _send(self, datagram: bytes) -> None:
+        with suppress(OSError):
+            self._socket.sendto(datagram, self._address)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class Program:
+    """The running autopilot: an `Onboard`, and anew whenever the simulator starts again."""
+
+    def __init__(
+        self,
+        build: Callable[[StoredMission | None], Onboard],
+        mission: StoredMission | None,
+        storage: Storage,
+        simulator: Address,
+        ground: GroundStations | GroundInStep,
+        say: Callable[[str], None],
+    ) -> None:
+        self._build = build
+        self._storage = storage
+        self._simulator = simulator
+        self._ground = ground
+        self._say = say
+        self._socket = _open(simulator, "simulator")
+        self._beaten, self._beaten_us = (
+            0.0,
+            0,
+        )  # the wall's and the vehicle's clock when it was last looked at
+        greeting = mavlink.MAVLink_heartbeat_message(
+            type=mavlink.MAV_TYPE_QUADROTOR,
+            autopilot=mavlink.MAV_AUTOPILOT_PX4,
+            base_mode=mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+            custom_mode=0,
+            system_status=mavlink.MAV_STATE_BOOT,
+            mavlink_version=3,
+        )
+        self._aside = Aside()
+        self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
+        self.onboard = build(mission)
+        self._ground.join(self.onboard)
+
+    def take_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
+        """Fence and rally points that are already there."""
+        for kind, items in areas.items():
+            self.onboard.take_areas(kind, items)
+
+    def run(self, stop: StopRequest) -> None:
+        """Tick for ever."""
+        set_timeout(self._socket, _GREETING_S)
+        heard = time.monotonic()
+        silent, lost, beaten = True, False, 0.0
+        self._say(f"looking for the simulator at {shown(self._simulator)}")
+        self._greet()
+        while True:
+            stop.check()
+            self._aside.attend(self.onboard)
+            arrived = receive(self._socket)
+            if arrived is None:
+                now = time.monotonic()
+                if not silent and now - heard > _SILENCE_S:
+                    silent = True
+                    self._say(f"no word from the simulator for {_SILENCE_S:g} s; looking for it")
+                    self.onboard.endpoint.say(
+                        mavlink.MAV_SEVERITY_CRITICAL, "Simulator silent: time stands still"
+                    )
+                    lost = True
+                if silent or now - heard > 1.0:
+                    self._greet()
+                # the clock stands, but questions are answered
+                if isinstance(self._ground, GroundStations):
+                    self._ground.exchange(self.onboard, self._keep, stop)
+                    if lost and now - beaten >= _BEAT_S:
+                        beaten = now
+                        self._ground.beat(self.onboard)
+                continue
+            datagram, sender = arrived
+            if sender != self._simulator:
+                continue
+            before = self.onboard.now_us, self.onboard.tick
+            answer = self.onboard.receive_sensors(datagram)
+            if answer is not None:
+                with suppress(OSError):
+                    self._answer(answer, stop, (self.onboard.now_us, self.onboard.tick) != before)
+                if silent:
+                    silent = False
+                    self._say(f"flying with the simulator at {shown(self._simulator)}")
+                    if lost:
+                        lost = False
+                        self.onboard.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again")
+                heard = time.monotonic()
+            elif self.onboard.out_of_time >= _RESTART_TICKS:
+                self._say("the simulator has started again: so do I")
+                areas = self.onboard.endpoint.areas
+                self._end_log()
+                self.onboard = self._build(self.onboard.endpoint.mission)
+                self.take_areas(areas)
+                self._ground.join(self.onboard)
+
+    def _answer(self, answer: bytes, stop: StopRequest, new: bool) -> None:
+        """Exchange with the ground before the answer where the ground shares our clock, else after it."""
+        if isinstance(self._ground, GroundInStep):
+            if new:
+                self._ground.exchange(self.onboard, self._keep, stop)
+            self._socket.sendto(answer, self._simulator)
+        else:
+            self._socket.sendto(answer, self._simulator)
+            self.onboard.endpoint.tell_time(time.time_ns() // 1000)
+            self._keep_beating()
+            self._ground.exchange(self.onboard, self._keep, stop)
+        self._keep(self.onboard.endpoint.take_events())
+        self._keep_log(_LOG_BYTES)
+        if new and self.onboard.fault and self.onboard.tick == 1:
+            raise AutopilotError(self.onboard.fault)
+
+    def _keep_beating(self) -> None:
+        """A heartbeat each second of the wall clock where the vehicle's is slower: clients wait by theirs."""
+        now, now_us = time.monotonic(), self.onboard.now_us
+        if now - self._beaten >= _BEAT_S:
+            if now_us - self._beaten_us < _SLOW_SHARE * _BEAT_S * 1e6:
+                self.onboard.endpoint.state_changed()
+            self._beaten, self._beaten_us = now, now_us
+
+    def _greet(self) -> None:
+        with suppress(OSError):
+            self._socket.sendto(self._greeting, self._simulator)
+
+    def _keep(self, events: list[Event]) -> None:
+        for event in events:
+            try:
+                match event:
+                    case MissionChanged(mission):
+                        self._storage.keep_mission(mission)
+                    case AreasChanged(kind, items):
+                        self._storage.keep_areas(kind, items)
+                    case ParameterChanged(name, value):
+                        self._storage.keep_parameter(name, value)
+                    case WorldSaved(values):
+                        self._storage.keep_world(values)
+                    case SigningChanged(key, timestamp):
+                        self._storage.keep_signing(key, timestamp)
+            except OSError as error:
+                self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
+                self._say(f"cannot store: {error}")
+
+    def _keep_log(self, least_bytes: int) -> None:
+        chunk = self.onboard.take_log(least_bytes)
+        if chunk is None:
+            return
+        try:
+            self._storage.keep_log(chunk, self.onboard.parameters["LOG_MAX_MB"])
+        except OSError as error:
+            self.onboard.give_up_log(error.strerror or str(error))
+            self._say(f"cannot store the flight log: {error}")
+
+    def _end_log(self) -> None:
+        self.onboard.end_log()
+        self._keep_log(1)
+
+    def close(self) -> None:
+        """Store what is left of the flight log, close all sockets."""
+        self._end_log()
+        self._socket.close()
+        self._ground.close()
+        self._aside.close()
+
+
+def _begin_signing(kept: Storage, key: bytes) -> None:
+    """Store the key, with the time of its last use if it was stored already."""
+    known = kept.load_signing()
+    try:
+        kept.keep_signing(key, known.timestamp if known and known.key == key else 0)
+    except OSError as error:
+        raise AutopilotError(f"the signing key cannot be stored: {reason(error)}") from None
+
+
+def _address_or_none(text: str) -> Address | None:
+    """HOST:PORT or `none`."""
+    return None if text == "none" else address_option(text)
+
+
+@click.command()
+@click.option(
+    "--sim",
+    type=address_option,
+    metavar="HOST:PORT",
+    default="127.0.0.1:4560",
+    show_default=True,
+    help="Where the simulator listens.",
+)
+@click.option(
+    "--gcs",
+    type=_address_or_none,
+    metavar="HOST:PORT",
+    multiple=True,
+    default=("127.0.0.1:14550",),
+    show_default=True,
+    help="Ground station to speak to; repeatable, `none` for none.",
+)
+@click.option(
+    "--api",
+    type=_address_or_none,
+    metavar="HOST:PORT",
+    multiple=True,
+    default=("127.0.0.1:14540",),
+    show_default=True,
+    help="API client to speak to; repeatable, `none` for none.",
+)
+@click.option(
+    "--tcp",
+    type=address_option,
+    metavar="HOST:PORT",
+    help="Listen here for ground stations that connect by TCP, as 127.0.0.1:5760.",
+)
+@click.option(
+    "--ground-lockstep",
+    type=address_option,
+    metavar="HOST:PORT",
+    help="One ground station that shares our clock, in place of --gcs and --api.",
+)
+@click.option(
+    "--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help="What is believed to fly."
+)
+@click.option(
+    "--set",
+    "settings",
+    type=setting_option,
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Set a parameter; repeatable. SIM_ parameters of the simulator are passed over.",
+)
+@click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
+@click.option(
+    "--storage",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Where mission and parameters outlive the program.  [default: the user's state directory]",
+)
+@click.option(
+    "--signing-key",
+    type=signing_key_option,
+    metavar="FILE",
+    help="Hear only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
+)
+@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+@click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
+def main(
+    sim: Address,
+    gcs: tuple[Address | None, ...],
+    api: tuple[Address | None, ...],
+    tcp: Address | None,
+    ground_lockstep: Address | None,
+    vehicle: str,
+    settings: tuple[tuple[str, float], ...],
+    home: Home | None,
+    storage: Path | None,
+    signing_key: bytes | None,
+    quiet: bool,
+) -> None:
+    """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
+
+    def say(text: str) -> None:
+        if not quiet:
+            print(f"autopilot: {text}", flush=True)
+
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop runs, there is nothing to bring to an end
+    program: Program | None = None
+    place = home or Home()
+    in_step = ground_lockstep is not None
+    try:
+        table = autopilot_parameters(load_belief(vehicle))
+        kept = Storage(storage or user_state_path("plumbline"))
+        kept.lock()
+        for trouble in kept.load_parameters(table):
+            print(f"autopilot: {trouble}", file=sys.stderr)
+        apply_settings(table, settings)
+        table.freeze()
+        mission, trouble = kept.load_mission(place)
+        if trouble:
+            print(f"autopilot: {trouble}", file=sys.stderr)
+        if signing_key is not None:
+            _begin_signing(kept, signing_key)
+        boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
+        options = Options(place, boot, clock_waits=in_step, log=True)
+
+        def build(stored: StoredMission | None) -> Onboard:
+            onboard = Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())
+            world, troubles = kept.load_world()
+            for trouble in troubles:
+                print(f"autopilot: {trouble}", file=sys.stderr)
+            onboard.restore_world(world)
+            return onboard
+
+        stations = [address for address in (*gcs, *api) if address is not None]
+        ground: GroundStations | GroundInStep
+        if ground_lockstep:
+            ground = GroundInStep(ground_lockstep)
+        else:
+            ground = GroundStations(tuple(stations), _listen(tcp) if tcp else None)
+        program = Program(build, mission, kept, sim, ground, say)
+        areas, troubles = kept.load_areas(place)
+        for trouble in troubles:
+            print(f"autopilot: {trouble}", file=sys.stderr)
+        program.take_areas(areas)
+        program.onboard.rehearse()
+        be_punctual()
+        with StopRequest() as stop:
+            program.run(stop)
+    except (AutopilotError, BeliefError, ParameterError, StorageError) as error:
+        print(f"autopilot: {error}", file=sys.stderr)
+        sys.exit(1)
+    except Stop:
+        pass
+    finally:
+        if program is not None:
+            program.close()
+    if program is not None:
+        say(f"stopped at t = {program.onboard.now_us / 1e6:.3f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+"""Ground stations that connect by TCP: each connection is a link of its own, which ends with it."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+
+from autopilot.onboard.onboard import Onboard
+from autopilot.services.records import Event, Link
+from autopilot.shell.options import Address
+from autopilot.wire.codec import whole_frames
+
+_LARGEST_READ = 65536
+_LARGEST_BACKLOG = 262_144  # bytes that a client has not taken: it is stuck, and is let go
+
+
+class _Client:
+    """One connection: what came of a frame, and what could not be sent yet."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        self.socket = sock
+        self.came = b""
+        self.waiting = b""
+
+    def take(self) -> bytes | None:
+        """Whole frames that came; None at the end of the connection."""
+        try:
+            read = self.socket.recv(_LARGEST_READ)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            return None
+        if not read:
+            return None
+        self.came += read
+        end = whole_frames(self.came)
+        whole, self.came = self.came[:end], self.came[end:]
+        return whole
+
+    def give(self, frames: bytes) -> bool:
+        """Send, or keep what the client does not take yet; False where it is stuck or gone."""
+        self.waiting += frames
+        try:
+            self.waiting = self.waiting[self.socket.send(self.waiting) :]
+        except BlockingIOError:
+            pass
+        except OSError:
+            return False
+        return len(self.waiting) <= _LARGEST_BACKLOG
+
+
+class TcpServer:
+    """Listens, serves any number of clients, and never waits for one."""
+
+    def __init__(self, address: Address) -> None:
+        """Raises OSError where the address cannot be had."""
+        family = socket.getaddrinfo(*address, type=socket.SOCK_STREAM)[0][0]
+        self._listener = socket.create_server(address, family=family)
+        self._listener.setblocking(False)
+        self._clients: dict[Link, _Client] = {}
+        self._number = 0
+
+    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None]) -> None:
+        """Take who knocks; hand over what came."""
+        self._accept(onboard)
+        for link, client in list(self._clients.items()):
+            frames = client.take()
+            if frames is None:
+                self._let_go(link, onboard)
+            elif frames:
+                handle(onboard.receive_ground(frames, link))
+
+    def send(self, link: Link, frames: bytes, onboard: Onboard) -> None:
+        """Frames for one client; nothing happens where it is gone."""
+        client = self._clients.get(link)
+        if client is not None and not client.give(frames):
+            self._let_go(link, onboard)
+
+    def links(self) -> tuple[Link, ...]:
+        """The connections."""
+        return tuple(self._clients)
+
+    def join(self, onboard: Onboard) -> None:
+        """Serve the connections that there are from now on."""
+        for link in self._clients:
+            onboard.add_link(link)
+
+    def close(self) -> None:
+        """End all connections."""
+        self._listener.close()
+        for client in self._clients.values():
+            client.socket.close()
+
+    def _accept(self, onboard: Onboard) -> None:
+        with suppress(OSError):  # nobody knocks
+            sock, _ = self._listener.accept()
+            sock.setblocking(False)
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._number += 1
+            link: Link = ("tcp", self._number)
+            self._clients[link] = _Client(sock)
+            onboard.add_link(link)
+
+    def _let_go(self, link: Link, onboard: Onboard) -> None:
+        self._clients.pop(link).socket.close()
+        onboard.endpoint.remove_link(link)

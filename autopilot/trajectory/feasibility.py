@@ -1,0 +1,343 @@
+"""Can the vehicle fly it? Answered before take-off, for every step of a mission.
+
+What is checked: the cable stays taut, total thrust (with a reserve) and each single rotor stay within their
+limits, so does the tilt of the vehicle, the load is carried at a height and stays above the ground, and a
+path has no jump in position or velocity. Drag of the vehicle is part of it. What is not checked: at the
+joints of half-sine envelopes the acceleration jumps, and to follow a jump exactly would take an unbounded
+moment for an instant; both sides of a joint are checked, the jump itself is not. An autopilot that shapes its
+paths flies near the jump (`autopilot.trajectory.shaping`), others err there and are none the worse. Nor
+does the check know of wind, delay or noise: what passes can be flown in principle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import cos, degrees, inf, nextafter, radians
+
+from numpy import linspace
+
+from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.trajectory.peaks import (
+    Body,
+    Extreme,
+    Peaks,
+    survey_attitude,
+    survey_path,
+    survey_signals,
+    survey_transfer,
+)
+from autopilot.trajectory.prepare import REFUSE, Limits, prepare, trouble_of
+from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.shaping import Shaped, path_jets, shape
+from autopilot.trajectory.signals import evaluate, joints, signal_table
+from autopilot.trajectory.timeline import Leg, legs
+from autopilot.trajectory.waypoint_path import Passage, passage_jets
+from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint, Winch
+
+__all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
+
+ROTOR_MARGIN = 0.15  # MIS_ROTOR_MARG, MIS_TENSION and MIS_SHAPE_ERR as delivered
+LEAST_TENSION = 0.3
+SHAPING_M = 0.05
+LEAST_HEIGHT_M = 0.3  # above home, at which a load is carried
+_REPORT_SAMPLES = 4001
+# Jumps of the path below these (m, m/s) are smaller than the error of any flight.
+_JUMP_M = 1e-3
+_JUMP_M_S = 1e-2
+# How far below the ground (m) a path may dip by rounding.
+_GROUND_M = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleLimits:
+    """What the check believes of the vehicle. Defaults: Table 4-1, and chosen where it is silent.
+
+    `thrust_reserve` is the share of the total thrust kept free for control. `rotor_max_n` may be infinite.
+    `speed_m_s` (until the mission sets its own) and `accel_m_s2` are the peaks of transfers.
+    """
+
+    quad_mass_kg: float = 0.4
+    load_mass_kg: float = 0.1
+    cable_length_m: float = 0.7
+    inertia_kg_m2: Vec3 = (2.23e-3, 2.99e-3, 4.8e-3)
+    gravity_m_s2: float = 9.81
+    arm_m: float = 0.126
+    torque_ratio_m: float = 0.016
+    rotor_min_n: float = 0.0
+    rotor_max_n: float = 1.96
+    thrust_reserve: float = 0.1
+    tilt_max_rad: float = radians(45.0)
+    speed_m_s: float = 1.5
+    accel_m_s2: float = 1.5
+    quad_drag_n_s_m: float = 0.0
+    quad_drag_quadratic_n_s2_m2: float = 0.0
+    rotor_tau_s: float = 0.0
+
+    @property
+    def body(self) -> Body:
+        """The part of it that the survey needs."""
+        return Body(
+            self.quad_mass_kg,
+            self.load_mass_kg,
+            self.cable_length_m,
+            self.inertia_kg_m2,
+            self.gravity_m_s2,
+            self.arm_m,
+            self.torque_ratio_m,
+            self.quad_drag_n_s_m,
+            self.quad_drag_quadratic_n_s2_m2,
+        )
+
+    @property
+    def shaping(self) -> Limits:
+        """What the autopilot shapes paths to, as delivered: its MIS_ parameters."""
+        margin = ROTOR_MARGIN * (self.rotor_max_n - self.rotor_min_n)
+        limited = self.rotor_max_n < inf
+        bounds = Bounds(
+            self.rotor_min_n + margin if limited else -inf,
+            self.rotor_max_n - margin if limited else inf,
+            LEAST_TENSION * self.load_mass_kg * self.gravity_m_s2,
+            cos(self.tilt_max_rad),
+            self.rotor_tau_s,
+        )
+        return Limits(
+            self.body, bounds, True, SHAPING_M, REFUSE, self.speed_m_s, self.accel_m_s2, time_optimal=False
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PathReport:
+    """How a step is flown: signals as shaped, waypoints as passed.
+
+    `distance_m` is between the flown and the asked path, at most; forces in N, `tilt_deg` of the vehicle.
+    """
+
+    item: int
+    kind: str
+    duration_s: float
+    distance_m: float
+    rotor_low_n: float
+    rotor_high_n: float
+    tension_low_n: float
+    tilt_deg: float
+
+    def __str__(self) -> str:
+        return (
+            f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s, at most "
+            f"{1e3 * self.distance_m:.1f} mm from the path asked; rotors {self.rotor_low_n:.2f} ... "
+            f"{self.rotor_high_n:.2f} N, tension from {self.tension_low_n:.2f} N, "
+            f"tilt to {self.tilt_deg:.0f} deg"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """A limit that a step breaks, at its worst: `value` where `limit` is allowed, `time_s` into the step."""
+
+    item: int
+    quantity: str
+    value: float
+    limit: float
+    time_s: float
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list[Violation]:
+    """All that the mission asks and the vehicle cannot do, step by step; empty if it can be flown.
+
+    `shaped`: signals are flown by an autopilot that shapes them; what it can fly near the asked path passes.
+    """
+    found: list[Violation] = []
+    for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2):
+        if isinstance(leg.step, Takeoff | Waypoint) and leg.end[2] < LEAST_HEIGHT_M:
+            text = (
+                f"items[{leg.item}] ({_kind(leg)}): the load would be carried {leg.end[2]:.2f} m above the "
+                f"ground; it must be at least {LEAST_HEIGHT_M:g} m: raise altitude_m"
+            )
+            found.append(Violation(leg.item, "height", leg.end[2], LEAST_HEIGHT_M, leg.transfer_s, text))
+        if isinstance(leg.step, Signals):
+            jumps = list(_jumps(leg.item, leg.step))
+            found += jumps
+            if shaped and not jumps:
+                along = _survey(leg, limits)
+                assert along is not None
+                trouble = trouble_of(shape(leg.step, limits.body, limits.shaping.bounds), limits.shaping)
+                low = list(_judge(leg, along, limits))
+                if not trouble:
+                    found += [v for v in low if v.quantity == "height"]
+                elif low:
+                    found += low
+                else:
+                    text = f"items[{leg.item}] (signals): {trouble}"
+                    found.append(Violation(leg.item, "shaping", inf, SHAPING_M, 0.0, text))
+                continue
+        along = _survey(leg, limits)
+        if along is not None:
+            found += _judge(leg, along, limits)
+    return found
+
+
+def paths(mission: Mission, limits: VehicleLimits) -> list[PathReport]:
+    """How each step is flown that signals describe, or that waypoints without a hold are passed in."""
+    shaping = limits.shaping
+    prepared = prepare(mission.steps, range(len(mission.steps)), shaping)
+    found = []
+    for item, made in enumerate(prepared.made):
+        if isinstance(made, Shaped):
+            kind, distance = "signals", made.distance_m
+            times = linspace(-made.lead_s, made.duration_s + made.tail_s, _REPORT_SAMPLES)
+            jets = path_jets(made, times)
+        elif isinstance(made, Passage):
+            kind, distance = "waypoint", 0.0
+            times = linspace(made.begin_s, made.end_s, _REPORT_SAMPLES)
+            jets = passage_jets(made.table, times)
+        else:
+            continue
+        along = survey_path(times, jets, 0.0, shaping.body)
+        found.append(
+            PathReport(
+                item,
+                kind,
+                float(times[-1] - times[0]),
+                distance,
+                along.rotor_low.value,
+                along.rotor_high.value,
+                along.tension_low.value,
+                degrees(along.tilt.value),
+            )
+        )
+    return found
+
+
+def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:
+    """The extremes along each step that moves the load, by item number."""
+    surveys = {leg.item: _survey(leg, limits) for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2)}
+    return {item: along for item, along in surveys.items() if along is not None}
+
+
+def _survey(leg: Leg, limits: VehicleLimits) -> Peaks | None:
+    if isinstance(leg.step, Signals):
+        return survey_signals(leg.step, leg.begin, limits.body)
+    if isinstance(leg.step, AttitudeRun):
+        return survey_attitude(leg.step, leg.begin[2], limits.body)
+    if leg.transfer_s > 0.0:
+        return survey_transfer(leg.begin, leg.end, leg.transfer_s, limits.body)
+    return None
+
+
+def _judge(leg: Leg, along: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
+    def violation(quantity: str, worst: Extreme, limit: float, says: str, advice: str = "") -> Violation:
+        advice = advice or _advice(leg, worst.time_s)
+        text = f"items[{leg.item}] ({_kind(leg)}): at {worst.time_s:.1f} s {says}; {advice}"
+        return Violation(leg.item, quantity, worst.value, limit, worst.time_s, text)
+
+    fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
+    gravity, full = limits.gravity_m_s2, 4.0 * limits.rotor_max_n
+    usable = full * (1.0 - limits.thrust_reserve)
+    # a leg that begins under the ground has been told of at the one that led there
+    if along.height_low.value < min(leg.begin[2], 0.0) - _GROUND_M:
+        says = f"the load would be {-along.height_low.value:.2f} m under the ground"
+        advice = "begin higher (altitude_m) or lower amplitude_m of z"
+        yield violation("height", along.height_low, 0.0, says, advice)
+    if fall.value >= gravity:
+        # beyond this the cable would have to push: thrust and tilt mean nothing any more
+        says = (
+            f"the load would have to fall at {fall.value:.1f} m/s^2 with the cable taut; gravity gives "
+            f"{gravity:.2f} m/s^2 ({_excess(fall.value, gravity)})"
+        )
+        yield violation("tension", fall, gravity, says)
+        return
+    if thrust.value > usable:
+        reserve = f", {usable:.2f} N with the reserve of {100.0 * limits.thrust_reserve:.0f} %"
+        says = (
+            f"the flight needs {thrust.value:.2f} N of thrust; four rotors give {full:.2f} N"
+            f"{reserve if usable < full else ''} ({_excess(thrust.value, usable)})"
+        )
+        yield violation("thrust", thrust, usable, says)
+    if high.value > limits.rotor_max_n:
+        says = (
+            f"one rotor has to give {high.value:.2f} N; it gives {limits.rotor_max_n:.2f} N at most "
+            f"({_excess(high.value, limits.rotor_max_n)})"
+        )
+        yield violation("rotor force", high, limits.rotor_max_n, says)
+    if low.value < limits.rotor_min_n:
+        says = (
+            f"one rotor has to give {low.value:.2f} N; it gives {limits.rotor_min_n:.2f} N at least "
+            f"({limits.rotor_min_n - low.value:.2f} N under)"
+        )
+        yield violation("rotor force", low, limits.rotor_min_n, says)
+    if tilt.value > limits.tilt_max_rad:
+        angle, bound = degrees(tilt.value), degrees(limits.tilt_max_rad)
+        says = (
+            f"the vehicle leans {angle:.0f} deg; the limit is {bound:.0f} deg ({angle - bound:.0f} deg over)"
+        )
+        yield violation("tilt", tilt, limits.tilt_max_rad, says)
+
+
+def _jumps(item: int, step: Signals) -> Iterator[Violation]:
+    """Jumps of position or velocity at the joints, and motion left over at the end of the duration."""
+    table = signal_table(step.terms)
+    for time in joints(step.terms):
+        if time >= step.duration_s:
+            continue
+        before, after = evaluate(table, nextafter(time, -inf)), evaluate(table, time)
+        for order, bound, unit in ((0, _JUMP_M, "m"), (1, _JUMP_M_S, "m/s")):
+            jump = norm(sub(after[order], before[order]))
+            if jump > bound:
+                what = ("position", "velocity")[order]
+                text = (
+                    f"items[{item}] (signals): at {time:.1f} s the {what} jumps by {jump:.2f} {unit}; "
+                    "it must be continuous: lengthen rise_s and fall_s"
+                )
+                yield Violation(item, f"{what} jump", jump, bound, time, text)
+    end = step.duration_s
+    speed = norm(evaluate(table, nextafter(end, -inf))[1])
+    if speed > _JUMP_M_S:
+        rest = max((_end(term) for term in step.terms), default=inf)
+        advice = f"duration_s to {rest:g}" if end < rest < inf else "the signals so that all come to rest"
+        text = (
+            f"items[{item}] (signals): at {end:.1f} s, its end, the load still moves at {speed:.2f} m/s; "
+            f"it must be at rest: change {advice}"
+        )
+        yield Violation(item, "velocity at the end", speed, _JUMP_M_S, end, text)
+
+
+def _end(term: Term) -> float:
+    """When a term has come to rest (s); inf for one that swings for ever."""
+    if term.hold_s is None:
+        return inf if term.factors else term.start_s + term.rise_s
+    return term.start_s + term.rise_s + term.hold_s + term.fall_s
+
+
+def _kind(leg: Leg) -> str:
+    names = {
+        Signals: "signals",
+        AttitudeRun: "attitude",
+        Takeoff: "takeoff",
+        Waypoint: "waypoint",
+        ReturnHome: "return",
+        Land: "land",
+        Winch: "winch",
+    }
+    return names[type(leg.step)]
+
+
+def _excess(value: float, limit: float) -> str:
+    return f"{100.0 * (value / limit - 1.0):.0f} % over" if limit > 0.0 else f"{value - limit:.2f} over"
+
+
+def _advice(leg: Leg, time: float) -> str:
+    """What to change: for signals the axis that accelerates most at that time."""
+    step = leg.step
+    if isinstance(step, AttitudeRun):
+        return "lower the tilt or lengthen duration_s"
+    if not isinstance(step, Signals):
+        return "lower speed_m_s or the acceleration of transfers"
+    accel = evaluate(signal_table(step.terms), time)[2]
+    axis = "xyz"[max(range(3), key=lambda i: abs(accel[i]))]
+    waves = any(term.axis == axis and term.factors for term in step.terms)
+    return f"lower amplitude_m of {axis} or lengthen its {'period_s' if waves else 'rise_s'}"

@@ -1,0 +1,224 @@
+"""What a trajectory asks of vehicle and cable, sampled finely along it through the flat map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, nextafter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, norm
+from autopilot.trajectory.flatness import flat_outputs
+from autopilot.trajectory.signals import Jet, SignalTable, evaluate, joints, signal_table
+from autopilot.trajectory.swing import swing
+from autopilot.trajectory.transfer import transfer
+from missions.model import AttitudeRun, Signals
+
+Samples = NDArray[np.float64]
+
+_SAMPLES_PER_PERIOD = 200
+_COARSEST_S = 0.01
+_STILL_SAMPLES = 201
+# columns of a sample row
+SPEED, ACCEL, FALL, TENSION, THRUST, ROTOR_LOW, ROTOR_HIGH, TILT, HEIGHT = range(9)
+_COLUMNS = 9
+
+
+class Body(NamedTuple):
+    """The vehicle's numbers that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, see (2-13).
+
+    Drag of the vehicle in N s/m and N s^2/m^2.
+    """
+
+    quad_mass: float
+    load_mass: float
+    cable_length: float
+    inertia: Vec3
+    gravity: float
+    arm: float
+    torque_ratio: float
+    drag_linear: float = 0.0
+    drag_quadratic: float = 0.0
+
+
+class Extreme(NamedTuple):
+    """A value and the time (s from the beginning of the step) at which it occurs."""
+
+    value: float
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Peaks:
+    """The extremes along a trajectory: m/s, m/s^2, N, rad, m above home. `fall` is downward acceleration."""
+
+    speed: Extreme
+    accel: Extreme
+    fall: Extreme
+    tension_low: Extreme
+    thrust: Extreme
+    rotor_low: Extreme
+    rotor_high: Extreme
+    tilt: Extreme
+    height_low: Extreme
+
+
+@kernel
+def _rotor_range(thrust: float, moment: Vec3, arm: float, torque_ratio: float) -> tuple[float, float]:
+    """Least and greatest rotor force: (2-13) solved for F1 ... F4."""
+    roll = 0.5 * moment[0] / arm
+    pitch = 0.5 * moment[1] / arm
+    yaw = 0.25 * moment[2] / torque_ratio
+    # F1, F3 = mean +- pitch - yaw; F2, F4 = mean -+ roll + yaw
+    mean = 0.25 * thrust
+    return mean - max(abs(pitch) + yaw, abs(roll) - yaw), mean + max(abs(pitch) - yaw, abs(roll) + yaw)
+
+
+@kernel
+def _fill(row: Samples, jet: Jet, body: Body) -> None:
+    """One sample: the columns named above, for a heading of 0; TILT as the cosine of the angle."""
+    flat = flat_outputs(
+        jet,
+        0.0,
+        body.quad_mass,
+        body.load_mass,
+        body.cable_length,
+        body.inertia,
+        body.gravity,
+        body.drag_linear,
+        body.drag_quadratic,
+    )
+    low, high = _rotor_range(flat.thrust, flat.moment, body.arm, body.torque_ratio)
+    row[0] = norm(jet[1])
+    row[1] = norm(jet[2])
+    row[2] = -jet[2][2]
+    row[3] = flat.tension
+    row[4] = flat.thrust
+    row[5] = low
+    row[6] = high
+    row[7] = flat.R[2][2]
+    row[8] = jet[0][2]
+
+
+@kernel
+def _fill_signals(table: SignalTable, times: Samples, body: Body, rows: Samples) -> None:
+    for i in range(times.shape[0]):
+        _fill(rows[i], evaluate(table, times[i]), body)
+
+
+@kernel
+def _fill_transfer(p0: Vec3, p1: Vec3, duration: float, times: Samples, body: Body, rows: Samples) -> None:
+    for i in range(times.shape[0]):
+        _fill(rows[i], transfer(p0, p1, duration, times[i]), body)
+
+
+@kernel
+def _fill_jets(jets: Samples, body: Body, rows: Samples) -> None:
+    for i in range(jets.shape[1]):
+        _fill(
+            rows[i],
+            (
+                (jets[0, i, 0], jets[0, i, 1], jets[0, i, 2]),
+                (jets[1, i, 0], jets[1, i, 1], jets[1, i, 2]),
+                (jets[2, i, 0], jets[2, i, 1], jets[2, i, 2]),
+                (jets[3, i, 0], jets[3, i, 1], jets[3, i, 2]),
+                (jets[4, i, 0], jets[4, i, 1], jets[4, i, 2]),
+                (jets[5, i, 0], jets[5, i, 1], jets[5, i, 2]),
+                (jets[6, i, 0], jets[6, i, 1], jets[6, i, 2]),
+            ),
+            body,
+        )
+
+
+def _peaks(times: Samples, rows: Samples) -> Peaks:
+    def extreme(column: int, greatest: bool) -> Extreme:
+        values = rows[:, column]
+        index = int(np.argmax(values) if greatest else np.argmin(values))
+        return Extreme(float(values[index]), float(times[index]))
+
+    cos_tilt = extreme(TILT, False)
+    return Peaks(
+        speed=extreme(SPEED, True),
+        accel=extreme(ACCEL, True),
+        fall=extreme(FALL, True),
+        tension_low=extreme(TENSION, False),
+        thrust=extreme(THRUST, True),
+        rotor_low=extreme(ROTOR_LOW, False),
+        rotor_high=extreme(ROTOR_HIGH, True),
+        tilt=Extreme(float(np.arccos(np.clip(cos_tilt.value, -1.0, 1.0))), cos_tilt.time_s),
+        height_low=extreme(HEIGHT, False),
+    )
+
+
+def signal_times(step: Signals) -> Samples:
+    """Sample times: 200 to the shortest period or edge, at least each 10 ms, and both sides of each joint."""
+    quickest = [sine.period_s for term in step.terms for sine in term.factors]
+    quickest += [edge for term in step.terms for edge in (term.rise_s, term.fall_s) if edge > 0.0]
+    spacing = min([_COARSEST_S, *(period / _SAMPLES_PER_PERIOD for period in quickest)])
+    regular = np.linspace(0.0, step.duration_s, int(step.duration_s / spacing) + 2)[:-1]
+    edges = [t for t in joints(step.terms) if 0.0 < t < step.duration_s]
+    sides = [nextafter(t, -inf) for t in (*edges, step.duration_s)] + edges
+    return np.union1d(regular, np.array(sides))
+
+
+def survey_signals(step: Signals, anchor: Vec3, body: Body) -> Peaks:
+    """Extremes along load signals that begin at `anchor`; the jumps at joints are not part of it."""
+    times = signal_times(step)
+    rows = np.empty((times.size, _COLUMNS))
+    _fill_signals(signal_table(step.terms), times, body, rows)
+    rows[:, HEIGHT] += anchor[2]
+    return _peaks(times, rows)
+
+
+def survey_transfer(p0: Vec3, p1: Vec3, duration: float, body: Body) -> Peaks:
+    """Extremes along a rest-to-rest transfer."""
+    times = np.linspace(0.0, duration, _STILL_SAMPLES)
+    rows = np.empty((times.size, _COLUMNS))
+    _fill_transfer(p0, p1, duration, times, body, rows)
+    return _peaks(times, rows)
+
+
+def survey_path(times: Samples, jets: Samples, height: float, body: Body) -> Peaks:
+    """Extremes along a path given by samples (7, n, 3), `height` m above home."""
+    rows = np.empty((times.size, _COLUMNS))
+    _fill_jets(jets, body, rows)
+    rows[:, HEIGHT] += height
+    return _peaks(times, rows)
+
+
+def survey_attitude(run: AttitudeRun, height: float, body: Body) -> Peaks:
+    """Extremes of an attitude run at constant height, on the safe side.
+
+    A run of the vehicle: thrust along u carries the whole weight. A run of the load: the cable along -u
+    carries the load and the vehicle moves with its upper end, F = (m_Q + m_L) g u / u_z + m_Q L u''. In both
+    the vehicle turns with F, and all of its angular acceleration is charged to the two rotors of an arm.
+    """
+    # the ends are left out: there u'' jumps, as it does at the joints of signals
+    times = np.linspace(0.0, run.duration_s, _STILL_SAMPLES)[1:-1]
+    lean = [swing(run.tilt_north_rad, run.tilt_east_rad, run.duration_s, float(t)) for t in times]
+    u = np.array([direction for direction, _, _ in lean])
+    u_ddot = np.array([second for _, _, second in lean])
+    force = (body.quad_mass + body.load_mass) * body.gravity * u / u[:, 2:]
+    if run.controlled == "load":
+        force = force + body.quad_mass * body.cable_length * u_ddot
+    thrust = np.linalg.norm(force, axis=1)
+    spacing = times[1] - times[0]
+    along = np.array([run.tilt_east_rad, run.tilt_north_rad])
+    along = along / max(float(np.linalg.norm(along)), 1e-12)
+    angle = np.arctan2(force[:, :2] @ along, force[:, 2])
+    turn = np.abs(np.gradient(np.gradient(angle, spacing), spacing))
+    differential = 0.5 * max(body.inertia[0], body.inertia[1]) * turn / body.arm
+    sideways = body.gravity * np.linalg.norm(u[:, :2], axis=1) / u[:, 2]
+    rows = np.zeros((times.size, _COLUMNS))
+    rows[:, SPEED] = np.cumsum(sideways) * spacing
+    rows[:, ACCEL] = sideways
+    rows[:, TENSION] = body.load_mass * body.gravity / u[:, 2]
+    rows[:, THRUST] = thrust
+    rows[:, ROTOR_LOW] = 0.25 * thrust - differential
+    rows[:, ROTOR_HIGH] = 0.25 * thrust + differential
+    rows[:, TILT] = np.minimum(u[:, 2], force[:, 2] / thrust)
+    rows[:, HEIGHT] = height
+    return _peaks(times, rows)

@@ -1,0 +1,235 @@
+"""A mission made ready for its vehicle before it is flown: paths shaped, and what cannot be flown dealt with.
+
+Signals become `Shaped` paths; waypoints without a hold are flown through, along one `Passage`. What cannot be
+flown even so, or only too far from where it was asked, is flown as asked, slowed down or refused, as the user
+chose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import cos, dist
+from typing import NamedTuple
+
+from autopilot.geometry.linear import Vec3, add
+from autopilot.trajectory.peaks import Body, Peaks, survey_transfer
+from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.shaping import Shaped, shape, unshaped
+from autopilot.trajectory.signals import evaluate, signal_table
+from autopilot.trajectory.timeline import legs
+from autopilot.trajectory.waypoint_path import MOST_POINTS, NEAREST_M, Passage, passage
+from missions.model import (
+    Delay,
+    Land,
+    Mission,
+    ReturnHome,
+    Signals,
+    Sine,
+    Speed,
+    Step,
+    Takeoff,
+    Term,
+    Waypoint,
+)
+
+AS_ASKED, SLOW_DOWN, REFUSE = 0, 1, 2
+SLOWEST = 4.0  # times as long as asked
+_SLOWER = (1.1, 1.25, 1.5, 1.8, 2.2, 2.8, 3.4, SLOWEST)
+_HALVINGS = 3
+_LONGER, _LONGER_TRIES = 1.05, 60  # of a transfer
+
+
+class Limits(NamedTuple):
+    """The vehicle, what is allowed along a path, and what to do where a path cannot be had within that."""
+
+    body: Body
+    bounds: Bounds
+    shaped: bool  # False: signals are flown exactly as asked, whatever they ask for
+    distance_m: float  # a shaped path is no further from the asked one
+    when_infeasible: int  # AS_ASKED, SLOW_DOWN or REFUSE
+    speed_m_s: float  # peaks along paths through waypoints, until the mission sets its own speed
+    accel_m_s2: float
+    time_optimal: bool  # paths through waypoints are as quick as the bounds allow, whatever the peaks
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """`made` has a path for each step that needs one; `notes` say what was changed; `refusal` why not."""
+
+    made: tuple[Shaped | Passage | None, ...] = ()
+    notes: tuple[str, ...] = ()
+    refusal: str = ""
+    pending: bool = False  # the paths are not there yet
+    least_s: tuple[float, ...] = ()  # for each step: what its transfer takes at least, 0 where nothing binds
+
+
+UNPREPARED = Prepared()
+PENDING = Prepared(pending=True)
+
+
+def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits) -> Prepared:
+    """The steps made ready; `sequence` has the mission item of each, by which the notes name it."""
+    made: list[Shaped | Passage | None] = []
+    notes: list[str] = []
+    refusal = ""
+    chains = _passages(steps, limits)
+    for index, (step, item) in enumerate(zip(steps, sequence, strict=True)):
+        if not isinstance(step, Signals):
+            made.append(chains.get(index))
+            continue
+        if not limits.shaped:
+            made.append(unshaped(step))
+            continue
+        found = shape(step, limits.body, limits.bounds)
+        trouble = trouble_of(found, limits)
+        if trouble and limits.when_infeasible == SLOW_DOWN:
+            slowed = slow_down(step, limits)
+            if slowed is not None:
+                notes.append(f"Item {item} flown {slowed.slowed:.2f} times as long: {trouble}")
+                found, trouble = slowed, ""
+        if trouble:
+            if limits.when_infeasible != AS_ASKED:
+                refusal = refusal or f"item {item}: {trouble}"
+            notes.append(f"Item {item}: {trouble}")
+            found = unshaped(step)
+        made.append(found)
+    least = tuple(_transfer_times(steps, limits)) if limits.shaped else ()
+    return Prepared(tuple(made), tuple(notes), refusal, least_s=least)
+
+
+def _transfer_times(steps: Sequence[Step], limits: Limits) -> Iterator[float]:
+    """For each step the least time (s) of its transfer within the bounds; 0 where these do not bind."""
+    mission = Mission("", "", "", (), tuple(steps))
+    for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2):
+        duration = leg.transfer_s
+        if not isinstance(leg.step, Waypoint | ReturnHome) or duration == 0.0:
+            yield 0.0
+            continue
+        for _ in range(_LONGER_TRIES):
+            if _transfer_fits(survey_transfer(leg.begin, leg.end, duration, limits.body), limits.bounds):
+                break
+            duration *= _LONGER
+        yield 0.0 if duration == leg.transfer_s else duration
+
+
+def _transfer_fits(along: Peaks, bounds: Bounds) -> bool:
+    return (
+        along.rotor_high.value <= bounds.rotor_high
+        and along.rotor_low.value >= bounds.rotor_low
+        and along.tension_low.value >= bounds.tension_low
+        and cos(along.tilt.value) >= bounds.cos_tilt
+    )
+
+
+def _passages(steps: Sequence[Step], limits: Limits) -> dict[int, Passage]:
+    """The stretch of a passage for each step that is a waypoint of one, by its index.
+
+    A passage is of waypoints in a row, all but the last without a hold.
+    """
+    found: dict[int, Passage] = {}
+    here: Vec3 | None = None
+    speed = limits.speed_m_s
+    points: list[Vec3] = []
+    first = 0
+
+    def close() -> None:
+        if len(points) > 2:
+            path, times = passage(
+                points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
+            )
+            table = path.table()
+            if float(path.jets()[1][0, :, 2].min()) + points[0][2] > 0.0:
+                for i in range(len(points) - 1):
+                    found[first + i] = Passage(table, float(times[i]), float(times[i + 1]), points[0])
+        points.clear()
+
+    for index, step in enumerate(steps):
+        if isinstance(step, Waypoint) and here is not None:
+            there = (step.east_m, step.north_m, step.altitude_m)
+            if points and (dist(points[-1], there) < NEAREST_M or len(points) > MOST_POINTS):
+                close()
+            if not points and dist(here, there) >= NEAREST_M:
+                points, first = [here], index
+            if points:
+                points.append(there)
+            if step.hold_s > 0.0:
+                close()
+            here = there
+            continue
+        close()
+        match step:
+            case Takeoff(altitude_m=altitude):
+                here = (0.0, 0.0, altitude)
+            case Speed(speed_m_s=given):
+                speed = given
+            case ReturnHome():
+                here = None if here is None else (0.0, 0.0, here[2])
+            case Signals(duration_s=duration, terms=terms):
+                here = None if here is None else add(here, evaluate(signal_table(terms), duration)[0])
+            case Waypoint(east_m=east, north_m=north, altitude_m=altitude):
+                here = (east, north, altitude)
+            case Delay() | Land():
+                pass
+            case _:
+                here = None  # an attitude run leaves the load where nobody knows
+    close()
+    return found
+
+
+def trouble_of(found: Shaped, limits: Limits) -> str:
+    """Why the shaped path will not do, or an empty text."""
+    if found.reason:
+        return found.reason
+    if found.distance_m > limits.distance_m:
+        return (
+            f"the nearest path that can be flown is {found.distance_m:.3f} m off; "
+            f"allowed are {limits.distance_m:.3f} m"
+        )
+    return ""
+
+
+def slow_down(step: Signals, limits: Limits) -> Shaped | None:
+    """The signals no slower than they must be, to a few percent; None if no slower ones will do either."""
+
+    def tried(factor: float) -> Shaped | None:
+        found = shape(slower(step, factor), limits.body, limits.bounds)
+        return None if trouble_of(found, limits) else replace(found, slowed=factor)
+
+    low, best = 1.0, None
+    for factor in _SLOWER:
+        best = tried(factor)
+        if best is not None:
+            break
+        low = factor
+    if best is None:
+        return None
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + best.slowed)
+        found = tried(middle)
+        if found is None:
+            low = middle
+        else:
+            best = found
+    return best
+
+
+def slower(step: Signals, factor: float) -> Signals:
+    """The same path at 1 / factor of the speed."""
+
+    def sine(s: Sine) -> Sine:
+        return Sine(factor * s.period_s, s.phase_rad, factor * s.start_s)
+
+    def term(t: Term) -> Term:
+        return Term(
+            t.axis,
+            t.amplitude_m,
+            factor * t.start_s,
+            factor * t.rise_s,
+            None if t.hold_s is None else factor * t.hold_s,
+            factor * t.fall_s,
+            tuple(sine(s) for s in t.factors),
+            None if t.rise_90_by_s is None else factor * t.rise_90_by_s,
+        )
+
+    return Signals(factor * step.duration_s, tuple(term(t) for t in step.terms))

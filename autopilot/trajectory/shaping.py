@@ -1,0 +1,316 @@
+"""Load signals as the vehicle can fly them: exactly as asked where that can be flown, nearby where it cannot.
+
+At the joints of half-cosine envelopes the acceleration jumps, and to follow a jump would take an unbounded
+moment; elsewhere a path may ask for more than rotors, cable or tilt allow. About each such place a window of
+the path is replaced by a spline, which takes over from the asked path and hands back to it without a jump up
+to the sixth derivative, and stays as near to it as the limits allow (`autopilot.trajectory.convex`). With
+the whole path known, the vehicle gets ready before a jump: a window about the beginning of the signals
+opens before it (the lead), with the load held within `HELD_M` of its place until then, and one about the
+end closes after it (the tail).
+
+Times are seconds from the beginning of the signals as asked; paths are relative to where they begin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import cos, inf, nextafter, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO
+from autopilot.trajectory.convex import NO_ROWS, SAMPLES, Goal, Problem, Rows, excess
+from autopilot.trajectory.peaks import Body
+from autopilot.trajectory.rotor_demand import Bounds, demand
+from autopilot.trajectory.signals import REST, Jet, SignalTable, evaluate, joints, signal_table
+from autopilot.trajectory.splines import COLUMNS, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
+from missions.model import Signals
+
+HELD_M = 0.005  # by which the load may leave its place before the signals begin
+INTERVAL_S = 0.04  # of the splines
+_HELD_S = 0.005  # between samples of that bound: 10 m/s^2 make 0.03 mm in the middle
+WINDOW_S = 0.45  # before and after a place that cannot be flown
+LONGEST_S = 15.0  # of one window; a longer one is no local change of the path
+_WIDER = 1.6  # a window whose path exceeds the bounds is tried so many times as wide, ...
+_TRIES = 3  # ... so often
+_COARSE_S = 0.01
+_FINE_S = 0.002
+_TOLERANCE_N = 0.05  # by which a shaped path may exceed its bounds between the samples
+_INSIDE_N = 0.03  # by which its samples keep within them
+# of the cost: a distance that counts as much as a sixth derivative which takes a rotor half its range
+_DISTANCE_M = 1e-3
+_SMOOTH_SHARE = 0.5
+_SMOOTH_S = 0.02  # in which the sixth derivative may change by as much
+# a jump of the n-th derivative is smoothed over this time; the rotor force that takes says whether it counts
+_JUMP_S = 0.15
+_JUMP_SHARE = 0.01
+_REST_M_S = 1e-2
+
+
+@dataclass(frozen=True, slots=True)
+class Shaped:
+    """Signals to be flown: `pieces` where the path is a spline, the asked path elsewhere.
+
+    The path begins `lead_s` before the signals as asked and ends `tail_s` after them.
+    """
+
+    table: SignalTable
+    pieces: PieceTable
+    duration_s: float  # of the signals as asked
+    lead_s: float
+    tail_s: float
+    distance_m: float  # greatest, between the flown and the asked path
+    excess_n: float  # by which a bound is exceeded for all that
+    slowed: float  # the asked signals last so many times as long as in the mission
+    reason: str  # why the path cannot be flown as it is, or ""
+
+    def jet(self, t: float) -> Jet:
+        """The path to fly at t (s from the beginning of the asked signals), and its derivatives 1 ... 6."""
+        return evaluate_shaped(self.table, self.pieces, self.duration_s, t)
+
+    def asked(self, t: float) -> Jet:
+        """The asked path at t."""
+        return evaluate_asked(self.table, self.duration_s, t)
+
+
+@kernel
+def evaluate_asked(table: SignalTable, duration: float, t: float) -> Jet:
+    """The signals; at rest before they begin, and where they end if they end at rest."""
+    if t < 0.0:
+        return REST
+    if t < duration:
+        return evaluate(table, t)
+    last = evaluate(table, duration)
+    v = last[1]
+    if v[0] * v[0] + v[1] * v[1] + v[2] * v[2] > 1e-4:
+        return evaluate(table, t)
+    return last[0], ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
+
+
+@kernel
+def evaluate_shaped(table: SignalTable, pieces: PieceTable, duration: float, t: float) -> Jet:
+    """The piece that holds t, else the signals as asked."""
+    row = find_piece(pieces, t)
+    if row >= 0:
+        return evaluate_piece(pieces, row, t)
+    return evaluate_asked(table, duration, t)
+
+
+@kernel
+def _fill(table: SignalTable, pieces: PieceTable, duration: float, times: Array, out: Array) -> None:
+    for i in range(times.shape[0]):
+        jet = evaluate_shaped(table, pieces, duration, times[i])
+        for order in range(7):
+            for axis in range(3):
+                out[order, i, axis] = jet[order][axis]
+
+
+_NO_PIECES: PieceTable = np.zeros((0, COLUMNS))
+
+
+def unshaped(step: Signals) -> Shaped:
+    """The signals exactly as asked."""
+    table = signal_table(step.terms)
+    return Shaped(table, _NO_PIECES, step.duration_s, 0.0, 0.0, 0.0, 0.0, 1.0, "")
+
+
+def path_jets(shaped: Shaped, times: Array) -> Array:
+    """(7, n, 3) of the path to fly."""
+    out = np.empty((7, times.size, 3))
+    _fill(shaped.table, shaped.pieces, shaped.duration_s, times, out)
+    return out
+
+
+def asked_jets(table: SignalTable, duration: float, times: Array) -> Array:
+    """(7, n, 3) of the path as asked."""
+    out = np.empty((7, times.size, 3))
+    _fill(table, _NO_PIECES, duration, times, out)
+    return out
+
+
+def full_crackle(body: Body, rotor_range: float) -> float:
+    """The sixth derivative of a sideways path (m/s^6) that takes half the range of a rotor (N), at hover.
+
+    Linearised about hover: pitch = m_Q L x'''' / (m g^2), and its second derivative times J is 2 l F.
+    """
+    reach = body.quad_mass * body.cable_length
+    weight = (body.quad_mass + body.load_mass) * body.gravity
+    return body.arm * rotor_range * weight * body.gravity / (max(body.inertia[:2]) * reach)
+
+
+def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
+    """The signals as the vehicle can fly them within the bounds; `reason` says so if it cannot."""
+    asked = unshaped(step)
+    table, duration = asked.table, step.duration_s
+    end_speed = float(np.linalg.norm(asked_jets(table, duration, np.array([nextafter(duration, -inf)]))[1]))
+    if end_speed > _REST_M_S:
+        return _refused(asked, f"the signals end at {end_speed:.2f} m/s; they must end at rest")
+    places = sorted([*_jumps(step, table, body, bounds), *_violations(table, duration, body, bounds)])
+    spans = _windows(places, WINDOW_S)
+    windows: list[_Window] = []
+    while len(windows) < len(spans):
+        begin, end = spans[len(windows)]
+        window = _widened(step, table, begin, end, body, bounds)
+        if window is None:
+            text = f"from {max(begin, 0.0):.1f} s to {min(end, duration):.1f} s it exceeds what can be flown"
+            return _refused(asked, text)
+        if windows and window.begin < windows[-1].end:
+            # widened into its neighbour: one window for both
+            last = len(windows) - 1
+            spans[last : last + 2] = [(spans[last][0], end)]
+            windows.pop()
+        else:
+            windows.append(window)
+    if not windows:
+        return asked
+    rows = np.vstack([window.pieces for window in windows])
+    lead, tail = max(-windows[0].begin, 0.0), max(windows[-1].end - duration, 0.0)
+    worst = max(window.excess_n for window in windows)
+    shaped = Shaped(table, rows, duration, lead, tail, 0.0, worst, 1.0, "")
+    times = _span(-lead, duration + tail, _FINE_S)
+    away = path_jets(shaped, times)[0] - asked_jets(table, duration, times)[0]
+    distance = float(np.sqrt(np.max(np.sum(away * away, axis=1))))
+    reason = "" if worst <= _TOLERANCE_N else f"a rotor or the cable is asked for {worst:.2f} N too much"
+    return Shaped(table, rows, duration, lead, tail, distance, worst, 1.0, reason)
+
+
+class _Window(NamedTuple):
+    """A spline from begin to end in place of the asked path."""
+
+    begin: float
+    end: float
+    pieces: PieceTable
+    excess_n: float
+
+
+def _widened(
+    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
+) -> _Window | None:
+    """The first window about begin and end that keeps the bounds, else the one that exceeds them least."""
+    found: _Window | None = None
+    wider = 0.0
+    for _ in range(_TRIES):
+        b, e = begin - wider, end + wider
+        if e - b > LONGEST_S:
+            break
+        tried = _solve(step, table, b, e, body, bounds)
+        if tried is not None and (found is None or tried.excess_n < found.excess_n):
+            found = tried
+        if found is not None and found.excess_n <= _TOLERANCE_N:
+            break
+        wider = (wider + WINDOW_S) * _WIDER - WINDOW_S
+    return found
+
+
+def _refused(asked: Shaped, reason: str) -> Shaped:
+    return Shaped(asked.table, asked.pieces, asked.duration_s, 0.0, 0.0, 0.0, inf, 1.0, reason)
+
+
+def _span(begin: float, end: float, spacing: float) -> Array:
+    return np.linspace(begin, end, max(int((end - begin) / spacing), 2) + 1)
+
+
+def _rotor_range(bounds: Bounds) -> float:
+    width = bounds.rotor_high - bounds.rotor_low
+    return width if np.isfinite(width) else 2.0
+
+
+def _jumps(step: Signals, table: SignalTable, body: Body, bounds: Bounds) -> Iterable[tuple[float, float]]:
+    """Times at which derivatives jump by more than any rotor can follow."""
+    full = full_crackle(body, _rotor_range(bounds))
+    times = {t for t in (*joints(step.terms), 0.0, step.duration_s) if 0.0 <= t <= step.duration_s}
+    for time in sorted(times):
+        sides = asked_jets(table, step.duration_s, np.array([nextafter(time, -inf), time]))
+        jump = np.linalg.norm(sides[:, 1] - sides[:, 0], axis=1)
+        takes = sum(jump[n] * _JUMP_S ** (n - 6) for n in range(1, 7))
+        if takes > _JUMP_SHARE * full:
+            yield time, time
+
+
+def _violations(
+    table: SignalTable, duration: float, body: Body, bounds: Bounds
+) -> Iterable[tuple[float, float]]:
+    """Stretches of the asked path that exceed the bounds."""
+    times = _span(0.0, duration, _COARSE_S)
+    # samples on both sides of a joint belong to no common slope: the lag is left to the optimisation
+    over = excess(demand(asked_jets(table, duration, times), body), 1.0, bounds._replace(rotor_tau=0.0)) > 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], over, [False]]).astype(np.int8)))
+    for first, after in zip(edges[::2], edges[1::2], strict=True):
+        yield float(times[first]), float(times[after - 1])
+
+
+def _windows(places: Iterable[tuple[float, float]], margin: float) -> list[tuple[float, float]]:
+    """Stretches `margin` wider than the places; those that come near each other are one."""
+    found: list[tuple[float, float]] = []
+    for begin, end in places:
+        b, e = begin - margin, end + margin
+        if found and b < found[-1][1] + margin:
+            found[-1] = (found[-1][0], max(found[-1][1], e))
+        else:
+            found.append((b, e))
+    return found
+
+
+def _solve(
+    step: Signals, table: SignalTable, begin: float, end: float, body: Body, bounds: Bounds
+) -> _Window | None:
+    """The spline from begin to end; None if there is none."""
+    intervals = max(round((end - begin) / INTERVAL_S), 2 * ORDERS)
+    basis = Basis(begin, end, intervals)
+    ends = asked_jets(table, step.duration_s, np.array([begin, end]))
+    origin = ends[0, 0].copy()
+    ends[0] -= origin
+    fixed = basis.ends(ends[:, 0], ends[:, 1])
+    times = np.linspace(begin, end, SAMPLES * intervals + 1)
+    target = asked_jets(table, step.duration_s, times)[0] - origin
+    full = full_crackle(body, _rotor_range(bounds))
+    smooth = 1.0 / (_SMOOTH_SHARE * full) ** 2
+    goal = Goal(target, _DISTANCE_M**-2, ((6, smooth), (7, smooth * _SMOOTH_S**2)))
+    inner = bounds._replace(rotor_low=bounds.rotor_low + _INSIDE_N, rotor_high=bounds.rotor_high - _INSIDE_N)
+    problem = Problem(basis, fixed, body, inner, goal, _rows(step, table, begin, end, origin))
+    solution = problem.solve()
+    if not solution.solved:
+        return None
+    pieces = basis.pieces(solution.coefficients, origin)
+    return _Window(begin, end, pieces, _fine_excess(pieces, begin, end, body, bounds))
+
+
+def _rows(step: Signals, table: SignalTable, begin: float, end: float, origin: Array) -> Rows:
+    """The load stays within HELD_M of its place until the signals begin, and arrives where it is asked to."""
+    times: list[float] = []
+    axes: list[int] = []
+    low: list[float] = []
+    high: list[float] = []
+    if begin < 0.0:
+        held = _span(begin, 0.0, _HELD_S)[1:]
+        for axis in range(3):
+            times += held.tolist()
+            axes += [axis] * held.size
+            low += [-HELD_M] * held.size
+            high += [HELD_M] * held.size
+    for term in step.terms:
+        if term.rise_90_by_s is None or not begin < term.start_s + term.rise_90_by_s < end:
+            continue
+        axis = "xyz".index(term.axis)
+        time = term.start_s + term.rise_90_by_s
+        made = 0.5 - 0.5 * cos(pi * min(term.rise_90_by_s / term.rise_s, 1.0))
+        asked = float(asked_jets(table, step.duration_s, np.array([time]))[0, 0, axis])
+        bound = asked + (0.9 - made) * term.amplitude_m - origin[axis]
+        times.append(time)
+        axes.append(axis)
+        low.append(bound if term.amplitude_m > 0.0 else -inf)
+        high.append(bound if term.amplitude_m < 0.0 else inf)
+    if not times:
+        return NO_ROWS
+    order = np.zeros(len(times), np.int64)
+    return Rows(np.array(times), order, np.eye(3)[axes], np.array(low), np.array(high))
+
+
+def _fine_excess(pieces: PieceTable, begin: float, end: float, body: Body, bounds: Bounds) -> float:
+    times = _span(begin, nextafter(end, -inf), _FINE_S)
+    jets = np.empty((7, times.size, 3))
+    _fill(np.zeros((0, 7)), pieces, 0.0, times, jets)
+    return float(excess(demand(jets, body), float(times[1] - times[0]), bounds).max())

@@ -1,0 +1,119 @@
+"""Paths as splines: smooth to the eighth derivative, evaluated as polynomials over equal intervals.
+
+A spline of degree 9 over [begin, end] with N equal intervals has N + 9 coefficients for each axis. Its first
+seven and last seven are decided by position and six derivatives at the two ends, so that a spline takes over
+from whatever comes before it, and hands over to what follows, without a jump of a rotor force. The rest is
+free: what an optimisation chooses (`autopilot.trajectory.shaping`, `autopilot.trajectory.waypoint_path`).
+
+For flight a spline becomes a table: for each interval the coefficients of (t - t_k)^n, so that `evaluate` is
+Horner's rule with all derivatives at once.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO
+from autopilot.trajectory.signals import Jet
+
+Array = NDArray[np.float64]
+
+DEGREE = 9
+ORDERS = 7  # position and six derivatives are matched at the ends
+
+PieceTable = Array
+"""A row for each interval: begin, end (s), then 10 coefficients of (t - begin)^n for east, north and up."""
+
+COLUMNS = 2 + 3 * (DEGREE + 1)
+
+
+class Basis:
+    """The B-splines over [begin, end] s in `intervals` equal parts, and how they sum to a path."""
+
+    def __init__(self, begin: float, end: float, intervals: int) -> None:
+        self.breaks: Array = np.linspace(begin, end, intervals + 1)
+        self.intervals = intervals
+        self.count = intervals + DEGREE
+        self.free = slice(ORDERS, self.count - ORDERS)
+        # whole numbers: times are counted in intervals, so that a knot belongs to one piece for certain
+        self.spacing = (end - begin) / intervals
+        inner = np.arange(intervals + 1, dtype=np.float64)
+        knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, float(intervals))])
+        self._one = BSpline(knots, np.eye(self.count), DEGREE)
+
+    def band(self, times: Array, orders: int) -> tuple[Array, NDArray[np.int64]]:
+        """(orders, n, 10): the derivatives 0 ... orders - 1 of the B-splines that are not zero at each of n
+        times; (n,): the index of the first of these."""
+        u = (times - self.breaks[0]) / self.spacing
+        first = np.clip(u.astype(np.int64), 0, self.intervals - 1)
+        columns = first[:, None] + np.arange(DEGREE + 1)
+        values = np.empty((orders, times.size, DEGREE + 1))
+        for order in range(orders):
+            every = self._one(u, nu=order) / self.spacing**order
+            values[order] = np.take_along_axis(every, columns, axis=1)
+        return values, first
+
+    def ends(self, before: Array, after: Array) -> Array:
+        """(count, 3) coefficients: those that the jets (7, 3) at the two ends decide, 0 for the free ones."""
+        found = np.zeros((self.count, 3))
+        for at, jet, part in ((0.0, before, slice(0, ORDERS)), (1.0, after, slice(-ORDERS, None))):
+            u = np.array([at * self.intervals])
+            rows = np.vstack([self._one(u, nu=n)[0] for n in range(ORDERS)])[:, part]
+            scaled = jet * self.spacing ** np.arange(ORDERS)[:, None]
+            found[part] = np.linalg.solve(rows, scaled)
+        return found
+
+    def pieces(self, coefficients: Array, origin: Array) -> PieceTable:
+        """The table of the spline with these coefficients (count, 3), moved by `origin` (3,)."""
+        spline = BSpline(self._one.t, coefficients, DEGREE)
+        left = np.arange(self.intervals, dtype=np.float64)
+        table = np.empty((self.intervals, COLUMNS))
+        table[:, 0], table[:, 1] = self.breaks[:-1], self.breaks[1:]
+        by_power = table[:, 2:].reshape(self.intervals, 3, DEGREE + 1)
+        for n in range(DEGREE + 1):
+            by_power[:, :, n] = spline(left, nu=n) / (factorial(n) * self.spacing**n)
+        by_power[:, :, 0] += origin
+        return table
+
+
+@kernel
+def find_piece(table: PieceTable, t: float) -> int:
+    """The row whose interval holds t, -1 if there is none; rows are in order and may leave gaps."""
+    low, high = 0, table.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if table[middle, 0] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    return low - 1 if low > 0 and t < table[low - 1, 1] else -1
+
+
+@kernel
+def evaluate_piece(table: PieceTable, row: int, t: float) -> Jet:
+    """Position and derivatives 1 ... 6 of the piece in `row` at time t (s)."""
+    u = t - table[row, 0]
+    d0, d1, d2, d3, d4, d5, d6 = ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
+    for n in range(9, -1, -1):
+        c = (table[row, 2 + n], table[row, 12 + n], table[row, 22 + n])
+        d6 = (d6[0] * u + d5[0], d6[1] * u + d5[1], d6[2] * u + d5[2])
+        d5 = (d5[0] * u + d4[0], d5[1] * u + d4[1], d5[2] * u + d4[2])
+        d4 = (d4[0] * u + d3[0], d4[1] * u + d3[1], d4[2] * u + d3[2])
+        d3 = (d3[0] * u + d2[0], d3[1] * u + d2[1], d3[2] * u + d2[2])
+        d2 = (d2[0] * u + d1[0], d2[1] * u + d1[1], d2[2] * u + d1[2])
+        d1 = (d1[0] * u + d0[0], d1[1] * u + d0[1], d1[2] * u + d0[2])
+        d0 = (d0[0] * u + c[0], d0[1] * u + c[1], d0[2] * u + c[2])
+    return (
+        d0,
+        d1,
+        (2.0 * d2[0], 2.0 * d2[1], 2.0 * d2[2]),
+        (6.0 * d3[0], 6.0 * d3[1], 6.0 * d3[2]),
+        (24.0 * d4[0], 24.0 * d4[1], 24.0 * d4[2]),
+        (120.0 * d5[0], 120.0 * d5[1], 120.0 * d5[2]),
+        (720.0 * d6[0], 720.0 * d6[1], 720.0 * d6[2]),
+    )

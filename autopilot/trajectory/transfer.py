@@ -1,0 +1,65 @@
+"""Carrying the load along a straight line, from rest to rest, smooth enough for four rotors.
+
+The path is p0 + (p1 - p0) s(t / duration) with the polynomial of degree 13 that has s(0) = 0, s(1) = 1 and
+its first six derivatives zero at both ends. Its slope is 12012 u^6 (1 - u)^6, where 12012 = 13! / (6! 6!), so
+
+* the peak speed is `PEAK_SPEED` distance / duration, halfway (u = 1/2): 12012 / 2^12 = 3003/1024,
+* the peak acceleration is `PEAK_ACCELERATION` distance / duration^2, where (1 - 2u)^2 = 1/11:
+  6 * 12012 * (5/22)^5 / sqrt(11).
+"""
+
+from __future__ import annotations
+
+from math import comb, sqrt
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, axpy, scale, sub
+from autopilot.trajectory.signals import Jet
+
+PEAK_SPEED = 3003.0 / 1024.0
+PEAK_ACCELERATION = 72072.0 * (5.0 / 22.0) ** 5 / sqrt(11.0)
+
+# of u^13 ... u^7; all lower powers are absent
+_COEFFICIENTS = tuple(float(comb(6 + k, k) * comb(13, 6 - k) * (-1) ** k) for k in range(6, -1, -1))
+
+
+@kernel
+def transfer(p0: Vec3, p1: Vec3, duration: float, t: float) -> Jet:
+    """Position and its derivatives 1 ... 6 at time t (s); at rest in p0 before 0, in p1 after `duration`."""
+    if t >= duration:
+        return p1, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
+    if t <= 0.0:
+        return p0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
+    # the second half is the first one seen from the other end: s(u) = 1 - s(1 - u). There the polynomial
+    # itself would lose digits, for its coefficients reach 24024 and alternate.
+    second = t > 0.5 * duration
+    u = (duration - t) / duration if second else t / duration
+    # Horner with all Taylor coefficients at once: s_n = s^(n)(u) / n!
+    s0, s1, s2, s3, s4, s5, s6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(14):
+        s6 = s6 * u + s5
+        s5 = s5 * u + s4
+        s4 = s4 * u + s3
+        s3 = s3 * u + s2
+        s2 = s2 * u + s1
+        s1 = s1 * u + s0
+        s0 = s0 * u + (_COEFFICIENTS[i] if i < 7 else 0.0)
+    path = sub(p1, p0)
+    even = -1.0 if second else 1.0
+    r = 1.0 / duration
+    r2 = r * r
+    return (
+        axpy(-s0, path, p1) if second else axpy(s0, path, p0),
+        scale(s1 * r, path),
+        scale(even * 2.0 * s2 * r2, path),
+        scale(6.0 * s3 * r2 * r, path),
+        scale(even * 24.0 * s4 * r2 * r2, path),
+        scale(120.0 * s5 * r2 * r2 * r, path),
+        scale(even * 720.0 * s6 * r2 * r2 * r2, path),
+    )
+
+
+@kernel
+def transfer_duration(distance: float, speed_max: float, accel_max: float) -> float:
+    """Shortest duration (s) with peak speed <= speed_max (m/s) and peak acceleration <= accel_max (m/s^2)."""
+    return max(PEAK_SPEED * distance / speed_max, sqrt(PEAK_ACCELERATION * distance / accel_max))

@@ -1,0 +1,247 @@
+"""Minimum-snap flight of the load through waypoints: from rest, past each in turn without a stop, to rest.
+
+The path is a spline (`autopilot.trajectory.splines`) that passes each waypoint exactly and minimises
+
+    integral of |x''''|^2 + tau^4 |x^(6)|^2
+
+x'''' is the snap of the load; x^(6) is what turns the vehicle, and tau the time over which that matters:
+without it the snap alone would leave rest with a jump of the moment. The times at the waypoints are those of
+the least integral for a given whole (`share_times`). The whole follows from the form that was asked for:
+
+* at a given speed: as short as the peak speed and peak acceleration allow,
+* time-optimal: as short as the bounds on rotors, cable and tilt allow.
+
+In either form the bounds hold along the whole path, drag of the vehicle included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, dist
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.optimize import minimize
+from scipy.sparse.linalg import splu
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.trajectory.convex import band_jets, excess
+from autopilot.trajectory.peaks import Body
+from autopilot.trajectory.rotor_demand import Bounds, demand
+from autopilot.trajectory.signals import Jet
+from autopilot.trajectory.splines import DEGREE, ORDERS, Array, Basis, PieceTable, evaluate_piece, find_piece
+from autopilot.trajectory.transfer import transfer_duration
+
+Indices = NDArray[np.int64]
+
+TURN_S = 0.25  # tau
+NEAREST_M = 0.05  # waypoints closer to each other than this are flown from rest to rest
+MOST_POINTS = 40  # of one passage
+_PER_SEGMENT = 8  # intervals to the shortest segment
+_MOST_INTERVALS = 400
+_SAMPLES = 4  # to an interval, of the integral
+_FINE_S = 0.01
+_SPLIT_ROUNDS = 6
+_MOST_SPLIT = 8  # segments whose times are optimised; more get those of the rule of thumb
+_SCALE_ROUNDS = 8
+_LONGER = 1.15
+_BAND = DEGREE + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """A stretch of a path through waypoints, from `begin_s` to `end_s` on its clock; (m, ENU from home)."""
+
+    table: PieceTable
+    begin_s: float
+    end_s: float
+    start: Vec3  # where the whole path begins
+
+
+@kernel
+def evaluate_path(table: PieceTable, t: float) -> Jet:
+    """The path at t (s), at rest before its beginning and after its end."""
+    row = find_piece(table, t)
+    if row >= 0:
+        return evaluate_piece(table, row, t)
+    if t < table[0, 0]:
+        x = (table[0, 2], table[0, 12], table[0, 22])
+    else:
+        last = table.shape[0] - 1
+        x = evaluate_piece(table, last, table[last, 1])[0]
+    return x, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
+
+
+@kernel
+def _fill(table: PieceTable, times: Array, out: Array) -> None:
+    for i in range(times.shape[0]):
+        jet = evaluate_path(table, times[i])
+        for order in range(7):
+            for axis in range(3):
+                out[order, i, axis] = jet[order][axis]
+
+
+def passage_jets(table: PieceTable, times: Array) -> Array:
+    """(7, n, 3) along the path."""
+    out = np.empty((7, times.size, 3))
+    _fill(table, times, out)
+    return out
+
+
+class MinimumSnap:
+    """The smoothest path from rest at the first point, past others at their times, to rest at the last."""
+
+    def __init__(self, points: Array, times: Array) -> None:
+        segments = np.diff(times)
+        count = ceil(_PER_SEGMENT * times[-1] / segments.min())
+        # an interval is no longer than a segment's share, however unlike the segments are
+        intervals = int(np.clip(count, 2 * ORDERS, _MOST_INTERVALS))
+        self.basis = basis = Basis(0.0, float(times[-1]), intervals)
+        self.origin: Array = points[0]
+        ends = np.zeros((2, ORDERS, 3))
+        ends[1, 0] = points[-1] - self.origin
+        self.coefficients: Array = basis.ends(ends[0], ends[1])
+        self._times = np.linspace(0.0, times[-1], _SAMPLES * intervals + 1)
+        self.values, self.first = basis.band(self._times, 7)
+        spacing = float(self._times[1])
+        four, six = (self._matrix(self.values[order], self.first) for order in (4, 6))
+        hessian = spacing * (four.T @ four + TURN_S**4 * (six.T @ six))
+        inner = times[1:-1]
+        passed = self._matrix(*self._at(inner))
+        free, fixed = slice(basis.free.start, basis.free.stop), self.coefficients
+        H, A = hessian[free, free], passed[:, free]
+        n = H.shape[0]
+        # the scale keeps the two kinds of rows comparable for the pivots
+        scale = float(np.median(H.diagonal()))
+        system = sparse.bmat([[H / scale, A.T], [A, None]], format="csc")
+        right = np.vstack(
+            [
+                -(hessian @ fixed)[free] / scale,
+                (points[1:-1] - self.origin) - passed @ fixed,
+            ]
+        )
+        self.coefficients = fixed.copy()
+        factor = splu(system)
+        solved = factor.solve(right)
+        # once more with what the digits left over: the least integral is small against its terms
+        solved += factor.solve(right - system @ solved)
+        self.coefficients[free] = solved[:n]
+        snap, turn = four @ self.coefficients, six @ self.coefficients
+        self.cost = spacing * float(np.sum(snap * snap) + TURN_S**4 * np.sum(turn * turn))
+
+    def _at(self, times: Array) -> tuple[Array, Indices]:
+        values, first = self.basis.band(times, 1)
+        return values[0], first
+
+    def _matrix(self, values: Array, first: Indices) -> sparse.csr_matrix:
+        n = len(values)
+        columns = first[:, None] + np.arange(_BAND)
+        lines = np.repeat(np.arange(n), _BAND).reshape(n, _BAND)
+        return sparse.csr_matrix(
+            (values.ravel(), (lines.ravel(), columns.ravel())), shape=(n, self.basis.count)
+        )
+
+    def jets(self) -> tuple[Array, Array]:
+        """Times (n,) and jets (7, n, 3) along the path, relative to its first point."""
+        times = np.linspace(0.0, self.basis.breaks[-1], max(int(self.basis.breaks[-1] / _FINE_S), 50) + 1)
+        values, first = self.basis.band(times, 7)
+        return times, band_jets(values, first, self.coefficients)
+
+    def table(self) -> PieceTable:
+        """The path as it is flown."""
+        return self.basis.pieces(self.coefficients, self.origin)
+
+
+def rule_of_thumb(points: Array) -> Array:
+    """Shares of the whole time for each segment: the time between points as transfers at speed and
+    acceleration 1 would take it, without the stops in between."""
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    times = np.sqrt(lengths) if len(lengths) == 1 else lengths.copy()
+    if len(lengths) > 1:
+        mean = float(lengths.mean())
+        times[0] += 0.7 * mean
+        times[-1] += 0.7 * mean
+    return np.asarray(times / times.sum())
+
+
+def share_times(points: Array, whole: float) -> Array:
+    """Shares of `whole` seconds for each segment that make the integral least."""
+    begin = np.log(rule_of_thumb(points))
+    if not 1 < len(begin) <= _MOST_SPLIT:
+        return np.exp(begin)
+
+    def shares(x: Array) -> Array:
+        found = np.exp(x - x.max())
+        return np.asarray(found / found.sum())
+
+    def cost(x: Array) -> float:
+        return float(np.log(MinimumSnap(points, _clock(shares(x), whole)).cost))
+
+    bounds = [(value - 0.7, value + 0.7) for value in begin]
+    found = minimize(
+        cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": _SPLIT_ROUNDS, "eps": 1e-3}
+    )
+    return shares(found.x)
+
+
+def _clock(shares: Array, whole: float) -> Array:
+    """Times at the points: whole microseconds, so that stretches join exactly on the vehicle's clock."""
+    times = np.concatenate([[0.0], np.cumsum(shares)]) * whole
+    return np.asarray(np.round(times * 1e6) * 1e-6)
+
+
+def passage(
+    points: Sequence[Vec3],
+    speed: float,
+    accel: float,
+    body: Body,
+    bounds: Bounds,
+    time_optimal: bool,
+) -> tuple[MinimumSnap, Array]:
+    """The path through the points and the times at them.
+
+    `speed` (m/s) and `accel` (m/s^2) are peaks; where it is `time_optimal` only the bounds count.
+    """
+    at = np.array(points)
+    length = float(sum(dist(a, b) for a, b in pairwise(points)))
+    whole = transfer_duration(length, speed, accel)
+    shares = share_times(at, whole)
+
+    def tried(seconds: float) -> tuple[MinimumSnap, Array, float]:
+        """... and how many times as long it should take; up to 1 it need not."""
+        times = _clock(shares, seconds)
+        path = MinimumSnap(at, times)
+        fine, jets = path.jets()
+        over = float(excess(demand(jets, body), float(fine[1]), bounds).max())
+        too_fast = float(np.linalg.norm(jets[1], axis=1).max()) / speed
+        too_hard = float(np.sqrt(np.linalg.norm(jets[2], axis=1).max() / accel))
+        asked = 0.0 if time_optimal else max(too_fast, too_hard)
+        return path, times, max(asked, 1.0 + over if over > 0.0 else 0.0)
+
+    path, times, factor = tried(whole)
+    if not time_optimal:
+        # peaks scale with time, all but exactly: twice is to a part in a thousand
+        for _ in range(2):
+            whole *= min(factor, 2.0)
+            path, times, factor = tried(whole)
+    for _ in range(4 * _SCALE_ROUNDS):
+        if factor <= 1.0 + 1e-3:
+            break
+        whole *= _LONGER if factor > 1.05 else 1.01
+        path, times, factor = tried(whole)
+    if time_optimal:
+        low, high = 0.0, whole
+        best = path, times
+        for _ in range(_SCALE_ROUNDS):
+            middle = 0.5 * (low + high) if low > 0.0 else 0.7 * high
+            path, times, factor = tried(middle)
+            if factor <= 1.0 + 1e-3:
+                best, high = (path, times), middle
+            else:
+                low = middle
+        path, times = best
+    return path, times

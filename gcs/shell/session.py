@@ -1,0 +1,166 @@
+"""A link to a running vehicle for one exchange after another, on the wall clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import Signing, timestamp_of
+from gcs.clients import command
+from gcs.clients.connection import Connection
+from gcs.clients.datagrams import messages
+from gcs.clients.operation import Operation, Result, Status, Target
+from gcs.clients.vehicle_view import VehicleView
+from gcs.errors import GcsError, NoVehicleError, RefusedError
+from gcs.shell.display import StepDisplay
+from gcs.shell.link import (
+    LOOPBACK,
+    TRUTH_PORT,
+    Address,
+    UdpSocket,
+    monotonic_us,
+    open_address,
+    unix_us,
+    wait,
+)
+
+FIND_S = 5.0
+REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may come a little later
+_TICK_S = 0.02
+
+Seen = Callable[[bytes, int], None]  # a datagram of the vehicle and the time
+
+
+class Session:
+    """One vehicle; `view` is what it has told."""
+
+    def __init__(self, address: Address, find_s: float | None = None) -> None:
+        self.view = VehicleView()
+        self.address = address
+        self.on_received: Seen | None = None
+        self.on_sent: Seen | None = None
+        self.on_truth: Seen | None = None
+        self._truth: UdpSocket | None = None
+        self._find_s = FIND_S if find_s is None else find_s
+        self._connection = Connection()
+        if address.signing_key is not None:
+            self._connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
+        self._socket = open_address(address)
+
+    @property
+    def target(self) -> Target:
+        """The vehicle; `find` must have been called."""
+        if self._connection.target is None:
+            raise NoVehicleError("no vehicle was looked for")
+        return self._connection.target
+
+    def listen_to_truth(self) -> bool:
+        """Hear the simulated world too, as far as nobody else listens to it; False if somebody does."""
+        try:
+            self._truth = UdpSocket(LOOPBACK, TRUTH_PORT)
+        except GcsError:
+            return False
+        return True
+
+    def find(self) -> Target:
+        """Wait for the vehicle's heartbeat."""
+        self.watch(lambda: self.view.armed is not None, self._find_s, "waiting for the vehicle")
+        if self._connection.target is None or self.view.armed is None:
+            other = 14540 if self.address.port != 14540 else 14550
+            raise NoVehicleError(
+                f"no vehicle heard on UDP {self.address} within {self._find_s:g} s; is autopilot running "
+                f"and sending there? (other addresses: --connect {other} or --connect HOST:PORT)"
+            )
+        return self._connection.target
+
+    def watch(
+        self,
+        done: Callable[[], bool],
+        seconds: float | None,
+        label: str = "",
+        operation: Operation | None = None,
+    ) -> bool:
+        """Listen until `done` or the time (None: any time) is over; True if done."""
+        until_us = None if seconds is None else monotonic_us() + round(seconds * 1e6)
+        with StepDisplay(label) as display:
+            while not done():
+                now_us = monotonic_us()
+                if until_us is not None and now_us >= until_us:
+                    return False
+                for datagram in self._connection.poll(now_us):
+                    self._send(datagram, now_us)
+                if operation is not None:
+                    for message in operation.poll(now_us):
+                        self._send(self._connection.frame(message), now_us)
+                if label:
+                    display.update(*(operation.progress if operation else (0, 0)))
+                if not done():
+                    wait([self._socket], _TICK_S)
+                    self._receive(monotonic_us(), operation)
+        return True
+
+    def run(self, operation: Operation, label: str = "") -> Result:
+        """Bring one operation to its end: NoVehicleError if nobody answers, RefusedError if it is a no."""
+        texts_before = len(self.view.texts)
+        self.watch(
+            lambda: operation.result is not None or self._connection.lost(monotonic_us()),
+            None,
+            label,
+            operation,
+        )
+        result = operation.result
+        if result is None:
+            raise NoVehicleError(f"{label or 'the exchange'}: the vehicle fell silent")
+        if result.status is Status.UNANSWERED:
+            raise NoVehicleError(result.text)
+        if result.status is Status.REFUSED:
+            self.watch(lambda: False, REASON_S)
+            raise RefusedError("; ".join([result.text, *self.view.complaints_since(texts_before)]))
+        return result
+
+    def request(self, message_id: int) -> Any:
+        """The newest message of that id, asked for if the vehicle has not sent it by itself."""
+        name = mavlink.mavlink_map[message_id].msgname
+        if name not in self.view.latest:
+            self.run(command.request_message(self.target, message_id))
+            if not self.watch(lambda: name in self.view.latest, REASON_S):
+                raise GcsError(f"the vehicle accepted the request of {name} but did not send it")
+        return self.view.latest[name]
+
+    def _send(self, datagram: bytes, now_us: int) -> None:
+        self._socket.send(datagram)
+        if self.on_sent is not None:
+            self.on_sent(datagram, now_us)
+
+    def _receive(self, now_us: int, operation: Operation | None) -> None:
+        for datagram in self._truth.drain() if self._truth else ():
+            if self.on_truth is not None:
+                self.on_truth(datagram, now_us)
+            for one in messages(datagram)[0]:
+                self.view.update_truth(one.message)
+        for datagram in self._socket.drain():
+            if self.on_received is not None:
+                self.on_received(datagram, now_us)
+            for one in self._connection.receive(datagram, now_us):
+                message = one.message
+                is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
+                if is_heartbeat and one.component != self.target.component:
+                    continue
+                self.view.update(message, now_us)
+                if operation is not None:
+                    operation.receive(message, now_us)
+
+    def close(self) -> None:
+        self._socket.close()
+        if self._truth is not None:
+            self._truth.close()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,39 @@
+"""Ctrl-C: the first asks to stop in order, the second abandons what is still being done."""
+
+from __future__ import annotations
+
+import signal
+from types import FrameType, TracebackType
+
+from gcs.shell.display import say
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class StopRequest:
+    """True once somebody asked to stop. In force within its `with` block."""
+
+    def __init__(self, hint: str) -> None:
+        self._hint = hint
+        self._asked = False
+        self._before: dict[signal.Signals, object] = {}
+
+    def __bool__(self) -> bool:
+        return self._asked
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self._asked:
+            raise KeyboardInterrupt
+        self._asked = True
+        say(self._hint)
+
+    def __enter__(self) -> StopRequest:
+        for number in _SIGNALS:
+            self._before[number] = signal.signal(number, self._handle)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]

@@ -1,0 +1,52 @@
+"""Telemetry of a running vehicle into a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from autopilot.wire.tlog import TlogWriter
+from gcs.clients import command
+from gcs.clients.capture import Capture
+from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
+from gcs.errors import GcsError, RefusedError
+from gcs.shell.display import say
+from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, monotonic_us, unix_us
+from gcs.shell.session import Session
+from gcs.shell.stopping import StopRequest
+
+
+def capture_to(path: Path, address: Address, duration_s: float | None) -> int:
+    """Write what is said until `duration_s` is over or somebody asks to stop; returns how many messages."""
+    with Session(address) as session, StopRequest("stopping") as stop:
+        if not session.listen_to_truth():
+            say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the log will have no truth of the simulator")
+        target = session.find()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = path.open("wb")
+        except OSError as error:
+            raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
+        with file:
+            capture = Capture(TlogWriter(file), unix_us() - monotonic_us())
+
+            def received(datagram: bytes, now_us: int) -> None:
+                capture.on_vehicle(datagram)
+                capture.flush(now_us)
+
+            def sent(datagram: bytes, now_us: int) -> None:
+                capture.on_sent(datagram)
+
+            def truth(datagram: bytes, now_us: int) -> None:
+                capture.on_truth(datagram)
+
+            session.on_truth = truth
+            session.on_received = received
+            session.on_sent = sent
+            for message_id in REPORT_MESSAGES:
+                try:
+                    session.run(command.message_interval(target, message_id, REPORT_INTERVAL_US))
+                except RefusedError as error:
+                    say(str(error))
+            session.watch(lambda: bool(stop), duration_s, "capturing")
+            capture.flush(monotonic_us())
+        return capture.records

@@ -1,0 +1,53 @@
+"""Missions as the commands take them: loaded, and checked against the vehicle that is to fly them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
+from autopilot.wire.convert import Home
+from autopilot.wire.mission_items import WireItem, decode_items
+from gcs.errors import GcsError
+from gcs.workflows.vehicle_limits import load_limits
+from missions.fileformat import MissionFileError, load_mission
+from missions.model import Mission
+
+
+def load(name_or_path: str) -> Mission:
+    """The mission; GcsError says what is wrong with it."""
+    try:
+        return load_mission(name_or_path)
+    except MissionFileError as error:
+        raise GcsError(str(error)) from None
+
+
+def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
+    """What the vehicle cannot do of it; with paths `shaped` by the autopilot or as they are asked."""
+    return check(mission, load_limits(vehicle), shaped)
+
+
+def path_reports(mission: Mission, vehicle: str) -> list[PathReport]:
+    """How the vehicle flies it, its paths shaped by the autopilot."""
+    return paths(mission, load_limits(vehicle))
+
+
+def load_checked(name_or_path: str, vehicle: str, force: bool, shaped: bool = True) -> Mission:
+    """The mission, which the vehicle can fly unless `force` says that it need not."""
+    mission = load(name_or_path)
+    if force:
+        return mission
+    _refuse(mission, vehicle, shaped)
+    return mission
+
+
+def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
+    """GcsError unless the vehicle can fly what the items stand for."""
+    steps = decode_items(items, home)
+    _refuse(Mission(name, name, "", (), steps), vehicle, True)
+
+
+def _refuse(mission: Mission, vehicle: str, shaped: bool) -> None:
+    found = violations(mission, vehicle, shaped)
+    if found:
+        listed = "; ".join(map(str, found))
+        raise GcsError(f"{mission.name} cannot be flown by vehicle {vehicle}: {listed}; --force tries")
