@@ -37,8 +37,9 @@ from autopilot.control.actuators.lag_compensation import lag_gain
 from autopilot.control.actuators.rotor_model import Actuation, actuation_constants, advance
 from autopilot.control.command_filter import FilterState
 from autopilot.control.design import Timing, Wanted, design
-from autopilot.control.laws import plumbline, thesis
-from autopilot.control.laws.plumbline_tick import PlumblineConstants, load_position_tick
+from autopilot.control import plumbline_cascade as plumbline
+from autopilot.control import thesis_cascade as thesis
+from autopilot.control.laws.plumbline import PlumblineConstants, load_position_tick
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Reference, State, Vehicle

@@ -17,7 +17,8 @@ Case B, B extended and C, without limits or lag (thesis) and with those of the v
 
 * largest load error, part of the time with a rotor command beyond its limits, or when the flight was lost.
 
-The row marked `flies` is what autopilot/control/laws/thesis.py does; the script flies that too and compares.
+The row marked `flies` is what autopilot/control/thesis_cascade.py does; the script flies that too and
+compares.
 
     python benchmarks/thesis_assumptions.py [--step 0.79 ...] [--hz 250 1000]
 """
@@ -34,7 +35,7 @@ from numpy.typing import NDArray
 
 from autopilot.control.actuators.mixer import mix
 from autopilot.control.command_filter import filter_acceleration, filter_step
-from autopilot.control.laws import thesis
+from autopilot.control import thesis_cascade as thesis
 from autopilot.control.load_attitude import (
     DirectionCommand,
     load_attitude_force,

@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
-from autopilot.control.laws.plumbline import PlumblineGains
+from autopilot.control.plumbline_cascade import PlumblineGains
 from autopilot.control.records import Vehicle
 
 Array = NDArray[np.float64]

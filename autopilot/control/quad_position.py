@@ -17,7 +17,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.control.laws.thesis import (
+from autopilot.control.load_attitude import thrust_along
+from autopilot.control.records import Command, Reference, State, Vehicle
+from autopilot.control.thesis_cascade import (
     ThesisFilters,
     ThesisGains,
     ThesisMemory,
@@ -25,8 +27,6 @@ from autopilot.control.laws.thesis import (
     quad_attitude,
     with_errors,
 )
-from autopilot.control.load_attitude import thrust_along
-from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, norm, scale, sub, times
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3
+from autopilot.geometry.packed import with_field
 
 # Position and its first to sixth time derivatives, world frame: m, m/s, ... m/s^6
 Jet = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
@@ -26,6 +28,14 @@ class Vehicle(NamedTuple):
     torque_ratio: float  # c = d/b, m: drag torque for each newton of thrust
     rotor_min: float  # N, one rotor
     rotor_max: float  # N, one rotor; inf if unlimited
+
+
+class Cable(NamedTuple):
+    """The cable at this tick, as the winch has it."""
+
+    length: float  # L, m, from vehicle to load; infinite where nothing ties the load to the vehicle
+    rate: float = 0.0  # L', m/s
+    accel: float = 0.0  # L'', m/s^2
 
 
 class State(NamedTuple):
@@ -65,3 +75,9 @@ class Command(NamedTuple):
     psi_q: float  # (3-8), 0 ... 2
     q_c: Vec3  # the cable direction asked for: computed (3-42) or desired
     R_c: Mat3  # the attitude asked for: computed (3-27) or desired
+
+
+@kernel
+def with_length(vehicle: Vehicle, length: float) -> Vehicle:
+    """The vehicle with a cable of this length (m)."""
+    return with_field(vehicle, "cable_length", length)

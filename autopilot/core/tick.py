@@ -12,7 +12,7 @@ from autopilot.control.actuators.rotor_model import Actuation, ActuationConstant
 from autopilot.control.actuators.rotor_model import advance as actuate
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
 from autopilot.control.laws.interface import Law, Memory
-from autopilot.control.laws.thesis import attitude_towards
+from autopilot.control.thesis_cascade import attitude_towards
 from autopilot.control.load_motion import Drag, air_force
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.core.scheduler import is_due

@@ -15,9 +15,10 @@ from autopilot.control.actuators.disturbance_observer import Observed, ObserverC
 from autopilot.control.actuators.mixer import MixerResult, mix
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.actuators.rotor_model import advance as actuate
-from autopilot.control.laws import lqr, thesis
+from autopilot.control import lqr
+from autopilot.control import thesis_cascade as thesis
 from autopilot.control.laws.interface import Law, LqrLaw, Memory, PlumblineLaw, PlumblineMemory, ThesisLaw
-from autopilot.control.laws.plumbline_tick import SlackConstants, load_position_tick, quad_position_tick
+from autopilot.control.laws.plumbline import SlackConstants, load_position_tick, quad_position_tick
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Command, Reference, State, Vehicle
 from autopilot.geometry.kernel import kernel

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from autopilot.control import load_attitude, quad_attitude, quad_position
-from autopilot.control.laws import thesis
+from autopilot.control import thesis_cascade as thesis
 from autopilot.control.records import Command, Reference, Vehicle
 from autopilot.trajectory.flatness import flat_outputs
 

@@ -24,7 +24,7 @@ from autopilot.control.actuators import predictor as prediction
 from autopilot.control.actuators import rotor_model as actuation
 from autopilot.control.actuators.mixer import mix
 from autopilot.control.actuators.rotor_model import actuation_constants
-from autopilot.control.laws import plumbline
+from autopilot.control import plumbline_cascade as plumbline
 from autopilot.control.laws.interface import PlumblineLaw, build_law
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment

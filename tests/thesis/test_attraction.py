@@ -20,7 +20,7 @@ import pytest
 from numpy.typing import NDArray
 
 from autopilot.control.command_filter import filter_start
-from autopilot.control.laws import thesis
+from autopilot.control import thesis_cascade as thesis
 from autopilot.control.load_attitude import (
     DirectionCommand,
     load_attitude_force,

@@ -75,14 +75,19 @@ def actuation_constants(delay: float, lag: float, period: float) -> ActuationCon
     )
 
 
-def resting() -> Actuation:
+def rows_of(constants: ActuationConstants) -> int:
+    """How many commands the delay makes one remember."""
+    return constants.whole + 2
+
+
+def resting(rows: int = ROWS) -> Actuation:
     """Rotors that stand still, and no command on its way."""
-    return Actuation(np.zeros((ROWS, 4)), 0.0, ZERO)
+    return Actuation(np.zeros((rows, 4)), 0.0, ZERO)
 
 
-def steady(thrust: float) -> Actuation:
+def steady(thrust: float, rows: int = ROWS) -> Actuation:
     """Rotors that have been asked for this thrust (N) for long."""
-    queue = np.zeros((ROWS, 4))
+    queue = np.zeros((rows, 4))
     queue[:, 0] = thrust
     return Actuation(queue, thrust, ZERO)
 

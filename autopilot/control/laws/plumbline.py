@@ -1,363 +1,250 @@
-"""The law `plumbline`: the cascade of the thesis with exact derivatives in place of its command filters.
+"""The law `plumbline`: every mode at the state at which its command will find the vehicle, with rotors
+hastened by their lag.
 
-    x_d .. x_d'''' --> A, A', A'' (3-43) -> q_c, q_c', q_c'' (3-42) -> F (3-31) -> R_c (3-27) -+-> M (3-36),
-    the same a moment before and after, along the motion of the model --> F', F'' --------------+   f (3-35)
+state, commands on their way -> state at the instant the command is in force -> law -> lag inverted -> command
 
-| symbol         | code name     | value    | unit       | equation |
-|----------------|---------------|----------|------------|----------|
-| k_R, k_Omega   | k_R, k_Omega  | `design` | N m, N m s | (3-21)   |
-| k_q, k_w       | k_q, k_omega  | `design` | N, N s     | (3-33)   |
-| k_x, k_v       | k_x, k_v      | `design` | N/m, N s/m | (3-43)   |
-| e_i, k_i       | integral, k_i | `design` | m s, N/m/s | e_i' = e_x |
-| F              | F             |          | N          | (3-31)   |
-| f, f'          | thrust, thrust_rate |    | N, N/s     | (3-35)   |
-| D              | air           | `PLB_DRAG`, `PLB_DRAG_2` | N | drag and wind on the vehicle |
-
-What the thesis filters is computed here:
-
-* e_x, e_v and all that follows are taken from the reference itself, with its derivatives up to the sixth.
-* q_c' and q_c'' are those of (3-42) along the motion of the model under the thrust that the rotors give now
-  (`load_motion`, `direction_jet`), feedback and all.
-* F' and F'' are differences of F along the motion of the model, under the thrust and moment that the rotors
-  give now, whose own second derivative is left out: on the path F hardly depends on it. Near hover F depends
-  on load and cable alone, F' on the attitude, F'' on the body rate besides: so the poles are those of the
-  three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
-* The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
-  count.
-* f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
-
-Memory comes in and goes out. `thrust` of `load_position` is what the rotors give at this instant, which the
-caller knows better than the law: `autopilot.control.actuators.rotor_model`.
+Load position is flown with exact derivatives (`autopilot.control.plumbline_cascade`). The other modes,
+which are flown for moments only, are the loops of the thesis's cascade with its filters and the gains of
+the design.
 """
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import NamedTuple
 
-from autopilot.control.direction_jet import PositionJet, direction_jet, held_up, position_jet
-from autopilot.control.laws.thesis import attitude_towards
-from autopilot.control.load_attitude import (
-    DirectionCommand,
-    DirectionResult,
-    load_attitude_force,
-    normal_force_tracking,
-    thrust_along,
-)
-from autopilot.control.load_motion import Drag, LoadMotion, air_force, load_motion
-from autopilot.control.quad_attitude import AttitudeCommand, attitude_from_axes, attitude_moment
-from autopilot.control.records import Command, Jet, Reference, State, Vehicle
+from autopilot.control import plumbline_cascade as cascade
+from autopilot.control import quad_position as position_law
+from autopilot.control.actuators.disturbance_observer import Observed, loaded, lying, standing
+from autopilot.control.actuators.lag_compensation import hasten, lag_gain
+from autopilot.control.actuators.predictor import Ahead, predict, stay
+from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
+from autopilot.control.believed import believed_actuation, believed_design, believed_drag
+from autopilot.control.laws import thesis
+from autopilot.control.laws.interface import Kernels, Law
+from autopilot.control.load_motion import Drag
+from autopilot.control.records import Cable, Command, Reference, State, Vehicle, with_length
+from autopilot.control.thesis_cascade import ThesisMemory
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import (
-    Vec3,
-    add,
-    add3,
-    apply,
-    axpy,
-    column,
-    cross,
-    dot,
-    mul,
-    norm,
-    scale,
-    sub,
-    times,
-)
-from autopilot.geometry.s2 import normalise, tangent, unit_derivatives
-from autopilot.geometry.so3 import exp
-
-STEP = 2e-3  # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
-
-GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask for
-
-# N; a shorter force has no direction to follow, and a load falling freely no cable direction
-_LEAST_FORCE = 1e-3
-# sine of the least angle between heading and thrust axis at which R_c is differentiated
-_LEAST_SINE = 1e-2
-# tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
-_GREATEST_LEAN = 2.7
-_LEAST_LIFT = 0.2
-# of the pull along the cable: what errors may exert across it at most, besides what the reference asks for
-_GREATEST_ACROSS = 0.7
-_GREATEST_RATE = 15.0  # rad/s
-_FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
+from autopilot.geometry.linear import Mat3, Vec3
+from autopilot.geometry.packed import Row, with_field
+from autopilot.wire.parameter_table import ParameterTable
 
 
-class PlumblineGains(NamedTuple):
-    """Vectors are diagonals: of the body frame for k_R, k_Omega, of the world for k_x, k_v."""
+class PlumblineConstants(NamedTuple):
+    """Everything derived from parameters that load position uses."""
 
-    k_R: Vec3  # N m
-    k_Omega: Vec3  # N m s
-    k_q: float  # N
-    k_omega: float  # N s
-    k_x: Vec3  # N/m
-    k_v: Vec3  # N s/m
-    k_i: Vec3  # N/m/s
+    gains: cascade.PlumblineGains
+    drag: Drag
+    actuation: ActuationConstants
+    lag_gain: float
+    period: float  # s
+    vehicle: Vehicle
+
+
+class PlumblineLaw(NamedTuple):
+    """The law for one length of the cable."""
+
+    constants: PlumblineConstants
+    other_modes: thesis.ThesisLaw
+    preview_s: float
 
 
 class PlumblineMemory(NamedTuple):
-    """All that load position remembers from one tick to the next."""
+    """What the law remembers: of load position, and of the other modes."""
 
-    thrust_rate: float  # f', N/s
-    integral: Vec3  # e_i, of e_x, m s
-
-
-class WantedForce(NamedTuple):
-    """The force that the vehicle should exert, and what it is made from."""
-
-    F: Vec3  # N, world
-    position: PositionJet
-    direction: DirectionResult
-    q_c: DirectionCommand
+    position: cascade.PlumblineMemory
+    other_modes: ThesisMemory
 
 
-PLUMBLINE_GAINS = PlumblineGains(
-    k_R=(0.9, 0.9, 0.9),
-    k_Omega=(0.1, 0.1, 0.1),
-    k_q=3.9,
-    k_omega=2.0,
-    k_x=(6.0, 6.0, 6.0),
-    k_v=(2.75, 2.75, 2.75),
-    k_i=(0.0, 0.0, 0.0),
-)
+class PlumblineRows(NamedTuple):
+    """The law, packed."""
+
+    constants: Row
+    memory: Row
 
 
-@kernel
-def start() -> PlumblineMemory:
-    """Memory of a law that begins now: the thrust is taken for steady."""
-    return PlumblineMemory(0.0, (0.0, 0.0, 0.0))
-
-
-@kernel
-def gently(v: Vec3, greatest: float) -> Vec3:
-    """v, never longer than `greatest`: smooth, and 0.2 % shorter than v where v is 0.3 times that."""
-    share = dot(v, v) / max(greatest * greatest, _LEAST_FORCE * _LEAST_FORCE)
-    return scale(1.0 / sqrt(sqrt(1.0 + share * share)), v)
-
-
-@kernel
-def no_longer(v: Vec3, greatest: float) -> Vec3:
-    """v, shortened to `greatest` where it is longer."""
-    n = norm(v)
-    return v if n <= greatest else scale(greatest / n, v)
-
-
-@kernel
-def commanded_attitude(
-    F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: State, vehicle: Vehicle
-) -> AttitudeCommand:
-    """R_c of (3-27) with Omega_c, Omega_c', no faster than the rotors can turn the vehicle.
-
-    Without the rates where F vanishes, lies along the heading or is more level than the vehicle may lean.
-    """
-    zero: Vec3 = (0.0, 0.0, 0.0)
-    sideways = norm((F[0], F[1], 0.0))
-    upward = max(F[2], _LEAST_LIFT * vehicle.quad_mass * vehicle.gravity)
-    if sideways > _GREATEST_LEAN * upward:
-        shrink = _GREATEST_LEAN * upward / sideways
-        return AttitudeCommand(
-            attitude_towards((shrink * F[0], shrink * F[1], upward), b1_d, state.R), zero, zero
+def build(table: ParameterTable, vehicle: Vehicle) -> PlumblineLaw:
+    """From the PLB_ and VEH_ parameters; the other modes from NGC_ and QP_."""
+    period = 1.0 / table["CTL_RATE_HZ"]
+    lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
+    gains = believed_design(table, vehicle).gains
+    constants = PlumblineConstants(
+        gains,
+        believed_drag(table),
+        believed_actuation(table),
+        lag_gain(lag, shown, period),
+        period,
+        vehicle,
+    )
+    others = thesis.build(table, vehicle)
+    others = others._replace(
+        gains=others.gains._replace(
+            k_R=gains.k_R, k_Omega=gains.k_Omega, k_q=gains.k_q, k_omega=gains.k_omega, epsilon=1.0
         )
-    n = norm(F)
-    if n < _LEAST_FORCE or norm(cross(F, b1_d)) < _LEAST_SINE * n:
-        return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
-    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, zero, zero)
-    J = max(vehicle.inertia[0], vehicle.inertia[1])
-    return AttitudeCommand(
-        attitude.R_c,
-        no_longer(attitude.Omega_c, _GREATEST_RATE),
-        no_longer(attitude.Omega_c_dot, vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J),
     )
+    return PlumblineLaw(constants, others, 1e-3 * table["VEH_ACT_DELAY"])
 
 
 @kernel
-def shifted_jet(jet: Jet, h: float) -> Jet:
-    """The reference h seconds later, as far as its six derivatives say."""
-    h2, h3, h4 = 0.5 * h * h, h * h * h / 6.0, h * h * h * h / 24.0
-    x, v, a, j, s, c, p = jet
-    return (
-        add(add3(x, scale(h, v), scale(h2, a)), add(scale(h3, j), scale(h4, s))),
-        add(add3(v, scale(h, a), scale(h2, j)), add(scale(h3, s), scale(h4, c))),
-        add(add3(a, scale(h, j), scale(h2, s)), add(scale(h3, c), scale(h4, p))),
-        add(add3(j, scale(h, s), scale(h2, c)), scale(h3, p)),
-        add3(s, scale(h, c), scale(h2, p)),
-        axpy(h, p, c),
-        p,
-    )
+def with_cable(law: PlumblineLaw, cable: Cable) -> PlumblineLaw:
+    """The law for the present cable: the loops about it as fast as they were."""
+    c = law.constants
+    longer = cable.length / c.vehicle.cable_length
+    gains = with_field(c.gains, "k_q", longer * c.gains.k_q)
+    gains = with_field(gains, "k_omega", longer * c.gains.k_omega)
+    constants = with_field(with_field(c, "gains", gains), "vehicle", with_length(c.vehicle, cable.length))
+    return PlumblineLaw(constants, thesis.with_cable(law.other_modes, cable), law.preview_s)
 
 
 @kernel
-def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, vehicle: Vehicle) -> State:
-    """The state h seconds later along the motion of the model; `turning` is Omega', rad/s^2, body."""
-    h2 = 0.5 * h * h
-    q = normalise(add3(state.q_cable, scale(h, state.q_cable_dot), scale(h2, motion.q_ddot)))
-    q_dot = add3(state.q_cable_dot, scale(h, motion.q_ddot), scale(h2, motion.q_dddot))
-    x = add3(state.x_load, scale(h, state.v_load), scale(h2, motion.a_load))
-    v = add3(state.v_load, scale(h, motion.a_load), scale(h2, motion.j_load))
-    L = vehicle.cable_length
-    return State(
-        x,
-        v,
-        q,
-        q_dot,
-        add(state.x_quad, sub(sub(x, state.x_load), scale(L, sub(q, state.q_cable)))),
-        add(state.v_quad, sub(sub(v, state.v_load), scale(L, sub(q_dot, state.q_cable_dot)))),
-        mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, turning)))),
-        axpy(h, turning, state.omega_body),
-        state.a_quad,
-    )
-
-
-@kernel
-def flat_across(q_cable: Vec3, jet: Jet, vehicle: Vehicle) -> Vec3:
-    """What the reference itself exerts across the cable, N: -m_Q L q_d'', at most the weight."""
-    mass = vehicle.quad_mass + vehicle.load_mass
-    # q_d = -lift / |lift|
-    lift, jerk, snap = held_up(
-        (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity), jet[3], jet[4], vehicle.gravity
-    )
-    _, _, u_ddot = unit_derivatives(lift, jerk, snap)
-    reach = vehicle.quad_mass * vehicle.cable_length
-    return gently(scale(reach, tangent(q_cable, u_ddot)), mass * vehicle.gravity)
-
-
-@kernel
-def wanted_force(
+def ahead_of(
     state: State,
-    motion: LoadMotion,
-    air: Vec3,
-    jet: Jet,
-    e_i: Vec3,
-    gains: PlumblineGains,
-    vehicle: Vehicle,
-) -> WantedForce:
-    """F of (3-31), drag and wind made up for, and what it is made from."""
-    position = position_jet(state, motion, jet, e_i, gains.k_i, gains.k_x, gains.k_v, vehicle)
-    q_c = direction_jet(position, state)
-    direction = load_attitude_force(
-        state.q_cable,
-        state.q_cable_dot,
-        q_c,
-        normal_force_tracking(state.q_cable, position.A),
-        gains.k_q,
-        gains.k_omega,
-        vehicle.quad_mass,
-        vehicle.cable_length,
+    taut: float,
+    actuation: Actuation,
+    observed: Observed,
+    constants: PlumblineConstants,
+) -> Ahead:
+    """State and rotors at the instant at which the command of this tick comes into force."""
+    if standing(observed, constants.vehicle):
+        return stay(state, actuation, constants.actuation)
+    return predict(
+        state,
+        taut,
+        actuation,
+        constants.actuation,
+        constants.period,
+        observed.push,
+        constants.drag,
+        loaded(constants.vehicle, observed.load_mass),
     )
-    along = dot(state.q_cable, direction.F)
-    pull = scale(along, state.q_cable)
-    asked = flat_across(state.q_cable, jet, vehicle)
-    across = gently(sub(sub(direction.F, pull), asked), _GREATEST_ACROSS * norm(position.A))
-    return WantedForce(sub(add3(pull, asked, across), air), position, direction, q_c)
 
 
 @kernel
-def force_beside(
-    state: State,
-    motion: LoadMotion,
-    turning: Vec3,
-    f: float,
-    f_dot: float,
-    jet: Jet,
-    e_i: Vec3,
-    h: float,
-    gains: PlumblineGains,
-    drag: Drag,
-    push: Vec3,
-    vehicle: Vehicle,
-) -> Vec3:
-    """F, N, as it will be h seconds later, while the thrust f (N) changes by f' (N/s)."""
-    then = shifted_state(state, motion, turning, h, vehicle)
-    air = add(air_force(then.v_quad, drag), push)
-    moved = load_motion(then, f + h * f_dot, f_dot, air, vehicle)
-    e_x, e_v = sub(state.x_load, jet[0]), sub(state.v_load, jet[1])
-    summed = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
-    return wanted_force(then, moved, air, shifted_jet(jet, h), summed, gains, vehicle).F
+def hastened(wanted: Command, ahead: Ahead, constants: PlumblineConstants) -> Command:
+    """The command that makes the rotors give what is wanted as fast as they shall."""
+    thrust, moment = hasten(ahead.thrust, ahead.moment, wanted.thrust, wanted.moment, constants.lag_gain)
+    return with_field(with_field(wanted, "thrust", thrust), "moment", moment)
+
+
+@kernel
+def start(law: PlumblineLaw, state: State, x_d: Vec3, v_d: Vec3) -> PlumblineMemory:
+    """Memory of a law that begins now: the thrust is taken for steady."""
+    return PlumblineMemory(cascade.start(), thesis.start(law.other_modes, state, x_d, v_d))
 
 
 @kernel
 def load_position(
+    law: PlumblineLaw,
     memory: PlumblineMemory,
     state: State,
     reference: Reference,
-    thrust: float,
-    moment: Vec3,
-    gains: PlumblineGains,
-    drag: Drag,
-    push: Vec3,
-    period: float,
-    vehicle: Vehicle,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
 ) -> tuple[PlumblineMemory, Command]:
-    """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
-
-    `thrust`, N, and `moment`, N m: what the rotors give at this instant; `push`, N, world: what the air does
-    to the vehicle besides drag in still air; `period`, s, is that of the law.
-    """
-    jet = reference.jet
-    air = add(air_force(state.v_quad, drag), push)
-    motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
-    wanted = wanted_force(state, motion, air, jet, memory.integral, gains, vehicle)
-    F, position, direction = wanted.F, wanted.position, wanted.direction
-
-    J, W = vehicle.inertia, state.omega_body
-    torque = sub(moment, cross(W, times(J, W)))
-    turning: Vec3 = (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
-    F_after = force_beside(
-        state,
-        motion,
-        turning,
+    """The load follows a reference, which is that of the instant at which the command comes into force."""
+    constants = with_cable(law, cable).constants
+    position = memory.position
+    ahead = ahead_of(state, 1.0, actuation, observed, constants)
+    then, thrust = ahead.state, ahead.thrust
+    if lying(observed, state):
+        # the ground gives what the rotors do not yet
+        vehicle = constants.vehicle
+        thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
+        position = cascade.PlumblineMemory(0.0, position.integral)
+        then = with_field(with_field(then, "x_load", state.x_load), "v_load", state.v_load)
+    position, wanted = cascade.load_position(
+        position,
+        then,
+        reference,
         thrust,
-        memory.thrust_rate,
-        jet,
-        memory.integral,
-        STEP,
-        gains,
-        drag,
-        push,
-        vehicle,
+        ahead.moment,
+        constants.gains,
+        constants.drag,
+        observed.push,
+        constants.period,
+        loaded(constants.vehicle, observed.load_mass),
     )
-    F_before = force_beside(
-        state,
-        motion,
-        turning,
-        thrust,
-        memory.thrust_rate,
-        jet,
-        memory.integral,
-        -STEP,
-        gains,
-        drag,
-        push,
-        vehicle,
-    )
-    F_dot = scale(0.5 / STEP, sub(F_after, F_before))
-    F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
+    return PlumblineMemory(position, memory.other_modes), hastened(wanted, ahead, constants)
 
-    attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state, vehicle)
-    result = attitude_moment(
-        state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
+
+@kernel
+def quad_position(
+    law: PlumblineLaw,
+    memory: PlumblineMemory,
+    state: State,
+    reference: Reference,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[PlumblineMemory, Command]:
+    """The vehicle follows a reference, nothing hanging on it."""
+    now = with_cable(law, cable)
+    constants, others = now.constants, now.other_modes
+    ahead = ahead_of(state, 0.0, actuation, observed, constants)
+    other, wanted = position_law.quad_position(
+        memory.other_modes,
+        ahead.state,
+        reference,
+        0.0,
+        observed.push,
+        others.position_gains,
+        others.gains,
+        others.filters,
+        constants.vehicle,
     )
-    b3 = column(state.R, 2)
-    b3_dot = cross(apply(state.R, state.omega_body), b3)
-    command = Command(
-        thrust_along(F, state.R),
-        result.moment,
-        position.e_x,
-        position.e_v,
-        direction.e_q,
-        direction.e_q_dot,
-        result.e_R,
-        result.e_Omega,
-        result.psi_R,
-        direction.psi_q,
-        wanted.q_c.q_c,
-        attitude.R_c,
+    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, constants)
+
+
+@kernel
+def load_attitude(
+    law: PlumblineLaw,
+    memory: PlumblineMemory,
+    state: State,
+    q_d: Vec3,
+    b1_d: Vec3,
+    pull: float,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[PlumblineMemory, Command]:
+    """The cable's direction follows q_d under a given pull (N)."""
+    constants = with_cable(law, cable).constants
+    ahead = ahead_of(state, 1.0, actuation, observed, constants)
+    other, wanted = thesis.load_attitude(
+        law.other_modes, memory.other_modes, ahead.state, q_d, b1_d, pull, actuation, observed, cable
     )
-    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
-    integral = axpy(period, position.e_x, memory.integral)
-    held = norm(times(gains.k_i, integral))
-    if held > GREATEST_HELD * weight:
-        integral = scale(GREATEST_HELD * weight / held, integral)
-    fastest = 4.0 * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
-    thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
-    return PlumblineMemory(thrust_rate, integral), command
+    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, constants)
+
+
+@kernel
+def quad_attitude(
+    law: PlumblineLaw,
+    memory: PlumblineMemory,
+    state: State,
+    R_d: Mat3,
+    thrust: float,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[PlumblineMemory, Command]:
+    """The vehicle's attitude follows R_d under a given thrust (N)."""
+    constants = with_cable(law, cable).constants
+    ahead = ahead_of(state, 1.0, actuation, observed, constants)
+    other, wanted = thesis.quad_attitude(
+        law.other_modes, memory.other_modes, ahead.state, R_d, thrust, actuation, observed, cable
+    )
+    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, constants)
+
+
+LAW = Law(
+    name="plumbline",
+    number=2,
+    constants=PlumblineLaw,
+    memory=PlumblineMemory,
+    rows=PlumblineRows,
+    build=build,
+    kernels=Kernels(start, load_position, quad_position, load_attitude, quad_attitude),
+    preview_s=lambda law: law.preview_s,
+    follows_shaped=True,
+)

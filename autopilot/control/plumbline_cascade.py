@@ -1,0 +1,363 @@
+"""The law `plumbline`: the cascade of the thesis with exact derivatives in place of its command filters.
+
+    x_d .. x_d'''' --> A, A', A'' (3-43) -> q_c, q_c', q_c'' (3-42) -> F (3-31) -> R_c (3-27) -+-> M (3-36),
+    the same a moment before and after, along the motion of the model --> F', F'' --------------+   f (3-35)
+
+| symbol         | code name     | value    | unit       | equation |
+|----------------|---------------|----------|------------|----------|
+| k_R, k_Omega   | k_R, k_Omega  | `design` | N m, N m s | (3-21)   |
+| k_q, k_w       | k_q, k_omega  | `design` | N, N s     | (3-33)   |
+| k_x, k_v       | k_x, k_v      | `design` | N/m, N s/m | (3-43)   |
+| e_i, k_i       | integral, k_i | `design` | m s, N/m/s | e_i' = e_x |
+| F              | F             |          | N          | (3-31)   |
+| f, f'          | thrust, thrust_rate |    | N, N/s     | (3-35)   |
+| D              | air           | `PLB_DRAG`, `PLB_DRAG_2` | N | drag and wind on the vehicle |
+
+What the thesis filters is computed here:
+
+* e_x, e_v and all that follows are taken from the reference itself, with its derivatives up to the sixth.
+* q_c' and q_c'' are those of (3-42) along the motion of the model under the thrust that the rotors give now
+  (`load_motion`, `direction_jet`), feedback and all.
+* F' and F'' are differences of F along the motion of the model, under the thrust and moment that the rotors
+  give now, whose own second derivative is left out: on the path F hardly depends on it. Near hover F depends
+  on load and cable alone, F' on the attitude, F'' on the body rate besides: so the poles are those of the
+  three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
+* The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
+  count.
+* f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
+
+Memory comes in and goes out. `thrust` of `load_position` is what the rotors give at this instant, which the
+caller knows better than the law: `autopilot.control.actuators.rotor_model`.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+from autopilot.control.direction_jet import PositionJet, direction_jet, held_up, position_jet
+from autopilot.control.load_attitude import (
+    DirectionCommand,
+    DirectionResult,
+    load_attitude_force,
+    normal_force_tracking,
+    thrust_along,
+)
+from autopilot.control.load_motion import Drag, LoadMotion, air_force, load_motion
+from autopilot.control.quad_attitude import AttitudeCommand, attitude_from_axes, attitude_moment
+from autopilot.control.records import Command, Jet, Reference, State, Vehicle
+from autopilot.control.thesis_cascade import attitude_towards
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import (
+    Vec3,
+    add,
+    add3,
+    apply,
+    axpy,
+    column,
+    cross,
+    dot,
+    mul,
+    norm,
+    scale,
+    sub,
+    times,
+)
+from autopilot.geometry.s2 import normalise, tangent, unit_derivatives
+from autopilot.geometry.so3 import exp
+
+STEP = 2e-3  # s, of the differences along the motion: truncation and rounding both below 1e-3 N/s^2
+
+GREATEST_HELD = 0.05  # of the weight: what the integral of the error may ask for
+
+# N; a shorter force has no direction to follow, and a load falling freely no cable direction
+_LEAST_FORCE = 1e-3
+# sine of the least angle between heading and thrust axis at which R_c is differentiated
+_LEAST_SINE = 1e-2
+# tangent of the greatest lean, 70 deg, and the least upward force, in weights of the vehicle
+_GREATEST_LEAN = 2.7
+_LEAST_LIFT = 0.2
+# of the pull along the cable: what errors may exert across it at most, besides what the reference asks for
+_GREATEST_ACROSS = 0.7
+_GREATEST_RATE = 15.0  # rad/s
+_FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
+
+
+class PlumblineGains(NamedTuple):
+    """Vectors are diagonals: of the body frame for k_R, k_Omega, of the world for k_x, k_v."""
+
+    k_R: Vec3  # N m
+    k_Omega: Vec3  # N m s
+    k_q: float  # N
+    k_omega: float  # N s
+    k_x: Vec3  # N/m
+    k_v: Vec3  # N s/m
+    k_i: Vec3  # N/m/s
+
+
+class PlumblineMemory(NamedTuple):
+    """All that load position remembers from one tick to the next."""
+
+    thrust_rate: float  # f', N/s
+    integral: Vec3  # e_i, of e_x, m s
+
+
+class WantedForce(NamedTuple):
+    """The force that the vehicle should exert, and what it is made from."""
+
+    F: Vec3  # N, world
+    position: PositionJet
+    direction: DirectionResult
+    q_c: DirectionCommand
+
+
+PLUMBLINE_GAINS = PlumblineGains(
+    k_R=(0.9, 0.9, 0.9),
+    k_Omega=(0.1, 0.1, 0.1),
+    k_q=3.9,
+    k_omega=2.0,
+    k_x=(6.0, 6.0, 6.0),
+    k_v=(2.75, 2.75, 2.75),
+    k_i=(0.0, 0.0, 0.0),
+)
+
+
+@kernel
+def start() -> PlumblineMemory:
+    """Memory of a law that begins now: the thrust is taken for steady."""
+    return PlumblineMemory(0.0, (0.0, 0.0, 0.0))
+
+
+@kernel
+def gently(v: Vec3, greatest: float) -> Vec3:
+    """v, never longer than `greatest`: smooth, and 0.2 % shorter than v where v is 0.3 times that."""
+    share = dot(v, v) / max(greatest * greatest, _LEAST_FORCE * _LEAST_FORCE)
+    return scale(1.0 / sqrt(sqrt(1.0 + share * share)), v)
+
+
+@kernel
+def no_longer(v: Vec3, greatest: float) -> Vec3:
+    """v, shortened to `greatest` where it is longer."""
+    n = norm(v)
+    return v if n <= greatest else scale(greatest / n, v)
+
+
+@kernel
+def commanded_attitude(
+    F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: State, vehicle: Vehicle
+) -> AttitudeCommand:
+    """R_c of (3-27) with Omega_c, Omega_c', no faster than the rotors can turn the vehicle.
+
+    Without the rates where F vanishes, lies along the heading or is more level than the vehicle may lean.
+    """
+    zero: Vec3 = (0.0, 0.0, 0.0)
+    sideways = norm((F[0], F[1], 0.0))
+    upward = max(F[2], _LEAST_LIFT * vehicle.quad_mass * vehicle.gravity)
+    if sideways > _GREATEST_LEAN * upward:
+        shrink = _GREATEST_LEAN * upward / sideways
+        return AttitudeCommand(
+            attitude_towards((shrink * F[0], shrink * F[1], upward), b1_d, state.R), zero, zero
+        )
+    n = norm(F)
+    if n < _LEAST_FORCE or norm(cross(F, b1_d)) < _LEAST_SINE * n:
+        return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
+    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, zero, zero)
+    J = max(vehicle.inertia[0], vehicle.inertia[1])
+    return AttitudeCommand(
+        attitude.R_c,
+        no_longer(attitude.Omega_c, _GREATEST_RATE),
+        no_longer(attitude.Omega_c_dot, vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J),
+    )
+
+
+@kernel
+def shifted_jet(jet: Jet, h: float) -> Jet:
+    """The reference h seconds later, as far as its six derivatives say."""
+    h2, h3, h4 = 0.5 * h * h, h * h * h / 6.0, h * h * h * h / 24.0
+    x, v, a, j, s, c, p = jet
+    return (
+        add(add3(x, scale(h, v), scale(h2, a)), add(scale(h3, j), scale(h4, s))),
+        add(add3(v, scale(h, a), scale(h2, j)), add(scale(h3, s), scale(h4, c))),
+        add(add3(a, scale(h, j), scale(h2, s)), add(scale(h3, c), scale(h4, p))),
+        add(add3(j, scale(h, s), scale(h2, c)), scale(h3, p)),
+        add3(s, scale(h, c), scale(h2, p)),
+        axpy(h, p, c),
+        p,
+    )
+
+
+@kernel
+def shifted_state(state: State, motion: LoadMotion, turning: Vec3, h: float, vehicle: Vehicle) -> State:
+    """The state h seconds later along the motion of the model; `turning` is Omega', rad/s^2, body."""
+    h2 = 0.5 * h * h
+    q = normalise(add3(state.q_cable, scale(h, state.q_cable_dot), scale(h2, motion.q_ddot)))
+    q_dot = add3(state.q_cable_dot, scale(h, motion.q_ddot), scale(h2, motion.q_dddot))
+    x = add3(state.x_load, scale(h, state.v_load), scale(h2, motion.a_load))
+    v = add3(state.v_load, scale(h, motion.a_load), scale(h2, motion.j_load))
+    L = vehicle.cable_length
+    return State(
+        x,
+        v,
+        q,
+        q_dot,
+        add(state.x_quad, sub(sub(x, state.x_load), scale(L, sub(q, state.q_cable)))),
+        add(state.v_quad, sub(sub(v, state.v_load), scale(L, sub(q_dot, state.q_cable_dot)))),
+        mul(state.R, exp(add(scale(h, state.omega_body), scale(h2, turning)))),
+        axpy(h, turning, state.omega_body),
+        state.a_quad,
+    )
+
+
+@kernel
+def flat_across(q_cable: Vec3, jet: Jet, vehicle: Vehicle) -> Vec3:
+    """What the reference itself exerts across the cable, N: -m_Q L q_d'', at most the weight."""
+    mass = vehicle.quad_mass + vehicle.load_mass
+    # q_d = -lift / |lift|
+    lift, jerk, snap = held_up(
+        (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity), jet[3], jet[4], vehicle.gravity
+    )
+    _, _, u_ddot = unit_derivatives(lift, jerk, snap)
+    reach = vehicle.quad_mass * vehicle.cable_length
+    return gently(scale(reach, tangent(q_cable, u_ddot)), mass * vehicle.gravity)
+
+
+@kernel
+def wanted_force(
+    state: State,
+    motion: LoadMotion,
+    air: Vec3,
+    jet: Jet,
+    e_i: Vec3,
+    gains: PlumblineGains,
+    vehicle: Vehicle,
+) -> WantedForce:
+    """F of (3-31), drag and wind made up for, and what it is made from."""
+    position = position_jet(state, motion, jet, e_i, gains.k_i, gains.k_x, gains.k_v, vehicle)
+    q_c = direction_jet(position, state)
+    direction = load_attitude_force(
+        state.q_cable,
+        state.q_cable_dot,
+        q_c,
+        normal_force_tracking(state.q_cable, position.A),
+        gains.k_q,
+        gains.k_omega,
+        vehicle.quad_mass,
+        vehicle.cable_length,
+    )
+    along = dot(state.q_cable, direction.F)
+    pull = scale(along, state.q_cable)
+    asked = flat_across(state.q_cable, jet, vehicle)
+    across = gently(sub(sub(direction.F, pull), asked), _GREATEST_ACROSS * norm(position.A))
+    return WantedForce(sub(add3(pull, asked, across), air), position, direction, q_c)
+
+
+@kernel
+def force_beside(
+    state: State,
+    motion: LoadMotion,
+    turning: Vec3,
+    f: float,
+    f_dot: float,
+    jet: Jet,
+    e_i: Vec3,
+    h: float,
+    gains: PlumblineGains,
+    drag: Drag,
+    push: Vec3,
+    vehicle: Vehicle,
+) -> Vec3:
+    """F, N, as it will be h seconds later, while the thrust f (N) changes by f' (N/s)."""
+    then = shifted_state(state, motion, turning, h, vehicle)
+    air = add(air_force(then.v_quad, drag), push)
+    moved = load_motion(then, f + h * f_dot, f_dot, air, vehicle)
+    e_x, e_v = sub(state.x_load, jet[0]), sub(state.v_load, jet[1])
+    summed = add3(e_i, scale(h, e_x), scale(0.5 * h * h, e_v))
+    return wanted_force(then, moved, air, shifted_jet(jet, h), summed, gains, vehicle).F
+
+
+@kernel
+def load_position(
+    memory: PlumblineMemory,
+    state: State,
+    reference: Reference,
+    thrust: float,
+    moment: Vec3,
+    gains: PlumblineGains,
+    drag: Drag,
+    push: Vec3,
+    period: float,
+    vehicle: Vehicle,
+) -> tuple[PlumblineMemory, Command]:
+    """Load position mode: x_L follows the reference (3-43), (3-44), (3-31), (3-36).
+
+    `thrust`, N, and `moment`, N m: what the rotors give at this instant; `push`, N, world: what the air does
+    to the vehicle besides drag in still air; `period`, s, is that of the law.
+    """
+    jet = reference.jet
+    air = add(air_force(state.v_quad, drag), push)
+    motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
+    wanted = wanted_force(state, motion, air, jet, memory.integral, gains, vehicle)
+    F, position, direction = wanted.F, wanted.position, wanted.direction
+
+    J, W = vehicle.inertia, state.omega_body
+    torque = sub(moment, cross(W, times(J, W)))
+    turning: Vec3 = (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
+    F_after = force_beside(
+        state,
+        motion,
+        turning,
+        thrust,
+        memory.thrust_rate,
+        jet,
+        memory.integral,
+        STEP,
+        gains,
+        drag,
+        push,
+        vehicle,
+    )
+    F_before = force_beside(
+        state,
+        motion,
+        turning,
+        thrust,
+        memory.thrust_rate,
+        jet,
+        memory.integral,
+        -STEP,
+        gains,
+        drag,
+        push,
+        vehicle,
+    )
+    F_dot = scale(0.5 / STEP, sub(F_after, F_before))
+    F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
+
+    attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state, vehicle)
+    result = attitude_moment(
+        state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
+    )
+    b3 = column(state.R, 2)
+    b3_dot = cross(apply(state.R, state.omega_body), b3)
+    command = Command(
+        thrust_along(F, state.R),
+        result.moment,
+        position.e_x,
+        position.e_v,
+        direction.e_q,
+        direction.e_q_dot,
+        result.e_R,
+        result.e_Omega,
+        result.psi_R,
+        direction.psi_q,
+        wanted.q_c.q_c,
+        attitude.R_c,
+    )
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    integral = axpy(period, position.e_x, memory.integral)
+    held = norm(times(gains.k_i, integral))
+    if held > GREATEST_HELD * weight:
+        integral = scale(GREATEST_HELD * weight / held, integral)
+    fastest = 4.0 * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
+    thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
+    return PlumblineMemory(thrust_rate, integral), command
