@@ -32,13 +32,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
+from autopilot.control import plumbline_cascade as plumbline
+from autopilot.control import thesis_cascade as thesis
 from autopilot.control.actuators.disturbance_observer import aloft
 from autopilot.control.actuators.lag_compensation import lag_gain
 from autopilot.control.actuators.rotor_model import Actuation, actuation_constants, advance
 from autopilot.control.command_filter import FilterState
 from autopilot.control.design import Timing, Wanted, design
-from autopilot.control import plumbline_cascade as plumbline
-from autopilot.control import thesis_cascade as thesis
 from autopilot.control.laws.plumbline import PlumblineConstants, load_position_tick
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position

@@ -33,9 +33,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.control import thesis_cascade as thesis
 from autopilot.control.actuators.mixer import mix
 from autopilot.control.command_filter import filter_acceleration, filter_step
-from autopilot.control import thesis_cascade as thesis
 from autopilot.control.load_attitude import (
     DirectionCommand,
     load_attitude_force,

@@ -101,7 +101,7 @@ def follow(
         now_us if fields & field else last for last, (field, _) in zip(before.heard_us, _FIELDS, strict=True)
     )
     mean, square = before.mean, before.square
-    imu = tick.readings.imu
+    imu = tick.imu
     if imu is not None and dt > 0.0:
         slow, fast = dt / (dt + 0.5 / (pi * _MEAN_HZ)), dt / (dt + 0.5 / (pi * _SQUARE_HZ))
         a = imu.accel

@@ -1,15 +1,32 @@
-"""The autopilot's end of the simulator link: a datagram of sensor frames is one tick."""
+"""The autopilot's end of the simulator link: a datagram of sensor frames is one tick, and fills the inbox."""
 
 from __future__ import annotations
 
-import math
-from math import nan
 from typing import Any, NamedTuple
 
-from autopilot.estimation.filter import Readings
-from autopilot.estimation.history import reading_age
-from autopilot.estimation.records import DirectionReading, GnssReading, ImuReading, LoadReading, PoseReading
-from autopilot.geometry.linear import ZERO, norm, scale
+from autopilot.estimation.inbox import (
+    DIRECTION,
+    FIELD,
+    FIX,
+    HEIGHT,
+    IMU,
+    LOAD,
+    NOT_MEASURED,
+    POSE,
+    is_sane,
+    new_inbox,
+    put_reading,
+    put_vector,
+)
+from autopilot.estimation.records import (
+    Array,
+    DirectionReading,
+    GnssReading,
+    ImuReading,
+    LoadReading,
+    PoseReading,
+)
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.wire.codec import decode
 from autopilot.wire.convert import (
     MAG,
@@ -23,35 +40,23 @@ from autopilot.wire.convert import (
 )
 from autopilot.wire.dialect import plumbline as mavlink
 
-# a tracker that claims to be perfect is believed to no more than this, so that the filter stays conditioned
-LEAST_POSITION_STD_M = 2e-5
-LEAST_ANGLE_STD_RAD = 2e-5
-LEAST_VELOCITY_STD_M_S = 2e-4
-LEAST_FIX_STD_M = 2e-3
-LEAST_DIRECTION_STD_RAD = 1e-4
-OLDEST_READING_S = 0.3  # older ones are dropped: the estimator's memory is no longer
-GREATEST_ACCEL_M_S2, GREATEST_RATE_RAD_S = 2000.0, 500.0
-
 
 class Tick(NamedTuple):
     """All that one datagram of the simulator said; `gps` is None where it held no fix."""
 
     now_us: int
-    readings: Readings
+    readings: tuple[tuple[int, int, Any], ...]  # (kind, instant shown in us, record or vector)
+    imu: ImuReading | None  # None where the sample was no number or beyond any sensor's range
     gps: HilGps | None
     fields_updated: int  # of HIL_SENSOR
     aside: tuple[Any, ...]  # messages that are no sensor's
 
 
-def read_tick(datagram: bytes, home: Home, imu_age: float = 0.0) -> Tick | None:
-    """The tick in a datagram, or None where there is none (garbage, another message).
-
-    `imu_age` (s) is how old the inertial unit's samples are when they come.
-    """
+def read_tick(datagram: bytes, home: Home) -> Tick | None:
+    """The tick in a datagram, or None where there is none (garbage, another message)."""
     messages, _ = decode(datagram)
     sensor = None
-    odometry: list[Any] = []
-    load: list[Any] = []
+    readings: list[tuple[int, int, Any]] = []
     gps = None
     aside = []
     for received in messages:
@@ -60,9 +65,9 @@ def read_tick(datagram: bytes, home: Home, imu_age: float = 0.0) -> Tick | None:
             case mavlink.MAVLINK_MSG_ID_HIL_SENSOR:
                 sensor = read_hil_sensor(message)
             case mavlink.MAVLINK_MSG_ID_ODOMETRY:
-                odometry.append(read_odometry(message))
+                readings.append(_pose(read_odometry(message)))
             case mavlink.MAVLINK_MSG_ID_LOAD_SENSOR:
-                load.append(read_load_sensor(message))
+                readings += _of_load(read_load_sensor(message))
             case mavlink.MAVLINK_MSG_ID_HIL_GPS:
                 gps = read_hil_gps(message, home)
             case _:
@@ -70,90 +75,53 @@ def read_tick(datagram: bytes, home: Home, imu_age: float = 0.0) -> Tick | None:
     if sensor is None:
         return None
     now_us = sensor.time_us
-    poses = tuple(pose for pose in (_pose(o, now_us, imu_age) for o in odometry) if pose is not None)
-    loads = tuple(reading for reading in (_load(r, now_us, imu_age) for r in load) if reading is not None)
-    seen = tuple(reading for reading in (_direction(r, now_us, imu_age) for r in load) if reading is not None)
-    fix = None if gps is None else _fix(gps, now_us, imu_age)
-    height = sensor.pressure_altitude_m - home.altitude_m if sensor.fields & PRESSURE else nan
-    field = sensor.mag_body_gauss if sensor.fields & MAG else (nan, nan, nan)
-    # written so that NaN fails
-    sane = norm(sensor.accel_body) < GREATEST_ACCEL_M_S2 and norm(sensor.gyro_body) < GREATEST_RATE_RAD_S
-    imu = ImuReading(sensor.gyro_body, sensor.accel_body) if sane else None
-    readings = Readings(
-        imu,
-        poses,
-        loads,
-        () if fix is None else (fix,),
-        seen,
-        height if math.isfinite(height) else None,
-        field if math.isfinite(norm(field)) and norm(field) > 0.0 else None,
-    )
-    return Tick(now_us, readings, gps, sensor.fields, tuple(aside))
+    imu = ImuReading(sensor.gyro_body, sensor.accel_body)
+    readings.append((IMU, now_us, imu))
+    if gps is not None and gps.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX:
+        readings.append(_fix(gps))
+    if sensor.fields & PRESSURE:
+        readings.append((HEIGHT, now_us, (sensor.pressure_altitude_m - home.altitude_m,)))
+    if sensor.fields & MAG:
+        readings.append((FIELD, now_us, sensor.mag_body_gauss))
+    return Tick(now_us, tuple(readings), imu if is_sane(imu) else None, gps, sensor.fields, tuple(aside))
 
 
-def _age_s(now_us: int, time_us: int, imu_age: float) -> float | None:
-    age = reading_age(float(now_us - time_us), imu_age)
-    return age if time_us <= now_us and age <= OLDEST_READING_S else None
+def fill(inbox: Array, tick: Tick) -> Array:
+    """The inbox with the tick's readings in its first rows; a larger one where they would not fit."""
+    if len(tick.readings) > len(inbox):
+        inbox = new_inbox(2 * len(tick.readings))
+    for at, (kind, shows_us, reading) in enumerate(tick.readings):
+        if kind in (HEIGHT, FIELD):
+            put_vector(inbox, at, kind, reading)
+        else:
+            put_reading(inbox, at, kind, shows_us, reading)
+    return inbox
 
 
-def _at_least(value: float, least: float) -> float:
-    """`value`, but no less than `least`; also for NaN."""
-    return value if value > least else least
+def _velocity(velocity: Vec3 | None, std: float) -> tuple[Vec3, float]:
+    """A velocity and its stated deviation, as the inbox has them."""
+    if velocity is None:
+        return ZERO, NOT_MEASURED
+    return velocity, 0.0 if std < 0.0 else std
 
 
-def _pose(o: Any, now_us: int, imu_age: float) -> PoseReading | None:
-    age = _age_s(now_us, o.time_us, imu_age)
-    values = (*o.position, *o.quat_wxyz, *(o.velocity or ()))
-    if age is None or not all(map(math.isfinite, values)):
-        return None
-    return PoseReading(
-        age,
-        o.position,
-        o.quat_wxyz,
-        o.velocity or ZERO,
-        _at_least(o.position_std, LEAST_POSITION_STD_M),
-        _at_least(o.attitude_std, LEAST_ANGLE_STD_RAD),
-        -1.0 if o.velocity is None else _at_least(o.velocity_std, LEAST_VELOCITY_STD_M_S),
-    )
+def _pose(o: Any) -> tuple[int, int, PoseReading]:
+    velocity, std = _velocity(o.velocity, o.velocity_std)
+    reading = PoseReading(0.0, o.position, o.quat_wxyz, velocity, o.position_std, o.attitude_std, std)
+    return POSE, o.time_us, reading
 
 
-def _load(r: Any, now_us: int, imu_age: float) -> LoadReading | None:
-    age = _age_s(now_us, r.time_us, imu_age)
-    if age is None or r.position is None or not all(map(math.isfinite, (*r.position, *(r.velocity or ())))):
-        return None
-    return LoadReading(
-        age,
-        r.position,
-        r.velocity or ZERO,
-        _at_least(r.position_std, LEAST_POSITION_STD_M),
-        -1.0 if r.velocity is None else _at_least(r.velocity_std, LEAST_VELOCITY_STD_M_S),
-    )
+def _of_load(r: Any) -> list[tuple[int, int, Any]]:
+    found: list[tuple[int, int, Any]] = []
+    if r.position is not None:
+        velocity, std = _velocity(r.velocity, r.velocity_std)
+        found.append((LOAD, r.time_us, LoadReading(0.0, r.position, velocity, r.position_std, std)))
+    if r.direction_body is not None:
+        found.append((DIRECTION, r.time_us, DirectionReading(0.0, r.direction_body, r.direction_std)))
+    return found
 
 
-def _fix(gps: HilGps, now_us: int, imu_age: float) -> GnssReading | None:
-    age = _age_s(now_us, gps.time_us, imu_age)
-    values = (*gps.position, *gps.velocity, gps.horizontal_std, gps.vertical_std)
-    if age is None or gps.fix_type < mavlink.GPS_FIX_TYPE_3D_FIX or not all(map(math.isfinite, values)):
-        return None
-    return GnssReading(
-        age,
-        gps.position,
-        gps.velocity,
-        _at_least(gps.horizontal_std, LEAST_FIX_STD_M),
-        _at_least(gps.vertical_std, LEAST_FIX_STD_M),
-        1.0 if gps.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT else 0.0,
-    )
-
-
-def _direction(r: Any, now_us: int, imu_age: float) -> DirectionReading | None:
-    age = _age_s(now_us, r.time_us, imu_age)
-    if age is None or r.direction_body is None:
-        return None
-    length = norm(r.direction_body)
-    if not 0.5 < length < 2.0:  # also for NaN
-        return None
-    return DirectionReading(
-        age,
-        scale(1.0 / length, r.direction_body),
-        _at_least(r.direction_std, LEAST_DIRECTION_STD_RAD),
-    )
+def _fix(gps: HilGps) -> tuple[int, int, GnssReading]:
+    rtk = 1.0 if gps.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT else 0.0
+    stated = (gps.horizontal_std, gps.vertical_std)
+    return FIX, gps.time_us, GnssReading(0.0, gps.position, gps.velocity, *stated, rtk)

@@ -1,51 +1,40 @@
-"""One tick of the flight software: readings in, rotor forces out. No clock, no socket, no hidden state."""
+"""One tick of the flight software: THE function that flies, in the processes and in a sweep.
+
+readings -> estimate -> (may the supervisor have something to decide?) -> law -> mixer -> rotors
+
+All that is carried from tick to tick lies in `CoreRows`, flat arrays that `fly_tick` reads and writes; which
+law flies, the compiler sees by the type of the law's rows. Where the supervisor may have something to decide
+the tick stops behind the estimate and says so: `autopilot.core.flight_core` then lets it decide, in Python,
+and has the tick finished by `control_tick`. No clock, no socket, no hidden state.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import nan
-from typing import NamedTuple
+from math import isnan
+from typing import Any, NamedTuple
 
 from autopilot.control.actuators.disturbance_observer import Observed, ObserverConstants, nominal, observe
 from autopilot.control.actuators.mixer import MixerResult, mix
-from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants, resting
+from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.actuators.rotor_model import advance as actuate
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
-from autopilot.control.laws.interface import Law, Memory
-from autopilot.control.thesis_cascade import attitude_towards
+from autopilot.control.laws.interface import constants_of, kernels_of, memory_of
 from autopilot.control.load_motion import Drag, air_force
-from autopilot.control.records import Command, Jet, Reference, State, Vehicle
-from autopilot.core.scheduler import is_due
-from autopilot.core.winch import as_if_firm, as_reeled, cable_now, lengthened, with_reel
-from autopilot.estimation.filter import Readings, complaints, control_state, estimate
-from autopilot.estimation.records import RECEIVER, EstimatorState, EstimatorTuning, History, blank_state
-from autopilot.estimation.release import parted, untied
+from autopilot.control.records import Cable, Command, Jet, Reference, State, Vehicle, with_length
+from autopilot.control.thesis_cascade import attitude_towards
+from autopilot.estimation.filter import (
+    control_state,
+    estimate,
+    load_complaint,
+    vehicle_complaint,
+)
+from autopilot.estimation.records import RECEIVER, Array, EstimatorState, EstimatorTuning, History
+from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
+from autopilot.geometry.packed import Row, pack, unpack, with_field
 from autopilot.geometry.so3 import tilt_angle
-from autopilot.guidance.legs import (
-    LOAD_ATTITUDE,
-    LOAD_POSITION,
-    QUAD_ATTITUDE,
-    QUAD_POSITION,
-    Calm,
-    Catch,
-    Leg,
-    Swing,
-    least_move_s,
-)
-from autopilot.guidance.setpoint_follower import Posture
-from autopilot.supervisor.advance import advance
-from autopilot.supervisor.flight import (
-    IN_AIR,
-    Flight,
-    Phase,
-    Report,
-    Settings,
-    View,
-    carries,
-    jet_ahead,
-    leg_time_s,
-)
+from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_POSITION
+from autopilot.supervisor.quiescence import RESTING, Stretch, may_decide
 
 HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 by the mass of Table 4-1
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
@@ -53,207 +42,254 @@ NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, ne
 STOPPED = MixerResult((0.0, 0.0, 0.0, 0.0), 0, 0.0, ZERO)
 IDLE = MixerResult((IDLE_FORCE_N, IDLE_FORCE_N, IDLE_FORCE_N, IDLE_FORCE_N), 0, 4.0 * IDLE_FORCE_N, ZERO)
 
+# what became of a tick
+ESTIMATED, FLOWN, TO_DECIDE = 0, 1, 2
 
-@dataclass(frozen=True)
-class Setup:
-    """All that parameters decide."""
 
+class CoreConstants(NamedTuple):
+    """Everything derived from parameters, but for the law's constants."""
+
+    tuning: EstimatorTuning
     vehicle: Vehicle
-    limited: float
-    law: Law
+    limited: float  # 1.0: the rotors have limits
     actuation: ActuationConstants
     observer: ObserverConstants
     drag: Drag
-    tuning: EstimatorTuning
-    settings: Settings
     control_every: int  # ticks
+    sensor_age_s: float  # greatest age of a reading to fly by
 
 
-class FlightState(NamedTuple):
-    """All that is carried from tick to tick, but for the estimator's history, too large for a record."""
+class Winch(NamedTuple):
+    """The cable at this tick."""
 
-    estimator: EstimatorState
-    flight: Flight
-    memory: Memory  # of the law; None while no rotor is controlled
-    control_mode: int  # that the memory was made for
+    cable: Cable
+    grown: float  # m, since the last tick
+    released: bool  # nothing ties the load to the vehicle
+
+
+class Pilot(NamedTuple):
+    """What the control half carries from tick to tick, beside the law's memory."""
+
     command: Command
     mixed: MixerResult
+    thrust: float  # N, that the rotors are believed to give
+    moment: Vec3  # N m
+    observed: Observed
+    control_mode: int  # that the law's memory was made for; RESTING: it has none
     slack_events: int
     was_taut: bool
-    actuation: Actuation
-    observed: Observed | None  # of load and wind; None before the first tick
 
 
-def with_cable(setup: Setup, flight: Flight) -> Setup:
-    """The setup of a vehicle whose cable is as the winch has it; the same where that never worked."""
-    length = flight.cable_m
-    if length is None:
-        return setup
-    settings = setup.settings
-    return replace(
-        setup,
-        vehicle=setup.vehicle._replace(cable_length=length),
-        law=setup.law.with_cable(length),
-        tuning=setup.tuning._replace(cable_length=length),
-        settings=replace(
-            settings, cable_length_m=length, least_move_s=least_move_s(length, settings.gravity_m_s2)
-        ),
+class Seen(NamedTuple):
+    """What the supervisor sees of the estimate."""
+
+    state: State
+    taut: bool
+    tilt_rad: float
+    pull_n: float  # of the cable on the vehicle, as the accelerometer tells
+    height_std: float  # m, of heights over home, where a receiver tells them
+    vehicle_complaint: int
+    load_complaint: int
+
+
+class CoreRows(NamedTuple):
+    """The memory of the flight software, written in place."""
+
+    estimator: Row  # EstimatorState
+    pilot: Row  # Pilot
+    seen: Row  # Seen, of the last tick
+    commands: Array  # (rows, 4) commands on their way to the rotors, as in `Actuation.queue`
+    history: History
+    inbox: Array  # readings of this tick, as in `autopilot.estimation.inbox`
+    constants: Row  # CoreConstants
+    winch: Row  # Winch
+    stretch: Row  # Stretch
+    targets: Array  # (ticks, 21) where load or vehicle are to be, from the stretch's first tick on
+    references: Array  # the same as the law is told it: later by its preview
+
+
+@kernel
+def _vector(row: Row, first: int) -> Vec3:
+    return (row[first], row[first + 1], row[first + 2])
+
+
+@kernel
+def _jet(row: Row) -> Jet:
+    return (
+        _vector(row, 0),
+        _vector(row, 3),
+        _vector(row, 6),
+        _vector(row, 9),
+        _vector(row, 12),
+        _vector(row, 15),
+        _vector(row, 18),
     )
 
 
-def initial_state() -> FlightState:
-    """A disarmed vehicle that knows nothing."""
-    return FlightState(blank_state(), Flight(), None, 0, NO_COMMAND, STOPPED, 0, False, resting(), None)
-
-
-def view_of(
-    estimator: EstimatorState,
-    state: State,
-    settings: Settings,
-    now_us: int,
-    pull_n: float = nan,
-    carrying: bool = True,
-) -> View:
-    """What the supervisor sees."""
-    return View(
-        now_us,
-        state.x_quad,
-        state.v_quad,
-        state.x_load,
-        state.v_load,
-        estimator.load.taut > 0.0,
-        tilt_angle(state.R),
-        complaints(estimator, settings.sensor_age_limit_s, carries=carrying),
-        pull_n,
-        estimator.doubt.vertical if estimator.vehicle.source == RECEIVER else 0.0,
-    )
-
-
-def felt_pull(before: FlightState, state: State, setup: Setup) -> float:
+@kernel
+def felt_pull(pilot: Pilot, state: State, constants: CoreConstants) -> float:
     """Pull of the cable on the vehicle (N): what moves it besides weight, rotors, drag and wind."""
-    vehicle, a = setup.vehicle, state.a_quad
+    vehicle, a = constants.vehicle, state.a_quad
     felt = (a[0], a[1], a[2] + vehicle.gravity)
-    known = axpy(before.actuation.thrust, column(state.R, 2), air_force(state.v_quad, setup.drag))
-    if before.observed is not None:
-        known = add(known, before.observed.push)
+    known = axpy(pilot.thrust, column(state.R, 2), air_force(state.v_quad, constants.drag))
+    known = add(known, pilot.observed.push)
     return dot(sub(scale(vehicle.quad_mass, felt), known), state.q_cable)
 
 
-def step(
-    before: FlightState, history: History, readings: Readings, setup: Setup, now_us: int, tick: int, dt: float
-) -> tuple[FlightState, Report]:
-    """The state after one tick of `dt` seconds; its `mixed.forces` are what the rotors are to give."""
-    flight = cable_now(before.flight, now_us)
-    setup = with_cable(setup, flight)
-    estimator, tuning = before.estimator, setup.tuning
-    if flight.cable_m is not None:
-        was = before.flight.cable_m
-        estimator = lengthened(estimator, 0.0 if was is None else flight.cable_m - was)
-        readings = as_if_firm(readings, estimator, flight.reel_rate)
-    before = before._replace(flight=flight)
-    if before.flight.released:
-        tuning = untied(tuning)
-        estimator = parted(estimator, history, tuning)
-    estimator = estimate(estimator, history, readings, tuning, dt, before.actuation.thrust)
-    before = before._replace(estimator=estimator)
-    if not is_due(tick, setup.control_every):
-        return before, Report()
-    return control(before, setup, now_us)
-
-
-def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState, Report]:
-    """The supervisor's, the law's and the mixer's part of a tick: `before` holds the estimate already."""
-    estimator, reel = before.estimator, before.flight
-    state = as_reeled(control_state(estimator), estimator, reel.reel_rate)
-    pull_n = felt_pull(before, state, setup)
-    view = view_of(estimator, state, setup.settings, now_us, pull_n, carries(before.flight))
-    flight, report = advance(before.flight, view, setup.settings)
-
-    taut = view.taut
-    slack_events = before.slack_events + (before.was_taut and not taut and not flight.released)
-    observed = before.observed if before.observed is not None else nominal(setup.vehicle)
-    observed = observe(
-        observed,
-        state,
-        1.0 if taut else 0.0,
-        before.actuation.thrust,
-        setup.observer,
-        setup.drag,
-        setup.vehicle,
+@kernel
+def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
+    """The estimate `dt` seconds later, after the first `count` readings of the inbox; and what is seen in it."""
+    constants = unpack(CoreConstants, rows.constants, 0)
+    winch, pilot = unpack(Winch, rows.winch, 0), unpack(Pilot, rows.pilot, 0)
+    tied = winch.cable
+    if winch.released:
+        tied = Cable(float("inf"), winch.cable.rate, winch.cable.accel)
+    estimator = estimate(
+        unpack(EstimatorState, rows.estimator, 0),
+        rows.history,
+        rows.inbox,
+        count,
+        now_us,
+        constants.tuning,
+        tied,
+        winch.grown,
+        dt,
+        pilot.thrust,
     )
-    after = before._replace(flight=flight, slack_events=slack_events, was_taut=taut, observed=observed)
-    if flight.phase not in IN_AIR:
-        idle = IDLE if flight.phase == Phase.ARMED else STOPPED
-        actuation = actuate(after.actuation, idle.thrust_done, idle.moment_done, setup.actuation)
-        return after._replace(
-            memory=None,
-            control_mode=0,
-            command=NO_COMMAND,
-            mixed=idle,
-            actuation=actuation,
-            observed=nominal(setup.vehicle)._replace(
-                support=observed.support, load_ground=observed.load_ground
-            ),
-        ), report
-
-    leg = flight.legs[0]
-    t = leg_time_s(flight, now_us) + setup.law.preview_s
-    if isinstance(leg, Catch):
-        jet = leg.meeting(state.x_quad, state.v_quad, state.x_load, state.v_load, setup.vehicle.gravity)
-    else:
-        jet = jet_ahead(flight, t)
-    memory = after.memory
-    if memory is None or leg.control_mode != after.control_mode:
-        memory = setup.law.start(state, jet[0], jet[1])
-    pushed = with_reel(observed, state, reel.reel_accel, setup.vehicle.quad_mass)
-    memory, command = track(setup, memory, state, leg, jet, t, after.actuation, pushed)
-    mixed = mix(command.thrust, command.moment, setup.vehicle, setup.limited)
-    return after._replace(
-        memory=memory,
-        control_mode=leg.control_mode,
-        command=command,
-        mixed=mixed,
-        actuation=actuate(after.actuation, mixed.thrust_done, mixed.moment_done, setup.actuation),
-    ), report
+    pack(estimator, rows.estimator, 0)
+    state = control_state(estimator, winch.cable)
+    seen = Seen(
+        state,
+        estimator.load.taut > 0.0,
+        tilt_angle(state.R),
+        felt_pull(pilot, state, constants),
+        estimator.doubt.vertical if estimator.vehicle.source == RECEIVER else 0.0,
+        vehicle_complaint(estimator, constants.sensor_age_s),
+        load_complaint(estimator, constants.sensor_age_s),
+    )
+    pack(seen, rows.seen, 0)
 
 
-def track(
-    setup: Setup,
-    memory: Memory,
-    state: State,
-    leg: Leg,
-    jet: Jet,
-    t: float,
-    actuation: Actuation,
-    observed: Observed,
-) -> tuple[Memory, Command]:
-    """The cascade in the mode that the leg asks for."""
-    law, heading = setup.law, E1
-    if leg.control_mode == LOAD_POSITION:
-        return law.load_position(memory, state, Reference(jet, heading), actuation, observed)
-    if leg.control_mode == QUAD_POSITION:
-        return law.quad_position(memory, state, Reference(jet, heading), actuation, observed)
-    assert isinstance(leg, Swing | Calm | Posture)
-    lift = held_height(setup, state, leg.anchor)
-    upward = leg.upward(t)
-    if leg.control_mode == LOAD_ATTITUDE:
-        pull = cable_pull(lift, state.q_cable)
-        return law.load_attitude(memory, state, neg(upward), heading, pull, actuation, observed)
-    assert leg.control_mode == QUAD_ATTITUDE
-    R_d, thrust = attitude_towards(upward, heading, state.R), tilted_thrust(lift, state.R)
-    if isinstance(leg, Posture) and leg.lean.thrust_n is not None:
-        thrust = leg.lean.thrust_n
-    return law.quad_attitude(memory, state, R_d, thrust, actuation, observed)
-
-
-def held_height(setup: Setup, state: State, anchor: Vec3) -> float:
-    """Upward force (N) that keeps the load at the anchor's height while an attitude is tracked."""
-    vehicle = setup.vehicle
+@kernel
+def held_height(state: State, anchor_height: float, vehicle: Vehicle) -> float:
+    """Upward force (N) that keeps the load at a height (m) while an attitude is tracked."""
     mass = vehicle.quad_mass + vehicle.load_mass
     return vertical_force(
-        state.x_load[2] - anchor[2],
+        state.x_load[2] - anchor_height,
         state.v_load[2],
         mass * HEIGHT_GAIN,
         mass * CLIMB_GAIN,
         mass * vehicle.gravity,
     )
+
+
+@kernel
+def reeled(observed: Observed, state: State, accel: float, quad_mass: float) -> Observed:
+    """What is believed to push the vehicle, with what the winch's acceleration amounts to.
+
+    In the motion of load and cable L'' is the same as a force m_Q L'' q on the vehicle, for
+    T = mu (q . (F_L / m_L - F_Q / m_Q) + L |q'|^2 - L''). Left out is 2 L' / L q' in q'': with L' up to 1 m/s
+    it is small beside the damping of the cable's loop.
+    """
+    if accel == 0.0:
+        return observed
+    return with_field(observed, "push", axpy(quad_mass * accel, state.q_cable, observed.push))
+
+
+@kernel
+def fly_law(
+    law: Any,
+    memory: Any,
+    state: State,
+    jet: Jet,
+    stretch: Stretch,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+    vehicle: Vehicle,
+) -> Any:
+    """The law in the mode that the stretch asks for: its memory and its command. The nose points east."""
+    kernels = kernels_of(law)
+    if stretch.mode == LOAD_POSITION:
+        return kernels.load_position(law, memory, state, Reference(jet, E1), actuation, observed, cable)
+    if stretch.mode == QUAD_POSITION:
+        return kernels.quad_position(law, memory, state, Reference(jet, E1), actuation, observed, cable)
+    lift = held_height(state, stretch.anchor_height, vehicle)
+    if stretch.mode == LOAD_ATTITUDE:
+        pull = cable_pull(lift, state.q_cable)
+        return kernels.load_attitude(
+            law, memory, state, neg(stretch.upward), E1, pull, actuation, observed, cable
+        )
+    R_d = attitude_towards(stretch.upward, E1, state.R)
+    thrust = tilted_thrust(lift, state.R) if isnan(stretch.thrust) else stretch.thrust
+    return kernels.quad_attitude(law, memory, state, R_d, thrust, actuation, observed, cable)
+
+
+@kernel
+def control_tick(rows: CoreRows, law_rows: Any, at: int) -> None:
+    """Observer, law and mixer for the estimate of this tick; `at` is its row in the stretch's setpoints."""
+    constants = unpack(CoreConstants, rows.constants, 0)
+    pilot, seen = unpack(Pilot, rows.pilot, 0), unpack(Seen, rows.seen, 0)
+    stretch, cable = unpack(Stretch, rows.stretch, 0), unpack(Winch, rows.winch, 0).cable
+    state, vehicle = seen.state, constants.vehicle
+    slack_events = pilot.slack_events
+    if pilot.was_taut and not seen.taut and not stretch.released:
+        slack_events += 1
+    observed = observe(
+        pilot.observed,
+        state,
+        1.0 if seen.taut else 0.0,
+        pilot.thrust,
+        constants.observer,
+        constants.drag,
+        with_length(vehicle, cable.length),
+    )
+    actuation = Actuation(rows.commands, pilot.thrust, pilot.moment)
+    if stretch.mode == RESTING:
+        command, mixed = NO_COMMAND, IDLE if stretch.idle else STOPPED
+        fresh = nominal(vehicle)
+        fresh = with_field(fresh, "support", observed.support)
+        observed = with_field(fresh, "load_ground", observed.load_ground)
+    else:
+        law = constants_of(law_rows)
+        jet = _jet(rows.references[at])
+        if stretch.mode == pilot.control_mode:
+            memory = memory_of(law_rows)
+        else:
+            memory = kernels_of(law).start(law, state, jet[0], jet[1])
+        pushed = reeled(observed, state, cable.accel, vehicle.quad_mass)
+        memory, command = fly_law(law, memory, state, jet, stretch, actuation, pushed, cable, vehicle)
+        pack(memory, law_rows.memory, 0)
+        mixed = mix(command.thrust, command.moment, vehicle, constants.limited)
+    actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, constants.actuation)
+    rows.commands[:] = actuation.queue
+    pilot = Pilot(
+        command,
+        mixed,
+        actuation.thrust,
+        actuation.moment,
+        observed,
+        stretch.mode,
+        slack_events,
+        seen.taut,
+    )
+    pack(pilot, rows.pilot, 0)
+
+
+@kernel
+def fly_tick(rows: CoreRows, law_rows: Any, count: int, now_us: int, tick: int, dt: float) -> int:
+    """One tick, `dt` seconds after the last: ESTIMATED, FLOWN, or TO_DECIDE before `control_tick`."""
+    sense(rows, count, now_us, dt)
+    constants = unpack(CoreConstants, rows.constants, 0)
+    if tick % constants.control_every != 0:
+        return ESTIMATED
+    stretch, seen = unpack(Stretch, rows.stretch, 0), unpack(Seen, rows.seen, 0)
+    at = (now_us - stretch.first_us) // stretch.period_us
+    target = ZERO
+    if stretch.mode != RESTING and 0 <= at < rows.targets.shape[0]:
+        target = _vector(rows.targets[at], 0)
+    known = seen.vehicle_complaint == 0 and (not stretch.carried or seen.load_complaint == 0)
+    if may_decide(stretch, now_us, seen.state, known, seen.taut, seen.tilt_rad, seen.pull_n, target):
+        return TO_DECIDE
+    control_tick(rows, law_rows, 0 if stretch.mode == RESTING else at)
+    return FLOWN

@@ -1,11 +1,32 @@
-"""The estimator as the flight core sees it: one call for each tick's readings."""
+"""The estimator as the core sees it: one call for each tick's readings.
+
+What the laws are told (`control_state`) and what keeps the estimate from being flown on (`complaints`)
+follow.
+"""
 
 from __future__ import annotations
 
-from math import radians
-from typing import NamedTuple
+from math import isfinite, isinf, radians
 
-from autopilot.control.records import State
+from autopilot.control.records import Cable, State
+from autopilot.estimation.inbox import (
+    DIRECTION,
+    FIELD,
+    FIX,
+    HEIGHT,
+    IMU,
+    KIND,
+    LOAD,
+    POSE,
+    READING,
+    age_of,
+    direction_in,
+    fix_in,
+    is_sane,
+    load_in,
+    pose_in,
+    vector_in,
+)
 from autopilot.estimation.measurements.barometer import correct_barometer
 from autopilot.estimation.measurements.direction import correct_direction
 from autopilot.estimation.measurements.gnss import correct_gnss
@@ -18,16 +39,16 @@ from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     CAMERA,
     RECEIVER,
-    DirectionReading,
+    Array,
     EstimatorState,
     EstimatorTuning,
-    GnssReading,
     History,
     ImuReading,
-    LoadReading,
-    PoseReading,
 )
-from autopilot.geometry.linear import Vec3, sub
+from autopilot.estimation.release import parted
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import axpy, norm, sub
+from autopilot.geometry.packed import unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.wire.parameter_table import ParameterTable
 
@@ -37,21 +58,6 @@ HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 LOAD_STD_TO_FLY = 0.1  # m from the vehicle, of a load that a camera sees
 PROMISE = 1.2  # times the deviation that the receiver states
 COASTING_S = 2.0  # that the IMU bridges between fixes
-
-
-class Readings(NamedTuple):
-    """What the sensors said since the last tick; each kind in the order in which it came.
-
-    `imu` is None where the sample was no number or beyond any sensor's range: the last one serves again.
-    """
-
-    imu: ImuReading | None
-    poses: tuple[PoseReading, ...] = ()
-    loads: tuple[LoadReading, ...] = ()
-    fixes: tuple[GnssReading, ...] = ()
-    directions: tuple[DirectionReading, ...] = ()
-    height_m: float | None = None  # by the barometer, over home
-    field_body: Vec3 | None = None  # of the magnetometer
 
 
 def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
@@ -93,49 +99,100 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
     )
 
 
+@kernel
+def lengthened(state: EstimatorState, grown: float) -> EstimatorState:
+    """The estimate with a cable that has grown by so many metres; a slack one has no length to speak of."""
+    load = state.load
+    if grown == 0.0 or load.taut == 0.0:
+        return state
+    return with_field(state, "load", with_field(load, "length", load.length + grown))
+
+
+@kernel
 def estimate(
     state: EstimatorState,
     history: History,
-    readings: Readings,
+    inbox: Array,
+    count: int,
+    now_us: int,
     tuning: EstimatorTuning,
+    cable: Cable,
+    grown: float,
     dt: float,
-    thrust: float = 0.0,
+    thrust: float,
 ) -> EstimatorState:
-    """The state after `dt` seconds and the readings. `history` is written in place.
+    """The state after `dt` seconds and the first `count` readings of the inbox. `history` is written in
+    place.
 
-    `thrust` (N) is what the rotors are believed to give.
+    `thrust` (N) is what the rotors are believed to give; the cable has grown by `grown` (m) since the last
+    tick. The estimator knows a cable of one length: the winch's speed is taken from what the load tracker
+    measures, v_L = v_Q + L q' + L' q.
     """
+    state = lengthened(state, grown)
+    tuning = with_field(tuning, "cable_length", cable.length)
+    reeled, along = cable.rate != 0.0 and state.load.taut != 0.0, state.load.q_cable
+    if isinf(cable.length):
+        state = parted(state, history, tuning)
+    used = state.last_imu
+    for i in range(count):
+        if inbox[i, KIND] == IMU:
+            imu = unpack(ImuReading, inbox[i], READING)
+            if is_sane(imu):
+                used = imu
     load = state.load
-    state = predict(state, history, readings.imu or state.last_imu, tuning, dt, thrust)
+    state = predict(state, history, used, tuning, dt, thrust)
     state = correct_tautened(state, history, load, tuning)
-    for pose in readings.poses:
-        state = correct_pose(state, history, pose, tuning)
-    if readings.field_body is not None:
-        state = correct_magnetic(state, history, readings.field_body, tuning.magnetic_age, tuning)
-    for fix in readings.fixes:
-        state = correct_gnss(state, history, fix, tuning)
-    if readings.height_m is not None:
-        state = correct_barometer(state, history, readings.height_m, tuning.barometer_age, tuning)
-    if state.vehicle.rejected == 0.0:
-        for reading in readings.loads:
-            state = correct_load(state, history, reading, tuning)
-    for direction in readings.directions:
-        state = correct_direction(state, history, direction, tuning)
+    for i in range(count):
+        if inbox[i, KIND] == POSE:
+            believed, pose = pose_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if believed:
+                state = correct_pose(state, history, pose, tuning)
+    for i in range(count):
+        if inbox[i, KIND] == FIELD:
+            field = vector_in(inbox[i])
+            size = norm(field)
+            if isfinite(size) and size > 0.0:
+                state = correct_magnetic(state, history, field, tuning.magnetic_age, tuning)
+    for i in range(count):
+        if inbox[i, KIND] == FIX:
+            believed, fix = fix_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if believed:
+                state = correct_gnss(state, history, fix, tuning)
+    for i in range(count):
+        if inbox[i, KIND] == HEIGHT and isfinite(inbox[i, READING]):
+            state = correct_barometer(state, history, inbox[i, READING], tuning.barometer_age, tuning)
+    accepted = state.vehicle.rejected == 0.0
+    for i in range(count):
+        if inbox[i, KIND] == LOAD:
+            believed, reading = load_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if reeled:
+                reading = with_field(reading, "v_load", axpy(-cable.rate, along, reading.v_load))
+            if believed and accepted:
+                state = correct_load(state, history, reading, tuning)
+    for i in range(count):
+        if inbox[i, KIND] == DIRECTION:
+            believed, sight = direction_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
+            if believed:
+                state = correct_direction(state, history, sight, tuning)
     if state.vehicle.source == RECEIVER:
         state = correct_standing(state, history, tuning, thrust)
     return state
 
 
-def control_state(state: EstimatorState) -> State:
-    """What the laws are told.
+@kernel
+def control_state(state: EstimatorState, cable: Cable) -> State:
+    """State passed to the control laws.
 
     A plain receiver places the vehicle by metres, and every correction of its velocity moves the place by
     decimetres at once: those are passed on over seconds, so that the load is not sent after them.
     """
     vehicle, load, debt = state.vehicle, state.load, state.aids.debt
+    v_load = load.v_load
+    if cable.rate != 0.0 and load.taut != 0.0:
+        v_load = axpy(cable.rate, load.q_cable, v_load)
     return State(
         sub(load.x_load, debt),
-        load.v_load,
+        v_load,
         load.q_cable,
         load.q_cable_dot,
         sub(vehicle.x_quad, debt),
@@ -146,47 +203,65 @@ def control_state(state: EstimatorState) -> State:
     )
 
 
+# what keeps the estimate from being flown on; 0 nothing
+NO_POSE, NO_FIX, POSITION_VAGUE, FIX_VAGUE, ATTITUDE_VAGUE, HEADING_VAGUE = 1, 2, 3, 4, 5, 6
+NO_LOAD, NO_SIGHT, LOAD_VAGUE = 7, 8, 9
+_COMPLAINTS = {
+    NO_POSE: "no vehicle pose from a tracker",
+    NO_FIX: "no position from the receiver",
+    POSITION_VAGUE: "vehicle position not settled",
+    FIX_VAGUE: "vehicle position not settled, good to {:.1f} m",
+    ATTITUDE_VAGUE: "vehicle attitude not settled",
+    HEADING_VAGUE: "vehicle heading not settled",
+    NO_LOAD: "no load position from a tracker",
+    NO_SIGHT: "no direction to the load from the camera",
+    LOAD_VAGUE: "load position not settled",
+}
+
+
+@kernel
+def vehicle_complaint(state: EstimatorState, oldest_s: float) -> int:
+    """What is wrong with the estimate of the vehicle; 0 if nothing is. Each is written so that NaN tells."""
+    vehicle, doubt = state.vehicle, state.doubt
+    if vehicle.source == RECEIVER:
+        level = POSITION_STD_TO_FLY + PROMISE * state.aids.horizontal_slow
+        if not vehicle.age_s <= max(oldest_s, COASTING_S):
+            return NO_FIX
+        if not (doubt.horizontal <= level and doubt.relative <= level):
+            return FIX_VAGUE
+        if not doubt.tilt <= ATTITUDE_STD_TO_FLY:
+            return ATTITUDE_VAGUE
+        return 0 if doubt.heading <= HEADING_STD_TO_FLY else HEADING_VAGUE
+    if not vehicle.age_s <= oldest_s:
+        return NO_POSE
+    if not (doubt.horizontal <= POSITION_STD_TO_FLY and doubt.vertical <= POSITION_STD_TO_FLY):
+        return POSITION_VAGUE
+    if not (doubt.tilt <= ATTITUDE_STD_TO_FLY and doubt.heading <= ATTITUDE_STD_TO_FLY):
+        return ATTITUDE_VAGUE
+    return 0
+
+
+@kernel
+def load_complaint(state: EstimatorState, oldest_s: float) -> int:
+    """What is wrong with the estimate of the load; 0 if nothing is."""
+    load, doubt = state.load, state.doubt
+    if load.source == CAMERA:
+        if load.taut == 0.0:  # it lies where it was laid, seen or not
+            return 0
+        if not load.age_s <= oldest_s:
+            return NO_SIGHT
+        return 0 if doubt.load <= LOAD_STD_TO_FLY else LOAD_VAGUE
+    if not load.age_s <= oldest_s:
+        return NO_LOAD
+    return 0 if doubt.load <= POSITION_STD_TO_FLY else LOAD_VAGUE
+
+
 def complaints(state: EstimatorState, oldest_s: float, carries: bool = True) -> tuple[str, ...]:
     """What keeps the estimate from being flown on, in words for the operator; empty if nothing does.
 
     Where nothing is carried the load need not be known.
     """
-    of_load = _of_load(state, oldest_s) if carries else ()
-    return (*_of_vehicle(state, oldest_s), *of_load)
-
-
-def _of_vehicle(state: EstimatorState, oldest_s: float) -> tuple[str, ...]:
-    # each is written so that NaN complains
-    vehicle, doubt = state.vehicle, state.doubt
-    if vehicle.source == RECEIVER:
-        aids = state.aids
-        level = POSITION_STD_TO_FLY + PROMISE * aids.horizontal_slow
-        if not vehicle.age_s <= max(oldest_s, COASTING_S):
-            return ("no position from the receiver",)
-        if not (doubt.horizontal <= level and doubt.relative <= level):
-            return (f"vehicle position not settled, good to {doubt.horizontal:.1f} m",)
-        if not doubt.tilt <= ATTITUDE_STD_TO_FLY:
-            return ("vehicle attitude not settled",)
-        if not doubt.heading <= HEADING_STD_TO_FLY:
-            return ("vehicle heading not settled",)
-        return ()
-    if not vehicle.age_s <= oldest_s:
-        return ("no vehicle pose from a tracker",)
-    if not max(doubt.horizontal, doubt.vertical) <= POSITION_STD_TO_FLY:
-        return ("vehicle position not settled",)
-    if not max(doubt.tilt, doubt.heading) <= ATTITUDE_STD_TO_FLY:
-        return ("vehicle attitude not settled",)
-    return ()
-
-
-def _of_load(state: EstimatorState, oldest_s: float) -> tuple[str, ...]:
-    load, doubt = state.load, state.doubt
-    if load.source == CAMERA:
-        if load.taut == 0.0:  # it lies where it was laid, seen or not
-            return ()
-        if not load.age_s <= oldest_s:
-            return ("no direction to the load from the camera",)
-        return () if doubt.load <= LOAD_STD_TO_FLY else ("load position not settled",)
-    if not load.age_s <= oldest_s:
-        return ("no load position from a tracker",)
-    return () if doubt.load <= POSITION_STD_TO_FLY else ("load position not settled",)
+    found = [vehicle_complaint(state, oldest_s)]
+    if carries:
+        found.append(load_complaint(state, oldest_s))
+    return tuple(_COMPLAINTS[code].format(state.doubt.horizontal) for code in found if code)

@@ -1,21 +1,17 @@
-"""What becomes of the estimate when the load is let go, and of the belief that a cable ends somewhere."""
+"""Estimator transition at load release: the load is by itself, and no cable ends in it."""
 
 from __future__ import annotations
 
-from math import inf
-
 from autopilot.estimation.records import TRACKER, EstimatorState, EstimatorTuning, History
 from autopilot.estimation.tautness import moved, slacken
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.packed import with_field
 
 # The error of a load that hung is a few millimetres and centimetres a second; a falling one is soon seen.
 PLACE_STD, SPEED_STD = 0.02, 0.2  # m, m/s
 
 
-def untied(tuning: EstimatorTuning) -> EstimatorTuning:
-    """The beliefs about a load that nothing ties to the vehicle: its cable is slack however far it is."""
-    return tuning._replace(cable_length=inf)
-
-
+@kernel
 def parted(state: EstimatorState, history: History, tuning: EstimatorTuning) -> EstimatorState:
     """The estimate with the load by itself; the same where it is by itself already.
 
@@ -27,4 +23,4 @@ def parted(state: EstimatorState, history: History, tuning: EstimatorTuning) -> 
     load = slacken(load, history, PLACE_STD * PLACE_STD, SPEED_STD * SPEED_STD)
     if load.source != TRACKER:
         load = moved(load, (load.x_load[0], load.x_load[1], tuning.load_height))
-    return state._replace(load=load)
+    return with_field(state, "load", load)

@@ -40,9 +40,9 @@ def _is_record(kind: Any) -> bool:
 
 @cache
 def width(kind: Any) -> int:
-    """Ho
-        """How many numbers a record of this type has, or a tuple,
-        or a number. Raises TypeError for other types.""" if kind in _NUMBERS: return 1
+    """How many numbers a record of this type has, or a tuple, or a number. Raises TypeError for others."""
+    if kind in _NUMBERS:
+        return 1
     if _is_record(kind):
         return sum(width(part) for _, part in _fields(kind))
     if get_origin(kind) is tuple and Ellipsis not in get_args(kind):
@@ -63,8 +63,9 @@ def _taken(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
         parts.append(text)
     if not _is_record(kind):
         return f"({', '.join(parts)},)", at
-    known[kind.__name__] = kind
-    return f"{kind.__name__}({', '.join(parts)})", at
+    name = f"{kind.__name__}_{len(known)}"  # two records may have one name
+    known[name] = kind
+    return f"{name}({', '.join(parts)})", at
 
 
 def _put(kind: Any, value: str, at: int) -> Iterator[tuple[int, str]]:
@@ -100,17 +101,21 @@ def _packer(kind: Any) -> Any:
 
 def unpack(kind: type[R], row: Row, first: int) -> R:
     """The record of type `kind` that begins at `row[first]`."""
-    return _unpacker(kind)(kind, row.tolist() if first == 0 else row, first)  # type: ignore[no-any-return]
+    record: Any = kind
+    numbers = row[first : first + width(record)].tolist()
+    return _unpacker(record)(record, numbers, 0)  # type: ignore[no-any-return]
 
 
 def pack(record: Any, row: Row, first: int) -> None:
     """Write a record's numbers to `row[first]` and behind."""
-    _packer(type(record))(record, row, first)
+    kind: Any = type(record)
+    _packer(kind)(record, row, first)
 
 
 def packed(record: Any) -> Row:
     """A record's numbers as a new array."""
-    row = np.zeros(width(type(record)))
+    kind: Any = type(record)
+    row = np.zeros(width(kind))
     pack(record, row, 0)
     return row
 
@@ -133,7 +138,7 @@ def _pack(record: Any, row: Any, first: Any) -> Any:
 
 @overload(with_field, prefer_literal=True)
 def _with_field(record: Any, name: Any, value: Any) -> Any:
-    kind = getattr(record, "instance_class", None)
+    kind: Any = getattr(record, "instance_class", None)
     if not _is_record(kind) or not isinstance(name, types.StringLiteral):
         return None
     parts = ", ".join("value" if part == name.literal_value else f"record.{part}" for part in kind._fields)

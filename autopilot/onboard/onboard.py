@@ -10,21 +10,19 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from autopilot.control.laws.interface import (
+from autopilot.control.believed import (
     believed_actuation,
     believed_drag,
     believed_observer,
     believed_vehicle,
-    build_law,
 )
+from autopilot.control.laws import build_law, chosen_law
+from autopilot.core.flight_core import FlightCore, Setup, commanded_rate
 from autopilot.core.health import Condition, battery_constants, follow
 from autopilot.core.scheduler import RateError, divider
-from autopilot.core.sensor_inbox import Tick, read_tick
-from autopilot.core.tick import Setup, initial_state, step, view_of, with_cable
+from autopilot.core.sensor_inbox import Tick, fill, read_tick
 from autopilot.core.warmup import rehearse
-from autopilot.core.winch import as_reeled, commanded_rate
-from autopilot.estimation.filter import control_state, estimator_tuning
-from autopilot.estimation.records import new_history
+from autopilot.estimation.filter import estimator_tuning
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
@@ -47,8 +45,8 @@ from autopilot.services.records import (
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
 from autopilot.services.snapshot import Snapshot
-from autopilot.supervisor.flight import ON_GROUND, MissionPlan, Phase, carries, settings_from
-from autopilot.supervisor.requests import decide, with_plan
+from autopilot.supervisor.flight import ON_GROUND, MissionPlan, Phase, settings_from
+from autopilot.supervisor.requests import with_plan
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
@@ -82,7 +80,7 @@ class Work(NamedTuple):
 
 def build_setup(table: ParameterTable, control_every: int) -> Setup:
     """What the flight core is given, from the parameters and the ticks between two runs of the law."""
-    law, vehicle = build_law(table), believed_vehicle(table)
+    kind, law, vehicle = chosen_law(table), build_law(table), believed_vehicle(table)
     return Setup(
         vehicle=vehicle,
         limited=table["VEH_ROTOR_LIM"],
@@ -91,7 +89,7 @@ def build_setup(table: ParameterTable, control_every: int) -> Setup:
         observer=believed_observer(table, vehicle),
         drag=believed_drag(table),
         tuning=estimator_tuning(table),
-        settings=settings_from(table, law.ramp_lag_s),
+        settings=settings_from(table, kind.ramp_lag_s(law), kind.reels, kind.follows_shaped),
         control_every=control_every,
     )
 
@@ -124,8 +122,6 @@ class Onboard:
         self.tick = -1
         self.fault = ""  # why the vehicle cannot be flown at all
         self._options = options
-        self._state = initial_state()
-        self._history = new_history()
         self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
         self._answer = b""
         self._last: Tick | None = None
@@ -139,9 +135,9 @@ class Onboard:
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
         self._reboot = False  # the simulator is asked to begin anew
-        self._setup = build_setup(parameters, 1)
+        self.core = FlightCore(build_setup(parameters, 1))
         self.work: Work | None = None  # what waits for `finish`
-        self._prepared_for = self._setup.settings.limits
+        self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
         self._log: FlightLog | None = None
         if options.log:
@@ -156,7 +152,7 @@ class Onboard:
 
         None for anything else: garbage, or a tick that is over.
         """
-        tick = read_tick(datagram, self._options.home, self._setup.tuning.imu_age)
+        tick = read_tick(datagram, self._options.home)
         if tick is None:
             return None
         if tick.now_us < self.now_us or (self.tick >= 0 and tick.now_us > self.now_us + LEAP_US):
@@ -168,11 +164,11 @@ class Onboard:
         self._run(tick)
         command = hil_actuator_controls_message(
             tick.now_us,
-            self._state.mixed.forces,
+            self.core.forces,
             self.armed,
             self._options.lockstep,
-            self._state.flight.released,
-            commanded_rate(self._state.flight, tick.now_us, self._shortest_us * 1e-6),
+            self.core.flight.released,
+            commanded_rate(self.core.flight, tick.now_us, self._shortest_us * 1e-6),
         )
         aside = self._world.messages(self.now_us)
         if self._reboot:
@@ -183,7 +179,7 @@ class Onboard:
     @property
     def phase(self) -> Phase:
         """The phase of flight."""
-        return self._state.flight.phase
+        return self.core.flight.phase
 
     @property
     def armed(self) -> bool:
@@ -208,16 +204,13 @@ class Onboard:
         if self.fault:
             return
         dt = period_us * 1e-6
-        self._state, report = step(
-            self._state, self._history, tick.readings, self._setup, tick.now_us, self.tick, dt
-        )
-        self._condition = follow(
-            self._condition, tick, self._state.mixed.forces, self._battery, tick.now_us, dt
-        )
+        self.core.take_inbox(fill(self.core.rows.inbox, tick))
+        report = self.core.step(len(tick.readings), tick.now_us, self.tick, dt)
+        self._condition = follow(self._condition, tick, self.core.forces, self._battery, tick.now_us, dt)
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
-            last = self._state.flight.mission_done and seq == report.reached[-1]
+            last = self.core.flight.mission_done and seq == report.reached[-1]
             self.endpoint.item_reached(seq, last)
         if self._log is not None:
             rate_hz = self.parameters["LOG_RATE_HZ"]
@@ -256,8 +249,8 @@ class Onboard:
             return set()
 
     def _log_sample(self) -> Sample:
-        imu = self._last.readings.imu if self._last else None
-        return Sample(self._snapshot(), imu, self._state.estimator)
+        imu = self._last.imu if self._last else None
+        return Sample(self._snapshot(), imu, self.core.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:
@@ -275,10 +268,10 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
             return
         self.fault = ""
-        self._setup = build_setup(self.parameters, every)
+        self.core.follow(build_setup(self.parameters, every))
         self._battery = battery_constants(self.parameters)
         # a mission under way keeps the paths that it began with
-        if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
+        if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.on_mission:
             self._prepare()
 
     # ---- ground
@@ -337,9 +330,9 @@ class Onboard:
 
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
-        rehearse(self._setup)
+        rehearse(self.core.setup)
         waypoints = (Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0))
-        Work(waypoints, (0, 1), self._setup.settings.limits).done()
+        Work(waypoints, (0, 1), self.core.setup.settings.limits).done()
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):
@@ -358,28 +351,21 @@ class Onboard:
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
-        state = self._state
-        estimator, flight = state.estimator, state.flight
-        settings = with_cable(self._setup, flight).settings
-        seen = as_reeled(control_state(estimator), estimator, flight.reel_rate)
-        view = view_of(estimator, seen, settings, self.now_us, carrying=carries(flight))
-        flight, verdict = decide(flight, request, view, settings)
-        self._state = state._replace(flight=flight)
-        return verdict
+        return self.core.ask(request, self.now_us)
 
     def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Another fence, other rally points."""
         self.endpoint.set_areas(kind, items)
-        flight = self._state.flight
+        flight = self.core.flight
         if kind == mavlink.MAV_MISSION_TYPE_FENCE:
             flight = replace(flight, fence=read_fence(items, self._options.home), breach="")
         else:
             flight = replace(flight, rally=read_rally(items, self._options.home))
-        self._state = self._state._replace(flight=flight)
+        self.core.change(flight)
 
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None)
-        self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
+        self.core.change(with_plan(self.core.flight, plan))
         self._prepare()
         kept = unflown(mission.items)
         if kept:
@@ -388,11 +374,11 @@ class Onboard:
 
     def _prepare(self) -> None:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
-        plan, limits = self._state.flight.plan, self._setup.settings.limits
+        plan, limits = self.core.flight.plan, self.core.setup.settings.limits
         self._prepared_for = limits
         self.work = Work(plan.steps, plan.sequence, limits)
         self._have_prepared(PENDING)
-        short = self._state.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
+        short = self.core.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
         if self._options.clock_waits or short:
             self.finish(self.work, self.work.done())
 
@@ -406,14 +392,12 @@ class Onboard:
         self._have_prepared(prepared)
 
     def _have_prepared(self, prepared: Prepared) -> None:
-        flight = self._state.flight
-        flight = replace(flight, plan=replace(flight.plan, prepared=prepared))
-        self._state = self._state._replace(flight=flight)
+        flight = self.core.flight
+        self.core.change(replace(flight, plan=replace(flight.plan, prepared=prepared)))
 
     def _snapshot(self) -> Snapshot:
         return make_snapshot(
-            self._state,
-            with_cable(self._setup, self._state.flight),
+            self.core,
             self._options,
             self.endpoint.mission,
             self._condition,

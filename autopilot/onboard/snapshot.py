@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, nan, sqrt
 
+from autopilot.control.load_motion import Drag
+from autopilot.core.flight_core import FlightCore
 from autopilot.core.health import BatteryConstants, Condition, remaining, sensors, vibration, voltage
-from autopilot.core.tick import FlightState, Setup, view_of
-from autopilot.core.winch import as_reeled
-from autopilot.estimation.filter import control_state
-from autopilot.estimation.records import TRACKER
+from autopilot.estimation.records import TRACKER, EstimatorState
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.so3 import quat_from_rotation
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, asked_jet
@@ -24,7 +23,6 @@ from autopilot.supervisor.flight import (
     Guide,
     Phase,
     Selected,
-    carries,
     leg_time_s,
 )
 from autopilot.supervisor.requests import arming_complaints
@@ -127,11 +125,10 @@ def mission_state(flight: Flight, items: int) -> int:
 
 
 def sensor_bits(
-    condition: Condition, state: FlightState, ready: bool, fake_gps: bool, now_us: int
+    condition: Condition, estimator: EstimatorState, ready: bool, fake_gps: bool, now_us: int
 ) -> tuple[int, int]:
     """Sensors present and healthy, as bits of SYS_STATUS; a tracker stands in for what it makes needless."""
     present, healthy = (bits | _ALWAYS for bits in sensors(condition, now_us))
-    estimator = state.estimator
     if estimator.vehicle.source == TRACKER:
         tracked = snapshot.TRACKER | (_BY_TRACKER & ~present if fake_gps else 0)
         present |= tracked
@@ -142,11 +139,8 @@ def sensor_bits(
     return present, healthy
 
 
-def wind(state: FlightState, setup: Setup) -> Vec3:
-    """The wind (m/s) whose drag on a resting vehicle is the push that is felt; NaN where that is unknown."""
-    if state.observed is None:
-        return (nan, nan, nan)
-    push, drag = state.observed.push, setup.drag
+def wind(push: Vec3, drag: Drag) -> Vec3:
+    """The wind (m/s) whose drag on a resting vehicle is the push (N) that is felt; NaN where none would do."""
     force = norm(push)
     if force == 0.0:
         return push
@@ -157,8 +151,7 @@ def wind(state: FlightState, setup: Setup) -> Vec3:
 
 
 def make_snapshot(
-    state: FlightState,
-    setup: Setup,
+    core: FlightCore,
     options: Options,
     mission: StoredMission,
     condition: Condition,
@@ -168,11 +161,10 @@ def make_snapshot(
     now_us: int,
 ) -> Snapshot:
     """All that telemetry tells of this instant."""
-    flight, estimator, command = state.flight, state.estimator, state.command
-    control = as_reeled(control_state(estimator), estimator, flight.reel_rate)
-    view = view_of(estimator, control, setup.settings, now_us, carrying=carries(flight))
-    ready = not arming_complaints(flight, view, setup.settings)
-    present, healthy = sensor_bits(condition, state, ready, fake_gps, now_us)
+    flight, estimator, pilot, setup = core.flight, core.estimator, core.pilot, core.setup
+    command, control, view = pilot.command, core.state, core.view(now_us)
+    ready = not arming_complaints(flight, view, core.settings)
+    present, healthy = sensor_bits(condition, estimator, ready, fake_gps, now_us)
     tracked = estimator.vehicle.source == TRACKER and healthy & snapshot.TRACKER
     fix = _fix(gps)
     if fix is None and fake_gps and tracked:
@@ -225,8 +217,8 @@ def make_snapshot(
         distance=norm(sub(control.x_load, control.x_quad)),
         tension=estimator.load.tension,
         taut=view.taut,
-        slack_events=state.slack_events,
-        control_mode=state.control_mode,
+        slack_events=pilot.slack_events,
+        control_mode=pilot.control_mode,
         seq=seq,
         elapsed_s=elapsed,
         duration_s=duration,
@@ -248,15 +240,15 @@ def make_snapshot(
         psi_q=command.psi_q,
         thrust=command.thrust,
         moment=command.moment,
-        forces=state.mixed.forces,
+        forces=pilot.mixed.forces,
         rotor_min=setup.vehicle.rotor_min if setup.limited else -inf,
         rotor_max=setup.vehicle.rotor_max if setup.limited else inf,
-        saturated=state.mixed.saturated,
+        saturated=pilot.mixed.saturated,
         sensors_present=present,
         sensors_healthy=healthy,
         gps=fix,
         vibration=vibration(condition),
-        wind=wind(state, setup) if flight.phase in IN_AIR else (nan, nan, nan),
+        wind=wind(pilot.observed.push, setup.drag) if flight.phase in IN_AIR else (nan, nan, nan),
         battery_voltage=voltage(condition, battery),
         battery_current=condition.current,
         battery_used_mah=condition.used_as / 3.6,

@@ -14,7 +14,7 @@ from autopilot.guidance.setpoint_follower import SILENT, SMOOTH_SHARE, Circle, F
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import UNPREPARED, Limits, Prepared
 from autopilot.trajectory.rotor_demand import Bounds
-from autopilot.vehicle.parameters import LAWS, SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE
+from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import NO_FENCE, Fence
 from autopilot.wire.parameter_table import ParameterTable
@@ -187,8 +187,10 @@ class Report(NamedTuple):
     reached: tuple[int, ...] = ()
 
 
-def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
-    """The supervisor's settings from the parameter table and the law's lag."""
+def settings_from(table: ParameterTable, ramp_lag_s: float, reels: bool, follows_shaped: bool) -> Settings:
+    """The supervisor's settings from the parameter table, and what the law says of itself: by how much time
+    the
+    load keeps behind on a ramp, whether it flies other lengths of the cable, whether shaping its paths pays."""
     return Settings(
         cable_length_m=table["VEH_CABLE_LEN"],
         takeoff_altitude_m=table["MIS_TAKEOFF_ALT"],
@@ -201,7 +203,7 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         sensor_age_limit_s=table["FS_SENSOR_S"],
         gravity_m_s2=table["VEH_GRAVITY"],
         least_move_s=least_move_s(table["VEH_CABLE_LEN"], table["VEH_GRAVITY"]),
-        limits=limits_from(table),
+        limits=limits_from(table, follows_shaped),
         ramp_lag_s=ramp_lag_s,
         load_weight_n=table["VEH_LOAD_MASS"] * table["VEH_GRAVITY"],
         snap_speed_m_s=table["MIS_SNAP_SPEED"],
@@ -218,14 +220,14 @@ def settings_from(table: ParameterTable, ramp_lag_s: float) -> Settings:
         longest_m=table["WNC_LEN_MAX"],
         reel_speed_m_s=table["WNC_SPEED"],
         reel_accel_m_s2=table["WNC_ACCEL"],
-        reels=LAWS[int(table["CTL_LAW"])] != "lqr",
+        reels=reels,
         guided_mode=int(table["MAV_IDENTITY"]) == ARDUPILOT_IDENTITY,
         guided_loss_us=round(1e6 * table["GUID_TIMEOUT"]),
         guides_vehicle=table["GDE_TARGET"] != 0.0,
     )
 
 
-def limits_from(table: ParameterTable) -> Limits:
+def limits_from(table: ParameterTable, follows_shaped: bool = True) -> Limits:
     """What paths are shaped to: the believed vehicle, and the MIS_ parameters."""
     low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
     margin = 0.01 * table["MIS_ROTOR_MARG"] * (high - low)
@@ -250,9 +252,7 @@ def limits_from(table: ParameterTable) -> Limits:
         1e-3 * table["VEH_ROTOR_TAU"],
     )
     shaping = table["MIS_SHAPE"]
-    shaped = shaping == SHAPE_ALWAYS or (
-        shaping == SHAPE_WITH_PLUMBLINE and LAWS[int(table["CTL_LAW"])] == "plumbline"
-    )
+    shaped = shaping == SHAPE_ALWAYS or (shaping == SHAPE_WITH_PLUMBLINE and follows_shaped)
     return Limits(
         body,
         bounds,

@@ -10,13 +10,12 @@ from typing import Any, NamedTuple
 
 from numba.extending import overload
 
-from autopilot.control import quad_position
+from autopilot.control import lqr, quad_position
+from autopilot.control import thesis_cascade as thesis
 from autopilot.control.actuators.disturbance_observer import Observed, ObserverConstants, observe
 from autopilot.control.actuators.mixer import MixerResult, mix
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.actuators.rotor_model import advance as actuate
-from autopilot.control import lqr
-from autopilot.control import thesis_cascade as thesis
 from autopilot.control.laws.interface import Law, LqrLaw, Memory, PlumblineLaw, PlumblineMemory, ThesisLaw
 from autopilot.control.laws.plumbline import SlackConstants, load_position_tick, quad_position_tick
 from autopilot.control.load_motion import Drag

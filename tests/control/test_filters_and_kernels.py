@@ -9,8 +9,8 @@ import pytest
 from scipy.signal import lsim
 
 from autopilot.control import command_filter, quad_position
-from autopilot.control.actuators.mixer import mix
 from autopilot.control import thesis_cascade as thesis
+from autopilot.control.actuators.mixer import mix
 from autopilot.control.records import Reference, Vehicle
 
 SCIPY = 1e-10  # lsim's own matrix exponential, over 500 steps

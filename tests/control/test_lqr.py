@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from autopilot.control.actuators.mixer import mix
 from autopilot.control import lqr
+from autopilot.control.actuators.mixer import mix
 from autopilot.control.linear_model import PHI_L, THETA_L, second_order, state_space
 from autopilot.control.records import Reference, State, Vehicle
 from autopilot.geometry.linear import ZERO

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 import autopilot
 from autopilot.control import direction_jet, load_motion
+from autopilot.control import plumbline_cascade as plumbline
 from autopilot.control.actuators import disturbance_observer as observer
 from autopilot.control.actuators import lag_compensation as rotor_lag
 from autopilot.control.actuators import predictor as prediction
 from autopilot.control.actuators import rotor_model as actuation
 from autopilot.control.actuators.mixer import mix
 from autopilot.control.actuators.rotor_model import actuation_constants
-from autopilot.control import plumbline_cascade as plumbline
 from autopilot.control.laws.interface import PlumblineLaw, build_law
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from autopilot.control.command_filter import filter_start
 from autopilot.control import thesis_cascade as thesis
+from autopilot.control.command_filter import filter_start
 from autopilot.control.load_attitude import (
     DirectionCommand,
     load_attitude_force,

@@ -69,6 +69,7 @@ def observer_constants(
     return ObserverConstants(share(mass_time), share(push_time), share(_CONTACT_TIME), greatest_push)
 
 
+@kernel
 def nominal(vehicle: Vehicle) -> Observed:
     """Nothing observed: the load's mass as told, still air, standing on the ground, the load at home."""
     g = vehicle.gravity

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance.legs import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
-from autopilot.supervisor.flight import Flight
 from autopilot.trajectory.shaping import evaluate_asked, evaluate_shaped
 from autopilot.trajectory.signals import Jet, SignalTable
 from autopilot.trajectory.splines import PieceTable
 from autopilot.trajectory.transfer import transfer
 from autopilot.trajectory.waypoint_path import evaluate_path
-from gcs.sweep.world import Floats
 
+Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives
 
 
@@ -88,11 +90,14 @@ def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
     return found
 
 
-def jets_ahead(flight: Flight, times_s: Floats) -> Floats:
-    """(n, 21) `jet_ahead` at n times (s into the present leg), which do not decrease."""
+def jets_ahead(legs: Sequence[Leg], times_s: Floats) -> Floats:
+    """(n, 21) setpoints at n times (s into the first leg), which do not decrease, into the legs that follow.
+
+    Only legs that control the same as the first one follow it for this.
+    """
     found = np.zeros((len(times_s), COLUMNS))
-    chain = [flight.legs[0]]
-    for after in (*flight.legs[1:], *flight.following):
+    chain = [legs[0]]
+    for after in legs[1:]:
         if after.control_mode != chain[0].control_mode:
             break
         chain.append(after)

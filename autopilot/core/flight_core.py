@@ -1,0 +1,318 @@
+"""The flight software around its compiled tick: the supervisor where it may have something to decide,
+requests.
+
+`FlightCore` is driven by the simulator link in the processes and by the loop of a sweep: `step` runs one
+tick,
+`decide` finishes one whose estimate a sweep's loop has made already. The cable as the winch has it enters the
+tick as `Winch`; what is flown and until when as `Stretch`, with its setpoints laid out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Any
+
+import numpy as np
+
+from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
+from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of
+from autopilot.control.laws.interface import law_of, new_rows
+from autopilot.control.load_motion import Drag
+from autopilot.control.records import Cable, State, Vehicle
+from autopilot.core.tick import (
+    NO_COMMAND,
+    STOPPED,
+    TO_DECIDE,
+    CoreConstants,
+    CoreRows,
+    Pilot,
+    Seen,
+    Winch,
+    control_tick,
+    fly_tick,
+)
+from autopilot.estimation.filter import complaints
+from autopilot.estimation.inbox import new_inbox
+from autopilot.estimation.records import (
+    Array,
+    EstimatorState,
+    EstimatorTuning,
+    blank_state,
+    new_history,
+)
+from autopilot.geometry.linear import ZERO
+from autopilot.geometry.packed import pack, packed, unpack
+from autopilot.guidance.layout import COLUMNS, jets_ahead
+from autopilot.guidance.legs import Catch, least_move_s, top_of
+from autopilot.services.records import Verdict
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.flight import Flight, Report, Settings, View, carries, leg_time_s
+from autopilot.supervisor.quiescence import RESTING, Stretch, at_rest, next_stretch
+from autopilot.supervisor.requests import decide
+
+LAID_OUT = 50  # setpoints that a process lays out at once; a sweep takes more
+_NO_ROWS = np.zeros((1, COLUMNS))
+_NOTHING = Report()
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything derived from parameters."""
+
+    vehicle: Vehicle
+    limited: float
+    law: Any  # the chosen law's constants
+    actuation: ActuationConstants
+    observer: ObserverConstants
+    drag: Drag
+    tuning: EstimatorTuning
+    settings: Settings
+    control_every: int  # ticks
+
+    @property
+    def preview_s(self) -> float:
+        """How much later than now the law wants to know its reference."""
+        return law_of(self.law).preview_s(self.law)
+
+
+class FlightCore:
+    """One vehicle's flight software. `flight` is the supervisor's record; all else lies in `rows`."""
+
+    def __init__(self, setup: Setup, laid_out: int = LAID_OUT) -> None:
+        self.setup = setup
+        self.flight = Flight()
+        self.settings = setup.settings  # with the cable as it is
+        self._laid_out = laid_out
+        self._cable_m: float | None = None  # that `settings` were made for
+        self._dirty = True  # the flight has changed since the winch was told
+        self.law_rows = new_rows(setup.law)
+        pilot = Pilot(NO_COMMAND, STOPPED, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
+        self.rows = CoreRows(
+            estimator=packed(blank_state()),
+            pilot=packed(pilot),
+            seen=packed(_BLIND),
+            commands=np.zeros((rows_of(setup.actuation), 4)),
+            history=new_history(),
+            inbox=new_inbox(),
+            constants=packed(_constants(setup)),
+            winch=packed(Winch(Cable(setup.vehicle.cable_length), 0.0, False)),
+            stretch=packed(at_rest(0, 0, False)),
+            targets=_NO_ROWS,
+            references=_NO_ROWS,
+        )
+
+    # ---- what there is
+
+    @property
+    def estimator(self) -> EstimatorState:
+        """The estimate."""
+        return unpack(EstimatorState, self.rows.estimator, 0)
+
+    @property
+    def pilot(self) -> Pilot:
+        """Command, rotor forces, and what is observed."""
+        return unpack(Pilot, self.rows.pilot, 0)
+
+    @property
+    def forces(self) -> tuple[float, float, float, float]:
+        """What the rotors are to give, N."""
+        return self.pilot.mixed.forces
+
+    @property
+    def state(self) -> State:
+        """State passed to the control laws."""
+        return unpack(Seen, self.rows.seen, 0).state
+
+    def view(self, now_us: int, pulls: bool = False) -> View:
+        """What the supervisor sees; of the cable's pull only during a tick."""
+        seen = unpack(Seen, self.rows.seen, 0)
+        carried = carries(self.flight)
+        found: tuple[str, ...] = ()
+        if seen.vehicle_complaint or (carried and seen.load_complaint):
+            found = complaints(self.estimator, self.settings.sensor_age_limit_s, carried)
+        state = seen.state
+        return View(
+            now_us,
+            state.x_quad,
+            state.v_quad,
+            state.x_load,
+            state.v_load,
+            seen.taut,
+            seen.tilt_rad,
+            found,
+            seen.pull_n if pulls else nan,
+            seen.height_std,
+        )
+
+    # ---- from tick to tick
+
+    def take_inbox(self, inbox: Array) -> None:
+        """A larger inbox."""
+        self.rows = self.rows._replace(inbox=inbox)
+
+    def step(self, count: int, now_us: int, tick: int, dt: float) -> Report:
+        """One tick of `dt` seconds with the first `count` readings of the inbox."""
+        self.move_cable(now_us)
+        if fly_tick(self.rows, self.law_rows, count, now_us, tick, dt) != TO_DECIDE:
+            return _NOTHING
+        return self.decide(now_us, round(dt * 1e6))
+
+    def decide(self, now_us: int, period_us: int) -> Report:
+        """The supervisor's part of a tick that is estimated already, and the law's behind it."""
+        self.flight, report = advance(self.flight, self.view(now_us, pulls=True), self.settings)
+        self._dirty = True
+        self._lay_out(now_us, period_us)
+        control_tick(self.rows, self.law_rows, 0)
+        return report
+
+    def move_cable(self, now_us: int) -> None:
+        """Let the cable be as the winch has it at this instant."""
+        flight = self.flight
+        reels = bool(flight.legs) and top_of(flight.legs[0]) is not None
+        if not (reels or self._dirty):
+            return
+        before_m = flight.cable_m
+        flight = self.flight = _with_cable_now(flight, now_us)
+        length = self.setup.vehicle.cable_length if flight.cable_m is None else flight.cable_m
+        grown = 0.0 if before_m is None or flight.cable_m is None else flight.cable_m - before_m
+        cable = Cable(length, flight.reel_rate, flight.reel_accel)
+        pack(Winch(cable, grown, flight.released), self.rows.winch, 0)
+        # what has grown is told once
+        self._dirty = grown != 0.0
+        self._follow_cable()
+
+    def _follow_cable(self) -> None:
+        if self.flight.cable_m == self._cable_m:
+            return
+        self._cable_m = self.flight.cable_m
+        length, settings = self._cable_m, self.setup.settings
+        if length is not None:
+            least_s = least_move_s(length, settings.gravity_m_s2)
+            settings = replace(settings, cable_length_m=length, least_move_s=least_s)
+        self.settings = settings
+
+    def _lay_out(self, now_us: int, period_us: int) -> None:
+        """The stretch that begins with this tick, and its setpoints."""
+        flight, preview_s = self.flight, self.setup.preview_s
+        stretch = next_stretch(flight, self.settings, now_us, period_us, preview_s)
+        if stretch.mode == RESTING:
+            pack(stretch, self.rows.stretch, 0)
+            return
+        leg = flight.legs[0]
+        if isinstance(leg, Catch):
+            state = self.state
+            jet = leg.meeting(
+                state.x_quad, state.v_quad, state.x_load, state.v_load, self.setup.vehicle.gravity
+            )
+            targets = references = np.ravel(jet).reshape(1, COLUMNS)
+        else:
+            ticks = max(1, min(self._laid_out, -(-(stretch.stop_us - now_us) // stretch.period_us)))
+            since_us = now_us - flight.leg_start_us
+            times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)
+            legs = (*flight.legs, *flight.following)
+            targets = references = jets_ahead(legs, times)
+            if preview_s != 0.0:
+                references = jets_ahead(legs, times + preview_s)
+        stop_us = min(stretch.stop_us, now_us + stretch.period_us * len(targets))
+        pack(stretch._replace(stop_us=stop_us), self.rows.stretch, 0)
+        self.rows = self.rows._replace(targets=targets, references=references)
+
+    # ---- what comes between two ticks
+
+    def ask(self, request: object, now_us: int) -> Verdict:
+        """The supervisor's verdict on a request, which may change the flight."""
+        flight, verdict = decide(self.flight, request, self.view(now_us), self.settings)
+        self.change(flight)
+        return verdict
+
+    def change(self, flight: Flight) -> None:
+        """Another flight; the next tick is decided upon."""
+        if flight is not self.flight:
+            self.flight = flight
+            self._dirty = True
+            self.interrupt()
+
+    def interrupt(self) -> None:
+        """Let the supervisor look at the next tick."""
+        stretch = unpack(Stretch, self.rows.stretch, 0)
+        pack(stretch._replace(stop_us=0), self.rows.stretch, 0)
+
+    def follow(self, setup: Setup) -> None:
+        """Other parameters, from the next tick on."""
+        before, self.setup = self.setup, setup
+        self._cable_m, self.settings = None, setup.settings
+        self._dirty = True
+        pack(_constants(setup), self.rows.constants, 0)
+        commands = np.zeros((rows_of(setup.actuation), 4))
+        kept = min(len(commands), len(self.rows.commands))
+        commands[:kept] = self.rows.commands[:kept]
+        self.rows = self.rows._replace(commands=commands)
+        rows = new_rows(setup.law)
+        if law_of(setup.law) is law_of(before.law):
+            rows.memory[:] = self.law_rows.memory
+        else:
+            # another law has no memory yet
+            pilot = self.pilot._replace(control_mode=RESTING)
+            pack(pilot, self.rows.pilot, 0)
+        self.law_rows = rows
+        self._follow_cable()
+        self.interrupt()
+
+
+def _constants(setup: Setup) -> CoreConstants:
+    return CoreConstants(
+        setup.tuning,
+        setup.vehicle,
+        setup.limited,
+        setup.actuation,
+        setup.observer,
+        setup.drag,
+        setup.control_every,
+        setup.settings.sensor_age_limit_s,
+    )
+
+
+def _with_cable_now(flight: Flight, now_us: int) -> Flight:
+    """The flight with its cable as the winch has it at this instant: L, L' and L'' of the leg that reels."""
+    top = top_of(flight.legs[0]) if flight.legs else None
+    if top is None:
+        resting = flight.reel_rate == 0.0 and flight.reel_accel == 0.0
+        return flight if resting else replace(flight, reel_rate=0.0, reel_accel=0.0)
+    jet = flight.legs[0].jet(leg_time_s(flight, now_us))
+    length = top - jet[0][2]
+    grown = 0.0 if flight.cable_m is None else length - flight.cable_m
+    return replace(
+        flight,
+        cable_m=length,
+        reel_rate=-jet[1][2],
+        reel_accel=-jet[2][2],
+        taut_length_m=flight.taut_length_m + grown,
+    )
+
+
+def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
+    """Rate in m/s that the winch is to reach by the end of a period."""
+    if not flight.legs or top_of(flight.legs[0]) is None:
+        return 0.0
+    return -flight.legs[0].jet(leg_time_s(flight, now_us) + period_s)[1][2]
+
+
+_BLIND = Seen(
+    State(
+        ZERO,
+        ZERO,
+        (0.0, 0.0, -1.0),
+        ZERO,
+        ZERO,
+        ZERO,
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        ZERO,
+    ),
+    False,
+    0.0,
+    0.0,
+    0.0,
+    1,
+    7,
+)

@@ -1,0 +1,155 @@
+"""The readings of one tick as rows of an array, and which of them are believed.
+
+A row is (kind, instant that it shows in us, the reading's numbers as in its record). The age of a reading is
+made here, by the clock of the estimate. A reading that is no number, of the future or too old is dropped,
+and a sensor that claims to be perfect is believed to no more than the least deviations below.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from autopilot.estimation.history import reading_age
+from autopilot.estimation.records import (
+    Array,
+    DirectionReading,
+    GnssReading,
+    ImuReading,
+    LoadReading,
+    PoseReading,
+)
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, norm, scale
+from autopilot.geometry.packed import pack, unpack
+
+KIND, SHOWS, READING = 0, 1, 2  # columns
+COLUMNS = 16
+IMU, POSE, FIELD, FIX, HEIGHT, LOAD, DIRECTION = range(7)
+ROOM = 16  # rows of a new inbox
+
+# so that the filter stays conditioned
+LEAST_POSITION_STD_M = 2e-5
+LEAST_ANGLE_STD_RAD = 2e-5
+LEAST_VELOCITY_STD_M_S = 2e-4
+LEAST_FIX_STD_M = 2e-3
+LEAST_DIRECTION_STD_RAD = 1e-4
+OLDEST_READING_S = 0.3  # older ones are dropped: the estimator's memory is no longer
+GREATEST_ACCEL_M_S2, GREATEST_RATE_RAD_S = 2000.0, 500.0
+NOT_MEASURED = -1.0  # deviation of a velocity that was not measured
+
+
+def new_inbox(rows: int = ROOM) -> Array:
+    """An inbox for so many readings."""
+    return np.zeros((rows, COLUMNS))
+
+
+def put_reading(inbox: Array, at: int, kind: int, shows_us: int, reading: Any) -> None:
+    """Write a record of a reading into a row; its age is not used."""
+    inbox[at, KIND] = kind
+    inbox[at, SHOWS] = shows_us
+    pack(reading, inbox[at], READING)
+
+
+def put_vector(inbox: Array, at: int, kind: int, vector: tuple[float, ...]) -> None:
+    """Write a reading that is a number or a vector, and of this instant."""
+    inbox[at, KIND] = kind
+    inbox[at, READING : READING + len(vector)] = vector
+
+
+@kernel
+def finite(v: Vec3) -> bool:
+    """Whether all three are numbers."""
+    return isfinite(v[0]) and isfinite(v[1]) and isfinite(v[2])
+
+
+@kernel
+def at_least(value: float, least: float) -> float:
+    """`value`, but no less than `least`; also for NaN."""
+    return value if value > least else least
+
+
+@kernel
+def is_sane(imu: ImuReading) -> bool:
+    """Whether an inertial sample is a number and within any sensor's range."""
+    return norm(imu.accel) < GREATEST_ACCEL_M_S2 and norm(imu.gyro) < GREATEST_RATE_RAD_S
+
+
+@kernel
+def age_of(row: Array, now_us: int, imu_age: float) -> float:
+    """Age of a reading, s; NaN where it is of the future or too old."""
+    age = reading_age(now_us - row[SHOWS], imu_age)
+    if row[SHOWS] <= now_us and age <= OLDEST_READING_S:
+        return age
+    return np.nan
+
+
+@kernel
+def pose_in(row: Array, age_s: float) -> tuple[bool, PoseReading]:
+    """Whether the row's pose is believed, and the pose."""
+    raw = unpack(PoseReading, row, READING)
+    measured = not raw.velocity_std < 0.0
+    q = raw.quat_wxyz
+    pose = PoseReading(
+        age_s,
+        raw.x_quad,
+        q,
+        raw.v_quad if measured else ZERO,
+        at_least(raw.position_std, LEAST_POSITION_STD_M),
+        at_least(raw.attitude_std, LEAST_ANGLE_STD_RAD),
+        at_least(raw.velocity_std, LEAST_VELOCITY_STD_M_S) if measured else NOT_MEASURED,
+    )
+    turned = isfinite(q[0]) and isfinite(q[1]) and isfinite(q[2]) and isfinite(q[3])
+    return isfinite(age_s) and finite(pose.x_quad) and finite(pose.v_quad) and turned, pose
+
+
+@kernel
+def load_in(row: Array, age_s: float) -> tuple[bool, LoadReading]:
+    """Whether the row's place of the load is believed, and the reading."""
+    raw = unpack(LoadReading, row, READING)
+    measured = not raw.velocity_std < 0.0
+    load = LoadReading(
+        age_s,
+        raw.x_load,
+        raw.v_load if measured else ZERO,
+        at_least(raw.position_std, LEAST_POSITION_STD_M),
+        at_least(raw.velocity_std, LEAST_VELOCITY_STD_M_S) if measured else NOT_MEASURED,
+    )
+    return isfinite(age_s) and finite(load.x_load) and finite(load.v_load), load
+
+
+@kernel
+def fix_in(row: Array, age_s: float) -> tuple[bool, GnssReading]:
+    """Whether the row's fix is believed, and the fix."""
+    raw = unpack(GnssReading, row, READING)
+    fix = GnssReading(
+        age_s,
+        raw.position,
+        raw.velocity,
+        at_least(raw.horizontal_std, LEAST_FIX_STD_M),
+        at_least(raw.vertical_std, LEAST_FIX_STD_M),
+        raw.rtk,
+    )
+    stated = isfinite(raw.horizontal_std) and isfinite(raw.vertical_std)
+    return isfinite(age_s) and finite(fix.position) and finite(fix.velocity) and stated, fix
+
+
+@kernel
+def direction_in(row: Array, age_s: float) -> tuple[bool, DirectionReading]:
+    """Whether the row's direction to the load is believed, and the reading."""
+    raw = unpack(DirectionReading, row, READING)
+    length = norm(raw.direction_body)
+    sight = DirectionReading(
+        age_s,
+        scale(1.0 / length, raw.direction_body),
+        at_least(raw.direction_std, LEAST_DIRECTION_STD_RAD),
+    )
+    return isfinite(age_s) and 0.5 < length < 2.0, sight
+
+
+@kernel
+def vector_in(row: Array) -> Vec3:
+    """Three numbers of a row."""
+    return (row[READING], row[READING + 1], row[READING + 2])

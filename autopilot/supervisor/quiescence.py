@@ -1,0 +1,243 @@
+"""When the supervisor has nothing to decide: the ticks that pass without it.
+
+After each decision `next_stretch` lays down what is flown from here, until when no time runs out, and what
+must stay true meanwhile. `may_decide` looks at each tick whether it still is, in machine code. Where it is,
+`advance` would let the time go by and no more; it may ask once too often, never once too little. What a
+stretch cannot judge (setpoints that come at any time, fences, winches, cables that are caught) is decided at
+every tick.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite, nan
+from typing import NamedTuple
+
+from autopilot.control.records import State
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, norm, sub
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Calm, Catch, Creep, Leg, Swing, top_of
+from autopilot.guidance.setpoint_follower import Posture
+from autopilot.supervisor.advance import (
+    ASTRAY,
+    FAILSAFE_DISARM_US,
+    IDLE_DISARM_US,
+    LEAST_GAP,
+    LIFT_OFF_US,
+    LOAD_SUNK,
+    NO_ACTION,
+    PULL_US,
+    PULLED,
+    SLACK,
+    STILL_SPEED,
+    STILL_US,
+    TAUT_LATEST,
+    VEHICLE_SUNK,
+)
+from autopilot.supervisor.flight import (
+    CARRYING,
+    IN_AIR,
+    Flight,
+    Phase,
+    Selected,
+    Settings,
+    carries,
+    leg_time_s,
+)
+from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
+
+RESTING = 0  # no rotor is controlled, beside the control modes of the legs
+FOREVER_US = 2**52  # later than any flight lasts
+# what else ends a stretch
+NOTHING, TAUT, LOAD_DOWN, VEHICLE_DOWN = 0, 1, 2, 3
+
+
+class Stretch(NamedTuple):
+    """What is flown from `first_us` on, and what ends it."""
+
+    mode: int  # RESTING or a control mode
+    idle: bool  # the rotors idle, while none is controlled
+    first_us: int
+    stop_us: int  # at the latest
+    period_us: int  # of the ticks for which the setpoints are laid out
+    watch: int
+    level: float  # m: of the watch
+    still: bool  # the supervisor has noted already that the thing is down, or that the cable pulls
+    error_limit: float  # m: of the place that is tracked; infinite where none is
+    hangs: bool  # the load should hang on the cable
+    taut_length: float  # m, from load to vehicle
+    load_weight: float  # N
+    carried: bool  # the load must be known to go on
+    released: bool
+    tilt_limit: float  # rad; infinite on the ground
+    anchor_height: float  # m, that is held while an attitude is tracked
+    upward: Vec3  # attitude modes: where the thrust, or the cable seen from the load, is to point
+    thrust: float  # N, asked for with an attitude; NaN: what holds the height
+
+
+def at_rest(until_us: int, now_us: int, idle: bool) -> Stretch:
+    """A stretch in which no rotor is controlled."""
+    return Stretch(
+        mode=RESTING,
+        idle=idle,
+        first_us=now_us,
+        stop_us=until_us,
+        period_us=1,
+        watch=NOTHING,
+        level=0.0,
+        still=False,
+        error_limit=inf,
+        hangs=False,
+        taut_length=0.0,
+        load_weight=1.0,
+        carried=False,
+        released=False,
+        tilt_limit=inf,
+        anchor_height=0.0,
+        upward=ZERO,
+        thrust=nan,
+    )
+
+
+def next_stretch(
+    flight: Flight, settings: Settings, now_us: int, period_us: int, preview_s: float
+) -> Stretch:
+    """What is flown from this tick on; ticks are `period_us` apart, the law looks ahead by `preview_s`."""
+    if flight.phase not in IN_AIR:
+        return at_rest(_rest_ends_us(flight, now_us), now_us, flight.phase == Phase.ARMED)
+    leg = flight.legs[0]
+    carried = carries(flight)
+    hangs = flight.phase in CARRYING and not flight.released
+    lifting_ends_us = flight.phase_start_us + LIFT_OFF_US
+    ends = [_leg_ends_us(flight, leg)]
+    if flight.phase == Phase.LIFT and now_us < lifting_ends_us:
+        hangs = False
+        ends.append(lifting_ends_us)
+    elif flight.phase == Phase.LOWER and isinstance(leg, Creep):
+        hangs = False
+    watch, level, end_us = _watched(flight, leg, settings)
+    ends.append(end_us)
+    if _is_decided_at_every_tick(flight, leg, settings):
+        ends.append(now_us)
+    tracked = flight.phase in CARRYING and leg.control_mode == _position_mode(flight)
+    anchor_height, upward, thrust = _attitude(leg, leg_time_s(flight, now_us) + preview_s)
+    return Stretch(
+        mode=leg.control_mode,
+        idle=False,
+        first_us=now_us,
+        stop_us=min(ends),
+        period_us=max(period_us, 1),
+        watch=watch,
+        level=level,
+        still=flight.still_since_us >= 0,
+        error_limit=settings.load_error_limit_m if tracked else inf,
+        hangs=hangs,
+        taut_length=flight.taut_length_m,
+        load_weight=settings.load_weight_n,
+        carried=carried,
+        released=flight.released,
+        tilt_limit=settings.tilt_limit_rad,
+        anchor_height=anchor_height,
+        upward=upward,
+        thrust=thrust,
+    )
+
+
+def _rest_ends_us(flight: Flight, now_us: int) -> int:
+    """When something happens by itself while no rotor is controlled."""
+    if flight.phase == Phase.FAILSAFE:
+        return flight.phase_start_us + FAILSAFE_DISARM_US + 1
+    if flight.phase == Phase.ARMED:
+        rises = flight.selected == Selected.OFFBOARD  # a setpoint may take the load up at any tick
+        return now_us if rises else flight.phase_start_us + IDLE_DISARM_US + 1
+    return FOREVER_US
+
+
+def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> bool:
+    fenced = flight.fence.zones or settings.fence_radius_m > 0.0 or settings.fence_height_m > 0.0
+    return bool(
+        leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
+        or isinstance(leg, Catch)
+        or flight.slack_since_us >= 0
+        or flight.phase == Phase.GUIDED
+        or top_of(leg) is not None
+        or (fenced and settings.fence_action != NO_ACTION and flight.phase in CARRYING)
+    )
+
+
+def _watched(flight: Flight, leg: Leg, settings: Settings) -> tuple[int, float, int]:
+    """What is watched for, its level in m, and when it has been true for long enough."""
+    noted = flight.still_since_us >= 0
+    if flight.phase == Phase.TAUTEN and len(flight.legs) == 1 and isinstance(leg, Creep):
+        level = leg.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m
+        return TAUT, level, flight.still_since_us + PULL_US if noted else FOREVER_US
+    if flight.phase in (Phase.LOWER, Phase.SET_DOWN) and isinstance(leg, Creep):
+        end_us = flight.still_since_us + STILL_US if noted else FOREVER_US
+        if leg.control_mode == LOAD_POSITION:
+            return LOAD_DOWN, LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED, end_us
+        return VEHICLE_DOWN, VEHICLE_SUNK, end_us
+    return NOTHING, 0.0, FOREVER_US
+
+
+def _leg_ends_us(flight: Flight, leg: Leg) -> int:
+    """The first microsecond at which the present leg is over, as `advance` sees it."""
+    if leg.duration_s == inf:
+        return FOREVER_US
+    end_us = flight.leg_start_us + round(leg.duration_s * 1e6) - 2
+    while leg_time_s(flight, end_us) < leg.duration_s:
+        end_us += 1
+    return end_us
+
+
+def _position_mode(flight: Flight) -> int:
+    return QUAD_POSITION if flight.released else LOAD_POSITION
+
+
+def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:
+    """Height held, direction and thrust (N; NaN: what holds the height) that an attitude leg asks for."""
+    if not isinstance(leg, Swing | Calm | Posture):
+        return 0.0, ZERO, nan
+    asked = leg.lean.thrust_n if isinstance(leg, Posture) else None
+    return leg.anchor[2], leg.upward(t), nan if asked is None else asked
+
+
+@kernel
+def may_decide(
+    at: Stretch, now_us: int, state: State, known: bool, taut: bool, tilt: float, pull: float, target: Vec3
+) -> bool:
+    """Whether the supervisor could do anything at this tick but let the time go by.
+
+    `known`: the estimate is good enough to be flown on; `tilt` in rad; `pull` of the cable in N; `target` is
+    where load or vehicle are to be now.
+    """
+    elapsed = now_us - at.first_us
+    if now_us >= at.stop_us or elapsed % at.period_us != 0:
+        return True
+    if at.mode == RESTING:
+        return False
+    finite = (
+        isfinite(norm(state.x_quad))
+        and isfinite(norm(state.v_quad))
+        and isfinite(norm(state.x_load))
+        and isfinite(norm(state.v_load))
+    )
+    if not finite or not tilt <= at.tilt_limit or not known:
+        return True
+    tracked = state.x_quad if at.released else state.x_load
+    if not norm(sub(tracked, target)) <= at.error_limit:
+        return True
+    pulled = pull / at.load_weight
+    if at.hangs:
+        gap = at.taut_length - norm(sub(state.x_quad, state.x_load))
+        if not taut or (gap > LEAST_GAP and pulled < SLACK):
+            return True
+    if at.watch == TAUT:
+        beside = (state.x_load[0] - target[0], state.x_load[1] - target[1], 0.0)
+        if target[2] > at.level or not norm(beside) <= ASTRAY:
+            return True
+        return (pulled > PULLED and taut) != at.still
+    if at.watch == LOAD_DOWN:
+        return (state.x_load[2] - target[2] > at.level) != at.still
+    if at.watch == VEHICLE_DOWN:
+        down = state.x_quad[2] - target[2] > at.level and abs(state.v_quad[2]) < STILL_SPEED
+        return down != at.still
+    return False
