@@ -22,7 +22,8 @@ from sitl.plant.records import Rotors, Truth
 from sitl.sensors.files import load_profile
 from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
-from sitl.sim_core import SECOND_US, STOPPED, Readings, SimCore, settings_of
+from sitl.settings import SECOND_US, settings_of
+from sitl.sim_core import STOPPED, Readings, SimCore
 from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters

@@ -42,7 +42,24 @@ from autopilot.geometry.linear import (
 from autopilot.geometry.s2 import direction_error, direction_rate_error, psi_direction
 from autopilot.geometry.so3 import attitude_error, psi_attitude
 
-Row = tuple[float, ...]  # 16 of them, in the order of (4-6)
+Row = tuple[  # of K, or the state: sixteen numbers
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+    float,
+]
 Gain = tuple[Row, Row, Row, Row]
 
 # cosines and squared lengths below which a rate of an angle is no longer the exact one
@@ -89,7 +106,7 @@ def lqr(vehicle: Vehicle, weights: LqrWeights = LQR_WEIGHTS) -> Lqr:
     thrust, roll, pitch, yaw = (tuple(float(k) for k in row) for row in K)
     # on a ramp the thrust is that of hovering, so K_z e_z + K_z' v = 0
     ramp_lag = thrust[8 + Z] / thrust[Z]
-    return Lqr((thrust, roll, pitch, yaw), hover_thrust(vehicle), vehicle.cable_length, ramp_lag)
+    return Lqr((thrust, roll, pitch, yaw), hover_thrust(vehicle), vehicle.cable_length, ramp_lag)  # type: ignore[arg-type]
 
 
 @kernel

@@ -138,7 +138,7 @@ def felt_pull(pilot: Pilot, state: State, constants: CoreConstants) -> float:
 
 @kernel
 def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
-    """The estimate `dt` seconds later, after the first `count` readings of the inbox; and what is seen in it."""
+    """The estimate `dt` seconds later, after the first `count` readings of the inbox, and what is seen."""
     constants = unpack(CoreConstants, rows.constants, 0)
     winch, pilot = unpack(Winch, rows.winch, 0), unpack(Pilot, rows.pilot, 0)
     tied = winch.cable

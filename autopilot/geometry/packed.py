@@ -127,12 +127,13 @@ def with_field(record: R, name: str, value: Any) -> R:
 
 @overload(unpack)
 def _unpack(kind: Any, row: Any, first: Any) -> Any:
-    return _unpacker(kind.instance_class) if isinstance(kind, types.NamedTupleClass) else None
+    record: Any = kind.instance_class if isinstance(kind, types.NamedTupleClass) else None
+    return None if record is None else _unpacker(record)
 
 
 @overload(pack)
 def _pack(record: Any, row: Any, first: Any) -> Any:
-    kind = getattr(record, "instance_class", None)
+    kind: Any = getattr(record, "instance_class", None)
     return _packer(kind) if _is_record(kind) else None
 
 

@@ -140,7 +140,7 @@ def sensor_bits(
 
 
 def wind(push: Vec3, drag: Drag) -> Vec3:
-    """The wind (m/s) whose drag on a resting vehicle is the push (N) that is felt; NaN where none would do."""
+    """The wind (m/s) whose drag on a resting vehicle is the push (N) that is felt; NaN if there is none."""
     force = norm(push)
     if force == 0.0:
         return push

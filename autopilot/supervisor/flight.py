@@ -188,9 +188,12 @@ class Report(NamedTuple):
 
 
 def settings_from(table: ParameterTable, ramp_lag_s: float, reels: bool, follows_shaped: bool) -> Settings:
-    """The supervisor's settings from the parameter table, and what the law says of itself: by how much time
-    the
-    load keeps behind on a ramp, whether it flies other lengths of the cable, whether shaping its paths pays."""
+    """The supervisor's settings from the parameter table, and what the law says of itself.
+
+    `ramp_lag_s`: by how much time the load keeps behind on a ramp. `reels`: it flies other lengths of the
+    cable.
+    `follows_shaped`: shaping its paths beforehand pays.
+    """
     return Settings(
         cable_length_m=table["VEH_CABLE_LEN"],
         takeoff_altitude_m=table["MIS_TAKEOFF_ALT"],

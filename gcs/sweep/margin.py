@@ -16,16 +16,17 @@ import numpy as np
 from scipy.linalg import expm
 
 from autopilot.control.actuators.disturbance_observer import aloft
-from autopilot.control.actuators.rotor_model import Actuation, advance, steady
-from autopilot.control.records import Reference, State, Vehicle
-from autopilot.core.tick import Setup
+from autopilot.control.actuators.rotor_model import Actuation, advance, rows_of, steady
+from autopilot.control.laws.interface import kernels_of
+from autopilot.control.records import Cable, Reference, State, Vehicle
+from autopilot.core.flight_core import Setup
 from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.onboard.onboard import build_setup
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from gcs.analysis.axes import Floats
 from gcs.sweep.plan import SweepPlan, simulated
-from sitl.sim_core import settings_of
+from sitl.settings import settings_of
 from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
@@ -140,18 +141,17 @@ def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
     observed = aloft(vehicle)
-    rows = setup.actuation.whole + 2  # of the queue; later ones are not looked at
+    kernels, cable = kernels_of(law), Cable(vehicle.cable_length)
     hover = np.zeros(MOTION)
 
     def tick(memory: Any, actuation: Actuation, motion: Floats) -> tuple[Any, Actuation, Floats]:
         state = state_at(motion, vehicle)
-        memory, command = law.load_position(memory, state, reference, actuation, observed)
+        memory, command = kernels.load_position(law, memory, state, reference, actuation, observed, cable)
         after = advance(actuation, command.thrust, command.moment, setup.actuation)
         return memory, after, np.array([command.thrust, *command.moment])
 
-    full = steady(weight)
-    actuation = Actuation(full.queue[:rows].copy(), full.thrust, full.moment)
-    memory = law.start(state_at(hover, vehicle), ZERO, ZERO)
+    actuation = steady(weight, rows_of(setup.actuation))
+    memory = kernels.start(law, state_at(hover, vehicle), ZERO, ZERO)
     for _ in range(SETTLE_TICKS):
         memory, actuation, _ = tick(memory, actuation, hover)
     form = (memory, actuation)

@@ -21,7 +21,7 @@ from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
 from missions.fileformat import load_mission
 from sitl.sensors.files import load_profile
-from sitl.sim_core import settings_of
+from sitl.settings import settings_of
 from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import sim_parameters
 

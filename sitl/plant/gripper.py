@@ -7,23 +7,28 @@ from __future__ import annotations
 
 from math import inf
 
+from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm, sub
+from autopilot.geometry.packed import with_field
 from sitl.plant.records import PlantState, Truth
 
 
+@kernel
 def without_cable(truth: Truth) -> Truth:
     """The truth of a vehicle and a load that nothing ties together."""
-    return truth._replace(cable_length=inf)
+    return with_field(truth, "cable_length", inf)
 
 
+@kernel
 def dropped(state: PlantState) -> PlantState:
     """The state at the instant at which the cable is let go: positions and velocities go on as they are.
 
     `accel_quad` stays that of the instant before, as at every instant at which the forces jump.
     """
-    return state._replace(taut=0.0, tension=0.0)
+    return with_field(with_field(state, "taut", 0.0), "tension", 0.0)
 
 
+@kernel
 def takes_hold(state: PlantState, truth: Truth) -> bool:
     """Whether a gripper that closes has the cable: the load lies on the ground, and within reach."""
     return state.load_on_ground > 0.0 and norm(sub(state.x_load, state.x_quad)) <= truth.cable_length

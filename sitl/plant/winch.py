@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from math import isnan, sqrt
 
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.packed import with_field
 from sitl.plant.records import Truth
 
 GREATEST_RATE = 2.0  # m/s
@@ -16,6 +18,7 @@ SHORTEST = 0.05  # m, then the drum stops
 _STANDS = 1e-9  # m/s, a rate that is rounding
 
 
+@kernel
 def reeling(truth: Truth, wanted_rate: float, tick_s: float) -> Truth:
     """The truth of a tick in which the drum goes to `wanted_rate`, m/s, positive: out; NaN: it stops."""
     if isnan(wanted_rate):
@@ -26,16 +29,16 @@ def reeling(truth: Truth, wanted_rate: float, tick_s: float) -> Truth:
     wanted_rate = min(GREATEST_RATE, max(-fastest_in, wanted_rate))
     rate = truth.reel_rate
     if wanted_rate == 0.0 and abs(rate) < _STANDS:
-        return truth._replace(reel_rate=0.0, reel_accel=0.0)
+        return with_field(with_field(truth, "reel_rate", 0.0), "reel_accel", 0.0)
     accel = min(GREATEST_ACCEL, max(-GREATEST_ACCEL, (wanted_rate - rate) / tick_s))
-    return truth._replace(reel_accel=accel)
+    return with_field(truth, "reel_accel", accel)
 
 
+@kernel
 def later(truth: Truth, h: float) -> Truth:
     """The truth h seconds on, within the tick."""
     rate, accel = truth.reel_rate, truth.reel_accel
     if rate == 0.0 and accel == 0.0:
         return truth
-    return truth._replace(
-        cable_length=truth.cable_length + h * (rate + 0.5 * h * accel), reel_rate=rate + h * accel
-    )
+    longer = with_field(truth, "cable_length", truth.cable_length + h * (rate + 0.5 * h * accel))
+    return with_field(longer, "reel_rate", rate + h * accel)

@@ -12,7 +12,8 @@ from autopilot.wire.codec import FrameWriter, decode
 from sitl.hil import HilSimulator
 from sitl.plant.step import initial_state
 from sitl.sensors.files import load_profile, parse_profile
-from sitl.sim_core import SimCore, settings_of
+from sitl.settings import settings_of
+from sitl.sim_core import SimCore
 from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply, sim_parameters
 

@@ -1,0 +1,216 @@
+"""What the simulator link makes of readings and commands: the rounding of its messages, without the messages.
+
+Readings pass through single precision in NED and FRD, fixes through 1e-7 degrees, so that a flight without a
+wire is the same flight. Nothing else is done here: which readings are believed is the autopilot's affair.
+"""
+
+from __future__ import annotations
+
+from math import cos, nan, pi, radians, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from autopilot.estimation import inbox as box
+from autopilot.estimation.records import Array, DirectionReading, GnssReading, LoadReading, PoseReading
+from autopilot.geometry.frames import quat_enu_flu_from_ned_frd, quat_ned_frd_from_enu_flu
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.packed import Row, pack
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import EARTH_RADIUS_M
+from autopilot.wire.convert.scaling import saturated
+from autopilot.wire.convert.simulator import REEL_MAX, ROTOR_FMAX
+from sitl.plant.records import Rotors
+from sitl.sensors.profile import Profile, stated_of
+from sitl.world import BARO, CABLE, GNSS, IMU, LOAD, MAG, MOCAP, READING, SHOWS, WorldRows, arrived
+
+
+class Wire(NamedTuple):
+    """The deviations that the trackers state, as they arrive (negative: not measured), and the home place."""
+
+    pose_position_std: float
+    pose_attitude_std: float
+    pose_velocity_std: float
+    load_position_std: float
+    load_velocity_std: float
+    direction_std: float
+    fix_horizontal_std: float
+    fix_vertical_std: float
+    rtk: float  # 1.0: fixes with carrier phase
+    home: Vec3  # degrees north and east, m
+    metres_per_degree: float
+    east_metres_per_degree: float
+    cosine: float  # of the latitude
+
+
+@kernel
+def single(value: float) -> float:
+    """`value` as a single-precision field of a message keeps it."""
+    return np.float64(np.float32(value))
+
+
+@kernel
+def _single3(row: Row, first: int) -> Vec3:
+    return (single(row[first]), single(row[first + 1]), single(row[first + 2]))
+
+
+@kernel
+def wire_forces(forces: Rotors) -> Rotors:
+    """Rotor forces (N) as HIL_ACTUATOR_CONTROLS carries them."""
+    return (
+        single(forces[0] / ROTOR_FMAX) * ROTOR_FMAX,
+        single(forces[1] / ROTOR_FMAX) * ROTOR_FMAX,
+        single(forces[2] / ROTOR_FMAX) * ROTOR_FMAX,
+        single(forces[3] / ROTOR_FMAX) * ROTOR_FMAX,
+    )
+
+
+def wire_rate(rate: float) -> float:
+    """The winch's rate (m/s) as HIL_ACTUATOR_CONTROLS carries it."""
+    return float(single(rate / REEL_MAX) * REEL_MAX)
+
+
+@kernel
+def _pose(row: Row, wire: Wire) -> PoseReading:
+    sent = quat_ned_frd_from_enu_flu((row[READING + 3], row[READING + 4], row[READING + 5], row[READING + 6]))
+    quat = quat_enu_flu_from_ned_frd((single(sent[0]), single(sent[1]), single(sent[2]), single(sent[3])))
+    v_quad = ZERO if wire.pose_velocity_std < 0.0 else _single3(row, READING + 7)
+    return PoseReading(
+        0.0,
+        _single3(row, READING),
+        quat,
+        v_quad,
+        wire.pose_position_std,
+        wire.pose_attitude_std,
+        wire.pose_velocity_std,
+    )
+
+
+@kernel
+def _load(row: Row, wire: Wire) -> LoadReading:
+    v_load = ZERO if wire.load_velocity_std < 0.0 else _single3(row, READING + 3)
+    return LoadReading(0.0, _single3(row, READING), v_load, wire.load_position_std, wire.load_velocity_std)
+
+
+@kernel
+def _fix(row: Row, wire: Wire) -> GnssReading:
+    """A fix as HIL_GPS carries it: position in 1e-7 degrees and millimetres, velocity in centimetres."""
+    home, scale_north, scale_east = wire.home, wire.metres_per_degree, wire.east_metres_per_degree
+    east_deg = row[READING] / scale_east
+    north_deg = row[READING + 1] / scale_north
+    latitude = np.rint((home[0] + north_deg) / 1e-7)
+    longitude = np.rint((home[1] + east_deg) / 1e-7)
+    altitude = np.rint((home[2] + row[READING + 2]) * 1e3)
+    position = (
+        (longitude * 1e-7 - home[1]) * scale_north * wire.cosine,
+        (latitude * 1e-7 - home[0]) * scale_north,
+        altitude * 1e-3 - home[2],
+    )
+    velocity = (
+        np.rint(row[READING + 3] * 100.0) * 0.01,
+        np.rint(row[READING + 4] * 100.0) * 0.01,
+        -(np.rint(-row[READING + 5] * 100.0) * 0.01),
+    )
+    return GnssReading(0.0, position, velocity, wire.fix_horizontal_std, wire.fix_vertical_std, wire.rtk)
+
+
+@kernel
+def _newest(sensor: int, now_us: int, rows: WorldRows) -> int:
+    """Row of the sensor's newest reading of this tick, those before it taken out; or -1."""
+    newest = -1
+    at = arrived(sensor, now_us, rows)
+    while at >= 0:
+        newest = at
+        at = arrived(sensor, now_us, rows)
+    return newest
+
+
+@kernel
+def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
+    """Put what has left the sensors by now into the autopilot's inbox; how many readings that is.
+
+    Row 0 is the inertial unit's: HIL_SENSOR says its newest sample, or again the last one.
+    """
+    newest = _newest(IMU, now_us, rows)
+    inbox[0, box.KIND] = box.IMU
+    if newest >= 0:
+        row = rows.queue[IMU, newest]
+        for i in range(3):
+            inbox[0, box.READING + i] = single(row[READING + 3 + i])
+            inbox[0, box.READING + 3 + i] = single(row[READING + i])
+    count = 1
+    at = arrived(MOCAP, now_us, rows)
+    while at >= 0:
+        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.POSE, rows.queue[MOCAP, at, SHOWS]
+        pack(_pose(rows.queue[MOCAP, at], wire), inbox[count], box.READING)
+        count += 1
+        at = arrived(MOCAP, now_us, rows)
+    at = arrived(LOAD, now_us, rows)
+    while at >= 0:
+        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.LOAD, rows.queue[LOAD, at, SHOWS]
+        pack(_load(rows.queue[LOAD, at], wire), inbox[count], box.READING)
+        count += 1
+        at = arrived(LOAD, now_us, rows)
+    at = arrived(CABLE, now_us, rows)
+    while at >= 0:
+        row = rows.queue[CABLE, at]
+        if row[READING + 3] > 0.0:  # seen
+            sight = DirectionReading(0.0, _single3(row, READING), wire.direction_std)
+            inbox[count, box.KIND], inbox[count, box.SHOWS] = box.DIRECTION, row[SHOWS]
+            pack(sight, inbox[count], box.READING)
+            count += 1
+        at = arrived(CABLE, now_us, rows)
+    newest = _newest(GNSS, now_us, rows)
+    if newest >= 0:
+        inbox[count, box.KIND], inbox[count, box.SHOWS] = box.FIX, rows.queue[GNSS, newest, SHOWS]
+        pack(_fix(rows.queue[GNSS, newest], wire), inbox[count], box.READING)
+        count += 1
+    newest = _newest(BARO, now_us, rows)
+    if newest >= 0:
+        inbox[count, box.KIND] = box.HEIGHT
+        altitude = single(wire.home[2] + rows.queue[BARO, newest, READING])
+        inbox[count, box.READING] = altitude - wire.home[2]
+        count += 1
+    newest = _newest(MAG, now_us, rows)
+    if newest >= 0:
+        inbox[count, box.KIND] = box.FIELD
+        for i in range(3):
+            inbox[count, box.READING + i] = single(rows.queue[MAG, newest, READING + i])
+        count += 1
+    return count
+
+
+def most_readings(rows: WorldRows) -> int:
+    """Readings that can arrive at one tick."""
+    return int(rows.queue.shape[0] * rows.queue.shape[1])
+
+
+def wire_of(profile: Profile, noise_scale: float, home: Home) -> Wire:
+    """What the trackers of a profile state, rounded as their messages round it."""
+    stated = stated_of(profile, noise_scale)
+    mocap, load = profile.mocap, profile.load_tracker
+
+    def root(std: float) -> float:
+        """Of a variance that was sent."""
+        variance = float(np.float32(std * std))
+        return sqrt(variance) if variance >= 0.0 else nan
+
+    metres, cosine = EARTH_RADIUS_M * pi / 180.0, cos(radians(home.latitude_deg))
+    measured = mocap is not None and mocap.velocity_noise_m_s is not None
+    load_measured = load is not None and load.velocity_noise_m_s is not None
+    return Wire(
+        root(stated.mocap_position),
+        root(stated.mocap_attitude),
+        root(stated.mocap_velocity) if measured else box.NOT_MEASURED,
+        float(np.float32(stated.load_position)),
+        float(np.float32(stated.load_velocity)) if load_measured else box.NOT_MEASURED,
+        float(np.float32(stated.direction)),
+        saturated(stated.gnss_horizontal * 100.0, 0, 0xFFFE) * 0.01,
+        saturated(stated.gnss_vertical * 100.0, 0, 0xFFFE) * 0.01,
+        1.0 if profile.gnss is not None and profile.gnss.fix == "rtk" else 0.0,
+        (home.latitude_deg, home.longitude_deg, home.altitude_m),
+        metres,
+        metres * cosine,
+        cosine,
+    )

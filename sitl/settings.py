@@ -1,0 +1,52 @@
+"""What the SIM_* parameters mean to the world."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.geometry.linear import Vec3
+from autopilot.wire.parameter_table import ParameterError, ParameterTable
+
+SECOND_US = 1_000_000
+
+
+class Settings(NamedTuple):
+    """Rates, delays, losses and wind."""
+
+    tick_us: int
+    actuator_delay_us: int
+    noise_scale: float
+    sensor_latency_us: int  # added to that of each sensor
+    sensor_loss: float  # 0 ... 1, added to that of each sensor but the IMU
+    wind: Vec3  # mean, ENU, m/s
+    gust_std: float  # m/s, each axis
+    gust_tau_s: float
+    pulse: Vec3  # ENU, m/s, added to the wind for a while
+    pulse_at_us: int  # when it begins; negative: never
+    pulse_for_us: int
+
+
+def settings_of(table: ParameterTable) -> Settings:
+    """The settings of a table of SIM_* parameters, or ParameterError."""
+    rate = table["SIM_RATE_HZ"]
+    tick_us = round(SECOND_US / rate)
+    if tick_us * rate != SECOND_US:
+        divisors = (hz for hz in range(100, 1001) if SECOND_US % hz == 0)
+        allowed = ", ".join(str(hz) for hz in divisors)
+        raise ParameterError(
+            f"SIM_RATE_HZ = {rate:g} Hz; a tick must be a whole number of microseconds, and "
+            f"{SECOND_US} us / {rate:g} is not: take one of {allowed}"
+        )
+    return Settings(
+        tick_us=tick_us,
+        actuator_delay_us=round(table["SIM_ACT_DELAY_MS"] * 1000.0),
+        noise_scale=table["SIM_NOISE_SCALE"],
+        sensor_latency_us=round(table["SIM_SENS_LAT_MS"] * 1000.0),
+        sensor_loss=table["SIM_DROP_PCT"] / 100.0,
+        wind=(table["SIM_WIND_E"], table["SIM_WIND_N"], table["SIM_WIND_U"]),
+        gust_std=table["SIM_GUST_STD"],
+        gust_tau_s=table["SIM_GUST_TAU_S"],
+        pulse=(table["SIM_GUST_E"], table["SIM_GUST_N"], table["SIM_GUST_U"]),
+        pulse_at_us=round(table["SIM_GUST_AT_S"] * SECOND_US),
+        pulse_for_us=round(table["SIM_GUST_FOR_S"] * SECOND_US),
+    )
