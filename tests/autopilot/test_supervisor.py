@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise, product
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,7 +14,9 @@ from autopilot.guidance.legs import LOAD_POSITION, Brake, Calm, Creep, Hold, Run
 from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
-from autopilot.supervisor.advance import TRANSITIONS, advance, enter, happen
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.machine import _enter as enter
+from autopilot.supervisor.machine import happen
 from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
@@ -25,60 +28,13 @@ from autopilot.supervisor.state import (
     Phase,
     Setpoints,
 )
+from autopilot.supervisor.table import TRANSITIONS, markdown
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
 
 from .conftest import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
 
-# the table, said once more in words: from, what happens, to
-TABLE = """
-disarmed  arm                    armed
-armed     disarm                 disarmed
-armed     take off               tauten
-armed     give up                disarmed
-tauten    cable taut             lift
-tauten    land                   set_down
-lift      legs done              hold
-lift      hold                   hold
-lift      land                   lower
-lift      load on the ground     set_down
-hold      hold                   hold
-hold      fly the mission        mission
-hold      return                 return
-hold      follow setpoints       guided
-hold      land                   lower
-hold      load on the ground     set_down
-mission   legs done              hold
-mission   hold                   hold
-mission   fly the mission        mission
-mission   return                 return
-mission   follow setpoints       guided
-mission   land                   lower
-mission   load on the ground     set_down
-return    legs done              lower
-return    hold                   hold
-return    fly the mission        mission
-return    land                   lower
-return    follow setpoints       guided
-return    load on the ground     set_down
-guided    follow setpoints       guided
-guided    hold                   hold
-guided    fly the mission        mission
-guided    return                 return
-guided    land                   lower
-guided    load on the ground     set_down
-lift      follow setpoints       guided
-lower     load on the ground     set_down
-lower     hold                   hold
-lower     fly the mission        mission
-lower     return                 return
-lower     follow setpoints       guided
-lower     vehicle on the ground  disarmed
-set_down  vehicle on the ground  disarmed
-failsafe  disarm                 disarmed
-"""
-# in the air, whatever the phase, one can give up, and stop the rotors by force
-IN_ANY_PHASE_IN_AIR = {Event.FAIL: Phase.FAILSAFE, Event.DISARM: Phase.DISARMED}
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "architecture.md"
 STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), model.Land())
 # m: setpoints on both sides of a join; a tick of 20 ms at 1.5 m/s is 30 mm
 CONTINUOUS = 1e-9
@@ -86,14 +42,25 @@ JUMP_PER_TICK = 0.05
 
 
 def table() -> dict[tuple[Phase, Event], Phase]:
-    rows = [line.split("  ", 1) for line in TABLE.strip().splitlines()]
+    """The table as the document has it."""
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in documented().splitlines()]
+    phases = [Phase[name.replace(" ", "_").upper()] for name in rows[0][1:]]
     written = {}
-    for name, rest in rows:
-        event, after = rest.strip().rsplit("  ", 1)
-        written[(Phase[name.upper()], Event(event.strip()))] = Phase[after.strip().upper()]
-    for phase in IN_AIR:
-        written.update({(phase, what): to for what, to in IN_ANY_PHASE_IN_AIR.items()})
+    for event, *cells in rows[2:]:
+        for phase, after in zip(phases, cells, strict=True):
+            if after:
+                written[(phase, Event(event))] = Phase[after.replace(" ", "_").upper()]
     return written
+
+
+def documented() -> str:
+    text = DOCUMENT.read_text()
+    begin = text.index("| event |")
+    return text[begin : text.index("\n\n", begin) + 1]
+
+
+def test_the_document_shows_the_table() -> None:
+    assert documented() == markdown()
 
 
 @pytest.mark.parametrize(("phase", "event"), list(product(Phase, Event)))
