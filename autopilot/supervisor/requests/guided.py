@@ -14,7 +14,16 @@ from autopilot.supervisor.motion import asked_motion
 from autopilot.supervisor.requests.limits import FARTHEST_M
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, later, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import ON_GROUND, Event, Flight, Guide, Phase, Selected, View, off_mission
+from autopilot.supervisor.state import (
+    ON_GROUND,
+    Event,
+    Flight,
+    Guide,
+    Phase,
+    Selected,
+    View,
+    off_mission,
+)
 
 STREAM_US = 500_000  # a stream is there where its last setpoint is no older: two a second
 

@@ -15,7 +15,16 @@ from autopilot.supervisor.requests.mission import continue_mission
 from autopilot.supervisor.requests.takeoff import takeoff
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, Handler, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import ON_GROUND, Event, Flight, Guide, Phase, Selected, View, off_mission
+from autopilot.supervisor.state import (
+    ON_GROUND,
+    Event,
+    Flight,
+    Guide,
+    Phase,
+    Selected,
+    View,
+    off_mission,
+)
 
 LEVEL_HOME_M = 1.0
 

@@ -18,7 +18,14 @@ from autopilot.supervisor.requests.limits import LEAST_ALTITUDE_M
 from autopilot.supervisor.requests.mission_checks import reel_trouble
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, later
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import ON_GROUND, Event, Flight, Phase, View, off_mission
+from autopilot.supervisor.state import (
+    ON_GROUND,
+    Event,
+    Flight,
+    Phase,
+    View,
+    off_mission,
+)
 from autopilot.supervisor.step_legs import LEAST_REEL_M
 from autopilot.wire.dialect import plumbline as mavlink
 

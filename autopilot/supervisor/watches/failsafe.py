@@ -7,7 +7,15 @@ from math import degrees, isfinite
 from autopilot.geometry.linear import norm, sub
 from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, IN_AIR, Event, Flight, View, off_mission, setpoint
+from autopilot.supervisor.state import (
+    CARRYING,
+    IN_AIR,
+    Event,
+    Flight,
+    View,
+    off_mission,
+    setpoint,
+)
 from autopilot.supervisor.watches.watched import Watched
 from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY
 
