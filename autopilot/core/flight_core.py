@@ -47,9 +47,10 @@ from autopilot.guidance.layout import COLUMNS, jets_ahead
 from autopilot.guidance.legs import Catch, least_move_s, top_of
 from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.flight import Flight, Report, Settings, View, carries, leg_time_s
 from autopilot.supervisor.quiescence import RESTING, Stretch, at_rest, next_stretch
-from autopilot.supervisor.requests import decide
+from autopilot.supervisor.requests.decide import decide
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import Flight, Report, View, carries, leg_time_s
 
 LAID_OUT = 50  # setpoints that a process lays out at once; a sweep takes more
 _NO_ROWS = np.zeros((1, COLUMNS))
@@ -130,7 +131,7 @@ class FlightCore:
         carried = carries(self.flight)
         found: tuple[str, ...] = ()
         if seen.vehicle_complaint or (carried and seen.load_complaint):
-            found = complaints(self.estimator, self.settings.sensor_age_limit_s, carried)
+            found = complaints(self.estimator, self.settings.failsafe.sensor_age_limit_s, carried)
         state = seen.state
         return View(
             now_us,
@@ -172,20 +173,21 @@ class FlightCore:
         reels = bool(flight.legs) and top_of(flight.legs[0]) is not None
         if not (reels or self._dirty):
             return
-        before_m = flight.cable_m
+        before_m = flight.cable.length_m
         flight = self.flight = _with_cable_now(flight, now_us)
-        length = self.setup.vehicle.cable_length if flight.cable_m is None else flight.cable_m
-        grown = 0.0 if before_m is None or flight.cable_m is None else flight.cable_m - before_m
-        cable = Cable(length, flight.reel_rate, flight.reel_accel)
-        pack(Winch(cable, grown, flight.released), self.rows.winch, 0)
+        winch = flight.cable
+        length = self.setup.vehicle.cable_length if winch.length_m is None else winch.length_m
+        grown = 0.0 if before_m is None or winch.length_m is None else winch.length_m - before_m
+        cable = Cable(length, winch.reel_rate, winch.reel_accel)
+        pack(Winch(cable, grown, winch.released), self.rows.winch, 0)
         # what has grown is told once
         self._dirty = grown != 0.0
         self._follow_cable()
 
     def _follow_cable(self) -> None:
-        if self.flight.cable_m == self._cable_m:
+        if self.flight.cable.length_m == self._cable_m:
             return
-        self._cable_m = self.flight.cable_m
+        self._cable_m = self.flight.cable.length_m
         length, settings = self._cable_m, self.setup.settings
         if length is not None:
             least_s = least_move_s(length, settings.gravity_m_s2)
@@ -269,7 +271,7 @@ def _constants(setup: Setup) -> CoreConstants:
         setup.observer,
         setup.drag,
         setup.control_every,
-        setup.settings.sensor_age_limit_s,
+        setup.settings.failsafe.sensor_age_limit_s,
     )
 
 
@@ -277,18 +279,20 @@ def _with_cable_now(flight: Flight, now_us: int) -> Flight:
     """The flight with its cable as the winch has it at this instant: L, L' and L'' of the leg that reels."""
     top = top_of(flight.legs[0]) if flight.legs else None
     if top is None:
-        resting = flight.reel_rate == 0.0 and flight.reel_accel == 0.0
-        return flight if resting else replace(flight, reel_rate=0.0, reel_accel=0.0)
+        if flight.cable.reel_rate == 0.0 and flight.cable.reel_accel == 0.0:
+            return flight
+        return replace(flight, cable=replace(flight.cable, reel_rate=0.0, reel_accel=0.0))
     jet = flight.legs[0].jet(leg_time_s(flight, now_us))
     length = top - jet[0][2]
-    grown = 0.0 if flight.cable_m is None else length - flight.cable_m
-    return replace(
-        flight,
-        cable_m=length,
+    grown = 0.0 if flight.cable.length_m is None else length - flight.cable.length_m
+    cable = replace(
+        flight.cable,
+        length_m=length,
         reel_rate=-jet[1][2],
         reel_accel=-jet[2][2],
-        taut_length_m=flight.taut_length_m + grown,
+        taut_length_m=flight.cable.taut_length_m + grown,
     )
+    return replace(flight, cable=cable)
 
 
 def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:

@@ -45,8 +45,9 @@ from autopilot.services.records import (
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
 from autopilot.services.snapshot import Snapshot
-from autopilot.supervisor.flight import ON_GROUND, MissionPlan, Phase, settings_from
-from autopilot.supervisor.requests import with_plan
+from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.settings import settings_from
+from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
@@ -167,7 +168,7 @@ class Onboard:
             self.core.forces,
             self.armed,
             self._options.lockstep,
-            self.core.flight.released,
+            self.core.flight.cable.released,
             commanded_rate(self.core.flight, tick.now_us, self._shortest_us * 1e-6),
         )
         aside = self._world.messages(self.now_us)
@@ -210,7 +211,7 @@ class Onboard:
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
-            last = self.core.flight.mission_done and seq == report.reached[-1]
+            last = self.core.flight.mission.done and seq == report.reached[-1]
             self.endpoint.item_reached(seq, last)
         if self._log is not None:
             rate_hz = self.parameters["LOG_RATE_HZ"]
@@ -271,7 +272,7 @@ class Onboard:
         self.core.follow(build_setup(self.parameters, every))
         self._battery = battery_constants(self.parameters)
         # a mission under way keeps the paths that it began with
-        if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.on_mission:
+        if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.mission.active:
             self._prepare()
 
     # ---- ground
@@ -358,10 +359,10 @@ class Onboard:
         self.endpoint.set_areas(kind, items)
         flight = self.core.flight
         if kind == mavlink.MAV_MISSION_TYPE_FENCE:
-            flight = replace(flight, fence=read_fence(items, self._options.home), breach="")
+            area = replace(flight.area, fence=read_fence(items, self._options.home), breach="")
         else:
-            flight = replace(flight, rally=read_rally(items, self._options.home))
-        self.core.change(flight)
+            area = replace(flight.area, rally=read_rally(items, self._options.home))
+        self.core.change(replace(flight, area=area))
 
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None)
@@ -374,7 +375,7 @@ class Onboard:
 
     def _prepare(self) -> None:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
-        plan, limits = self.core.flight.plan, self.core.setup.settings.limits
+        plan, limits = self.core.flight.mission.plan, self.core.setup.settings.limits
         self._prepared_for = limits
         self.work = Work(plan.steps, plan.sequence, limits)
         self._have_prepared(PENDING)
@@ -393,7 +394,8 @@ class Onboard:
 
     def _have_prepared(self, prepared: Prepared) -> None:
         flight = self.core.flight
-        self.core.change(replace(flight, plan=replace(flight.plan, prepared=prepared)))
+        plan = replace(flight.mission.plan, prepared=prepared)
+        self.core.change(replace(flight, mission=replace(flight.mission, plan=plan)))
 
     def _snapshot(self) -> Snapshot:
         return make_snapshot(

@@ -17,33 +17,16 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, norm, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Calm, Catch, Creep, Leg, Swing, top_of
 from autopilot.guidance.setpoint_follower import Posture
-from autopilot.supervisor.advance import (
-    ASTRAY,
-    FAILSAFE_DISARM_US,
-    IDLE_DISARM_US,
-    LEAST_GAP,
-    LIFT_OFF_US,
-    LOAD_SUNK,
-    NO_ACTION,
-    PULL_US,
-    PULLED,
-    SLACK,
-    STILL_SPEED,
-    STILL_US,
-    TAUT_LATEST,
-    VEHICLE_SUNK,
-)
-from autopilot.supervisor.flight import (
-    CARRYING,
-    IN_AIR,
-    Flight,
-    Phase,
-    Selected,
-    Settings,
-    carries,
-    leg_time_s,
-)
+from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import CARRYING, IN_AIR, Flight, Phase, Selected, carries, leg_time_s
+from autopilot.supervisor.watches.cable_pull import PULL_US, PULLED, SLACK
+from autopilot.supervisor.watches.fence import NO_ACTION
+from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
+from autopilot.supervisor.watches.slack import LEAST_GAP, LIFT_OFF_US
+from autopilot.supervisor.watches.tautening import ASTRAY, TAUT_LATEST
+from autopilot.supervisor.watches.touchdown import LOAD_SUNK, STILL_SPEED, STILL_US, VEHICLE_SUNK
 
 RESTING = 0  # no rotor is controlled, beside the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts
@@ -106,7 +89,7 @@ def next_stretch(
         return at_rest(_rest_ends_us(flight, now_us), now_us, flight.phase == Phase.ARMED)
     leg = flight.legs[0]
     carried = carries(flight)
-    hangs = flight.phase in CARRYING and not flight.released
+    hangs = flight.phase in CARRYING and not flight.cable.released
     lifting_ends_us = flight.phase_start_us + LIFT_OFF_US
     ends = [_leg_ends_us(flight, leg)]
     if flight.phase == Phase.LIFT and now_us < lifting_ends_us:
@@ -118,7 +101,7 @@ def next_stretch(
     ends.append(end_us)
     if _is_decided_at_every_tick(flight, leg, settings):
         ends.append(now_us)
-    tracked = flight.phase in CARRYING and leg.control_mode == _position_mode(flight)
+    tracked = flight.phase in CARRYING and leg.control_mode == position_mode(flight)
     anchor_height, upward, thrust = _attitude(leg, leg_time_s(flight, now_us) + preview_s)
     return Stretch(
         mode=leg.control_mode,
@@ -129,13 +112,13 @@ def next_stretch(
         watch=watch,
         level=level,
         still=flight.still_since_us >= 0,
-        error_limit=settings.load_error_limit_m if tracked else inf,
+        error_limit=settings.failsafe.load_error_limit_m if tracked else inf,
         hangs=hangs,
-        taut_length=flight.taut_length_m,
+        taut_length=flight.cable.taut_length_m,
         load_weight=settings.load_weight_n,
         carried=carried,
-        released=flight.released,
-        tilt_limit=settings.tilt_limit_rad,
+        released=flight.cable.released,
+        tilt_limit=settings.failsafe.tilt_limit_rad,
         anchor_height=anchor_height,
         upward=upward,
         thrust=thrust,
@@ -153,14 +136,14 @@ def _rest_ends_us(flight: Flight, now_us: int) -> int:
 
 
 def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> bool:
-    fenced = flight.fence.zones or settings.fence_radius_m > 0.0 or settings.fence_height_m > 0.0
+    fenced = flight.area.fence.zones or settings.fence.radius_m > 0.0 or settings.fence.height_m > 0.0
     return bool(
         leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
         or isinstance(leg, Catch)
-        or flight.slack_since_us >= 0
+        or flight.cable.slack_since_us >= 0
         or flight.phase == Phase.GUIDED
         or top_of(leg) is not None
-        or (fenced and settings.fence_action != NO_ACTION and flight.phase in CARRYING)
+        or (fenced and settings.fence.action != NO_ACTION and flight.phase in CARRYING)
     )
 
 
@@ -186,10 +169,6 @@ def _leg_ends_us(flight: Flight, leg: Leg) -> int:
     while leg_time_s(flight, end_us) < leg.duration_s:
         end_us += 1
     return end_us
-
-
-def _position_mode(flight: Flight) -> int:
-    return QUAD_POSITION if flight.released else LOAD_POSITION
 
 
 def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:

@@ -22,9 +22,10 @@ from autopilot.guidance.legs import LOAD_POSITION, asked_jet
 from autopilot.onboard.onboard import Onboard, build_setup, plan_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.requests import Arm, StartMission
-from autopilot.supervisor.flight import IN_AIR, MissionPlan, Phase, jet_ahead, leg_time_s
+from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.quiescence import Stretch
-from autopilot.supervisor.requests import arming_complaints, with_plan
+from autopilot.supervisor.requests.arming import arming_complaints
+from autopilot.supervisor.state import IN_AIR, MissionPlan, Phase, jet_ahead, leg_time_s
 from autopilot.trajectory.prepare import Limits
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.belief import load_belief
@@ -171,7 +172,7 @@ class _Flight:
                 self.asked,
                 self.trace,
                 begun,
-                flight.released,
+                flight.cable.released,
                 wire_rate(commanded_rate(flight, before.now_us, self.tick_us * 1e-6)),
                 self._stop_tick(),
             )
@@ -254,7 +255,7 @@ class _Flight:
         if flown.outcome:
             return
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
-            flown.outcome = "completed" if flight.mission_done else "interrupted"
+            flown.outcome = "completed" if flight.mission.done else "interrupted"
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.limit_us:
             where: str = flight.phase.name.lower()
             flown.outcome, flown.lost_phase = "timeout", where

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.onboard.onboard import Onboard
-from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.state import Phase
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home, hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
 from autopilot.wire.dialect import plumbline as mavlink
@@ -204,13 +204,13 @@ def test_a_mission_is_not_uploaded_over_the_one_being_flown() -> None:
     craft = Craft(Takeoff(1.0), Delay(30.0), Land())
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
-    plan = craft.flight.plan
+    plan = craft.flight.mission.plan
     craft.send(mavlink.MAVLink_mission_count_message(1, 1, 2, 0))
     craft.tick()
     acks = [m.type for m in craft.heard if m.get_type() == "MISSION_ACK"]
     assert acks
     assert acks[-1] != mavlink.MAV_MISSION_ACCEPTED
-    assert craft.flight.plan is plan
+    assert craft.flight.mission.plan is plan
 
 
 def test_the_same_sensors_give_the_same_answers_and_the_same_telemetry() -> None:

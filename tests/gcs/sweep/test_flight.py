@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gcs.sweep.legs import jets, jets_ahead
+from gcs.sweep.link import settled
 
 from autopilot.estimation.filter import complaints
 from autopilot.estimation.records import CAMERA, RECEIVER, TRACKER, Doubt, blank_state
@@ -20,7 +22,8 @@ from autopilot.guidance.legs import (
     asked_jet,
 )
 from autopilot.onboard.onboard import Onboard
-from autopilot.supervisor.flight import Flight, jet_ahead, limits_from
+from autopilot.supervisor.settings import limits_from
+from autopilot.supervisor.state import Flight, jet_ahead
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.shaping import Shaped, unshaped
 from autopilot.trajectory.waypoint_path import Passage
@@ -29,8 +32,6 @@ from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.flight import TRACE_COLUMNS, boarding, fly
-from gcs.sweep.legs import jets, jets_ahead
-from gcs.sweep.link import settled
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Takeoff, Term, Waypoint
 from sitl.hil import HilSimulator
