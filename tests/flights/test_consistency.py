@@ -9,9 +9,11 @@ seeds are what counts.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from autopilot.estimation.records import (
@@ -31,7 +33,6 @@ from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.flight import Phase
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
-from tests.doubles.motion import Array
 
 PLUMBLINE = 2.0
 SEEDS = range(1, 11)
@@ -47,7 +48,7 @@ PARTS = {
 SCALARS = {POSE: 6, LOAD: 3, FIX: 6, PRESSURE: 1, MAGNETIC: 1, SIGHT: 2}
 
 
-def error_of(craft: Craft) -> Array:
+def error_of(craft: Craft) -> NDArray[Any]:
     """The error state but for biases, truth minus estimate, of one more tick."""
     truth = craft.truth  # a tick ends with the world moved on
     craft.tick()
@@ -66,7 +67,7 @@ def error_of(craft: Craft) -> Array:
 
 
 @cache
-def flown(sensors: str) -> tuple[dict[str, Array], Array]:
+def flown(sensors: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
     """NEES of each part, (seeds, instants); mean NIS of each sensor per scalar over all seeds."""
     nees: dict[str, list[list[float]]] = {name: [] for name in PARTS}
     consistency = np.zeros((7, 2))

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
-from autopilot.geometry.linear import ZERO, norm
-from autopilot.guidance.legs import CATCH_S, Catch, Hold
-from autopilot.supervisor.advance import advance
-from autopilot.supervisor.flight import Flight, Phase
+from autopilot.geometry.linear import norm
+from autopilot.supervisor.flight import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Signals, Sine, Takeoff, Term
 from tests.doubles.craft import Craft, at_phase
-from tests.doubles.sky import SETTINGS, hanging
+from tests.doubles.sky import SETTINGS
 
 PLUMBLINE = {"CTL_LAW": 2.0}
 HIGH = (Takeoff(5.0), Delay(60.0), Land())
@@ -72,17 +69,6 @@ def test_a_load_that_flies_free_is_caught(sensors: str, speed: float, most: floa
     assert craft.truth.x_load[2] > 2.0  # measured 3.0 m
 
 
-def test_falling_with_the_load_closes_at_the_speed_asked_or_as_the_gap_needs() -> None:
-    catch = Catch(ZERO, 0.7, 0.2)
-    below = (0.0, 0.0, -0.69)
-    _, v, a, *_ = catch.meeting(ZERO, (1.0, 0.0, 3.0), below, (0.0, 0.0, -2.0), 9.81)
-    assert v == pytest.approx((1.0, 0.0, -2.0 + 0.2))
-    assert a == (0.0, 0.0, -9.81)
-    near = (0.0, 0.0, -0.4)
-    _, v, *_ = catch.meeting(ZERO, ZERO, near, (0.0, 0.0, -2.0), 9.81)
-    assert v[2] == pytest.approx(-2.0 + 0.3 / CATCH_S)
-
-
 EIGHT = Signals(
     12.0,
     (
@@ -116,16 +102,3 @@ def test_a_load_on_the_ground_is_no_slack_to_catch() -> None:
     craft.begin()
     craft.run(at_phase(Phase.DISARMED), 60.0)
     assert not any("slack" in text.lower() for text in craft.texts)
-
-
-def test_noise_alone_starts_no_catch() -> None:
-    """No pull for a moment, and the length that it had: what a gust or a jolt of thrust feigns."""
-    flight = Flight(phase=Phase.HOLD, legs=(Hold((0.0, 0.0, 2.0)),), taut_length_m=0.7)
-    for k in range(50):
-        seen = hanging(k * 4000)._replace(pull_n=-1.0)
-        flight, _ = advance(flight, seen, SETTINGS)
-    assert isinstance(flight.legs[0], Hold)
-    flight = replace(flight, taut_length_m=0.75)  # now there is a gap as well
-    for k in range(50, 60):
-        flight, _ = advance(flight, hanging(k * 4000)._replace(pull_n=-1.0), SETTINGS)
-    assert isinstance(flight.legs[0], Catch)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,26 +10,15 @@ import pytest
 
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold, Pass, Run
-from autopilot.onboard.onboard import Onboard
-from autopilot.onboard.snapshot import Options
 from autopilot.services.requests import Arm, Pause, StartMission
 from autopilot.supervisor.flight import Phase, asked_setpoint, jet_ahead
 from autopilot.supervisor.requests import with_plan
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
-from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.tlog import TlogWriter, read_tlog
-from gcs.analysis.metrics import step_numbers, tracking_numbers
-from gcs.analysis.samples import samples_of
-from gcs.analysis.telemetry import telemetry_of
-from gcs.closed_loop import Conditions, fly
 from missions import model
-from missions.fileformat import load_mission
 from missions.model import Delay, Signals, Step, Takeoff, Term, Waypoint
-from tests.doubles.craft import Craft
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
 
-PLUMBLINE = 2.0  # CTL_LAW
 IN_PROGRESS, DENIED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_DENIED
 EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 ROUND = (
@@ -163,44 +151,3 @@ def test_a_start_before_the_paths_are_there_is_for_later() -> None:
     sky.flight = replace(sky.flight, plan=replace(sky.flight.plan, prepared=ready))
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
-
-
-def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() -> None:
-    craft = Craft(Takeoff(2.0), Delay(1.0), EDGE, model.Land(), CTL_LAW=PLUMBLINE)
-    onboard: Onboard = craft.onboard
-    assert onboard.work is None
-    onboard._options = Options(Home(), 0, clock_waits=False)
-    flying = replace(onboard._state.flight, phase=Phase.HOLD)
-    onboard._state = onboard._state._replace(flight=flying)
-    onboard._take_plan(onboard.endpoint.mission)
-    work = onboard.work
-    assert work is not None
-    assert onboard._state.flight.plan.prepared.pending
-    onboard.finish(work, work.done())
-    assert onboard.work is None
-    assert not onboard._state.flight.plan.prepared.pending
-    onboard.finish(work, PENDING)
-    assert not onboard._state.flight.plan.prepared.pending, "an answer that nobody waits for"
-
-
-def flown(name: str) -> dict[str, float | int | None]:
-    log = io.BytesIO()
-    outcome = fly(load_mission(name), Conditions(settings={"CTL_LAW": PLUMBLINE}), TlogWriter(log))
-    assert outcome.name == "completed"
-    log.seek(0)
-    samples = samples_of(telemetry_of(read_tlog(log)))
-    return {**tracking_numbers(samples), **step_numbers(samples)}
-
-
-def test_case_a_beats_the_thesis_with_true_rotor_limits() -> None:
-    """Thesis, without limits: 0.61 s, 15 %, 1.26 s."""
-    found = flown("case-a")
-    rise, settling = found["rise_time_90_s"], found["settling_time_5pct_s"]
-    assert rise is not None
-    assert settling is not None
-    # measured: 0.588 s, 1.5 %, 0.63 s
-    assert rise < 0.61
-    assert (found["overshoot_pct"] or 0.0) < 4.0
-    assert settling < 0.8
-    assert (found["shaping_distance_max_m"] or 1.0) < 0.013
-    assert (found["tracking_error_max_m"] or 1.0) < 0.01
