@@ -33,6 +33,7 @@ from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.flight import Phase
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
+from tests.doubles.insides import history_of
 
 PLUMBLINE = 2.0
 SEEDS = range(1, 11)
@@ -52,7 +53,7 @@ def error_of(craft: Craft) -> NDArray[Any]:
     """The error state but for biases, truth minus estimate, of one more tick."""
     truth = craft.truth  # a tick ends with the world moved on
     craft.tick()
-    estimate = craft.onboard._state.estimator
+    estimate = craft.estimate
     vehicle, load = estimate.vehicle, estimate.load
     error = np.zeros(RATE + 2)
     error[POSITION : POSITION + 3] = np.subtract(truth.x_quad, vehicle.x_quad)
@@ -76,7 +77,7 @@ def flown(sensors: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
         craft = Craft(*steps, sensors=sensors, seed=seed, CTL_LAW=PLUMBLINE)
         craft.begin()
         craft.wait(SETTLED_S - 1.0)
-        history = craft.onboard._history
+        history = history_of(craft.onboard)
         history.consistency[:] = 0.0
         for values in nees.values():
             values.append([])

@@ -59,8 +59,8 @@ def test_the_vehicle_stays_where_it_was_and_the_load_falls(settings_: dict[str, 
     assert craft.truth.x_load == pytest.approx((before.x_load[0], before.x_load[1], 0.02), abs=0.03)
     assert (craft.truth.taut, craft.truth.tension) == (0.0, 0.0)
     # the estimate follows the load down
-    assert craft.onboard._state.estimator.load.x_load == pytest.approx(craft.truth.x_load, abs=0.005)
-    assert craft.onboard._state.estimator.load.taut == 0.0
+    assert craft.estimate.load.x_load == pytest.approx(craft.truth.x_load, abs=0.005)
+    assert craft.estimate.load.taut == 0.0
 
 
 def test_alone_it_takes_a_place_returns_and_lands_clear_of_the_load() -> None:
@@ -120,7 +120,7 @@ def test_with_receiver_and_camera_the_vehicle_flies_on_as_well() -> None:
     before = craft.truth.x_quad
     craft.wait(4.0)
     assert math.dist(craft.truth.x_quad, before) < 0.15  # as well as the receiver knows; measured 0.05
-    assert craft.onboard._state.estimator.load.x_load[2] < 0.3
+    assert craft.estimate.load.x_load[2] < 0.3
     assert craft.command(21) == ACCEPTED
     landed(craft)
 

@@ -24,8 +24,8 @@ def snaps(craft: Craft, until, limit_s: float = 60.0) -> list[float]:
     while not until(craft):
         craft.tick()
         assert craft.onboard.now_us < end, craft.texts
-        if craft.simulator._core.snap_speed > 1e-3:
-            found.append(craft.simulator._core.snap_speed)
+        if craft.world.snap_speed > 1e-3:
+            found.append(craft.world.snap_speed)
     return found
 
 
@@ -46,7 +46,7 @@ def kicked(sensors: str, speed: float) -> tuple[Craft, float]:
     craft.begin()
     craft.run(at_phase(Phase.MISSION))
     craft.wait(2.0)
-    core = craft.simulator._core
+    core = craft.world
     up = core.state.v_load[2] + speed
     core.state = core.state._replace(v_load=(0.0, 0.0, up), taut=0.0)
     end = craft.onboard.now_us + 6_000_000

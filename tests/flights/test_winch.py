@@ -34,7 +34,7 @@ def held(altitude: float = 2.0, sensors: str = "lab", **settings_: float) -> Cra
 
 
 def true_length(craft: Craft) -> float:
-    return craft.simulator._core.cable_length
+    return craft.world.cable_length
 
 
 def reeled(craft: Craft, seconds: float) -> tuple[float, float]:
@@ -64,7 +64,7 @@ def test_the_vehicle_stays_and_the_load_goes_down_and_up(settings_: dict[str, fl
         assert craft.truth.x_load[2] == pytest.approx(2.7 - there, abs=0.01)
     assert craft.truth.slack_events == slack
     assert "Winch: 1.50 m to 0.60 m" in craft.texts
-    estimate = craft.onboard._state.estimator.load
+    estimate = craft.estimate.load
     assert estimate.length == pytest.approx(0.6, abs=0.003)
 
 
