@@ -136,7 +136,7 @@ class VehicleEndpoint:
         self._work = False  # something waits in a queue
         self._events: list[Event] = []  # of `poll`, until they are taken
         self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
-        self._handlers = self._handler_table()
+        self.handlers = self._handler_table()  # by message id
 
     @property
     def mission(self) -> StoredMission:
@@ -177,7 +177,7 @@ class VehicleEndpoint:
             if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
             state = self._heard(link, now_us)
-            handler = self._handlers.get(message_id)
+            handler = self.handlers.get(message_id)
             if handler and self._is_for_us(message_id, received.message):
                 peer = Peer(link, received.system, received.component)
                 wrapped = self._decider(state, peer, now_us, decide)

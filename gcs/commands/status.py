@@ -11,7 +11,7 @@ from gcs.commands.options import connect_option, json_option, print_json, print_
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 
-_LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
+LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
 
 
 @click.command("status")
@@ -22,7 +22,7 @@ def status_command(as_json: bool, address: Address) -> None:
     with Session(address) as session:
         session.listen_to_truth()
         session.find()
-        session.watch(lambda: False, _LISTEN_S, "listening")
+        session.watch(lambda: False, LISTEN_S, "listening")
         record = _record(session.view)
     if as_json:
         print_json(record)

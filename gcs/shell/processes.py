@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -71,11 +72,15 @@ class Child:
         if self.running:
             self._process.terminate()
 
+    def wait(self, limit_s: float) -> bool:
+        """Wait for its end, no longer than this; True if it has ended."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(limit_s)
+        return not self.running
+
     def finish(self) -> None:
         """Wait for its end, and force it after `STOP_S`."""
-        try:
-            self._process.wait(STOP_S)
-        except subprocess.TimeoutExpired:
+        if not self.wait(STOP_S):
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
         self.exit_code = self._process.returncode

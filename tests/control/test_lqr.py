@@ -30,6 +30,7 @@ from missions.model import Signals
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
 from sitl.vehicles import load_truth
+from tests.control.plain_laws import plain_laws, text_of
 
 Array = NDArray[np.float64]
 PRINTED = np.array(json.loads((Path(__file__).parent / "printed_gains.json").read_text())["K"])
@@ -264,8 +265,7 @@ def test_no_attitude_gives_a_command_that_is_no_number(
 
 
 def test_compiled_and_plain_agree_to_the_bit(model: SimpleNamespace, regulator: lqr.Lqr) -> None:
-    room = Path(lqr.__file__)
-    plain = model.plain_laws({"control/lqr.py": room.read_text()})
+    plain = plain_laws({lqr.__name__: text_of(lqr.__name__)})
     rng = np.random.default_rng(14)
     for _ in range(20):
         state, reference = told(rng.uniform(-1.2, 1.2, size=16), model), still(model.vec(rng.normal(size=3)))

@@ -2,47 +2,34 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from benchmarks import cascade_margin
+
 LINEAR = 1e-7  # central differences with step 1e-5 of equations whose third derivatives are of order 100
 
 
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    name = "cascade_margin"
-    spec = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # its dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_linear_model_is_that_of_the_equations(tool: ModuleType, model: SimpleNamespace) -> None:
-    vehicle, h = tool.BEBOP, 1e-5
-    A, B = tool.plant(vehicle)
+def test_linear_model_is_that_of_the_equations(model: SimpleNamespace) -> None:
+    vehicle, h = cascade_margin.BEBOP, 1e-5
+    A, B = cascade_margin.plant(vehicle)
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def rates(motion: np.ndarray, u: np.ndarray) -> np.ndarray:
-        s = tool.state_at(motion, vehicle)
+        s = cascade_margin.state_at(motion, vehicle)
         w = np.cross(s.q_cable, s.q_cable_dot)
         d = model.rates(model.pack(s.x_load, s.v_load, s.q_cable, w, s.R, s.omega_body), u[0], u[1:], vehicle)
         q_ddot = np.cross(d[9:12], s.q_cable) + np.cross(w, s.q_cable_dot)
         return np.concatenate([d[0:6], d[6:8], q_ddot[0:2], motion[13:16], d[21:24]])
 
     u0 = np.array([weight, 0.0, 0.0, 0.0])
-    for j in range(tool.MOTION):
-        step = h * np.eye(tool.MOTION)[j]
+    for j in range(cascade_margin.MOTION):
+        step = h * np.eye(cascade_margin.MOTION)[j]
         column = (rates(step, u0) - rates(-step, u0)) / (2 * h)
         np.testing.assert_allclose(A[:, j], column, atol=LINEAR * 100)
-    zero = np.zeros(tool.MOTION)
+    zero = np.zeros(cascade_margin.MOTION)
     for j in range(4):
         step = h * np.eye(4)[j]
         np.testing.assert_allclose(
@@ -55,23 +42,25 @@ def test_linear_model_is_that_of_the_equations(tool: ModuleType, model: SimpleNa
     [(1.5, 0.35, 0.02, 18.0, 0.074), (2.4, 0.35, 0.0023, 152.0, 0.0100), (0.25, 0.025, 6.0e-4, 42.7, 0.0314)],
 )
 def test_published_delay_margins(
-    tool: ModuleType, k_R: float, k_Omega: float, J: float, crossover: float, delay: float
+    k_R: float, k_Omega: float, J: float, crossover: float, delay: float
 ) -> None:
     """(k_Omega s + k_R)/(J s^2) with ideal rotors, for three published sets of gains. The hold of a period
     takes half of it; the printed figures have two or three digits."""
     period = 0.02 / crossover
-    gains = tool.thesis.THESIS_GAINS._replace(k_R=(k_R,) * 3, k_Omega=(k_Omega,) * 3)
-    vehicle = tool.BEBOP._replace(inertia=(J, J, J))
-    result = tool.margin(tool.Settings(0.0, period, 0.0, "attitude", gains), vehicle)
+    gains = cascade_margin.thesis.THESIS_GAINS._replace(k_R=(k_R,) * 3, k_Omega=(k_Omega,) * 3)
+    vehicle = cascade_margin.BEBOP._replace(inertia=(J, J, J))
+    result = cascade_margin.margin(cascade_margin.Settings(0.0, period, 0.0, "attitude", gains), vehicle)
     assert result.crossover == pytest.approx(crossover, rel=0.01)
     assert result.delay == pytest.approx(delay - 0.5 * period, rel=0.02)
 
 
-def test_margin_ends_where_the_loop_is_lost(tool: ModuleType) -> None:
+def test_margin_ends_where_the_loop_is_lost() -> None:
     """With the delay that was said to be left the loop still holds, with a little more it does not."""
-    settings = tool.Settings(rotor_tau=0.02, period=0.004)
-    left = tool.margin(settings).delay
-    law = tool.linearised_law(settings, tool.BEBOP)
+    settings = cascade_margin.Settings(rotor_tau=0.02, period=0.004)
+    left = cascade_margin.margin(settings).delay
+    law = cascade_margin.linearised_law(settings, cascade_margin.BEBOP)
     for delay, holds in ((left, True), (left + 2e-4, False)):
-        closed = tool.joined(tool.sampled_plant(settings, tool.BEBOP, delay), law, np.ones(4))
-        assert (tool.radius(closed) < tool.LOST) is holds
+        closed = cascade_margin.joined(
+            cascade_margin.sampled_plant(settings, cascade_margin.BEBOP, delay), law, np.ones(4)
+        )
+        assert (cascade_margin.radius(closed) < cascade_margin.LOST) is holds

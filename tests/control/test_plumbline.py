@@ -4,19 +4,16 @@ against the flat trajectory, its rotors against rotors, and what it flies.
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import autopilot
 from autopilot.control import direction_jet, load_motion
 from autopilot.control import plumbline_cascade as plumbline
 from autopilot.control.actuators import disturbance_observer as observer
@@ -32,27 +29,19 @@ from autopilot.control.records import Jet, Reference, State, Vehicle
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.signals import evaluate, signal_table
+from autopilot.vehicle import belief
 from autopilot.vehicle.belief import BeliefError, load_belief
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
+from benchmarks import cascade_margin
 from missions.fileformat import load_mission
 from missions.model import Signals
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
 from sitl.vehicles import load_truth
+from tests.control.flips import surviving
+from tests.control.plain_laws import plain_laws, sources
 
 Array = NDArray[np.float64]
-ROOM = Path(autopilot.__file__).parent
-HERE = Path(__file__).parent
-FILES = (
-    "control/load_motion.py",
-    "control/direction_jet.py",
-    "control/plumbline.py",
-    "rotor_lag.py",
-    "actuation.py",
-    "prediction.py",
-    "observer.py",
-)
-
 ZERO, EAST = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 TICK = 0.004
 CALM_AIR = Drag(0.0, 0.0)
@@ -68,15 +57,6 @@ ALONG = 1e-3
 ROUNDING = 1e-9  # sixth derivatives of 1e3, a hundred operations
 # m, largest load error on the true vehicle, the state known: measured FLOWN_B and FLOWN_C mm
 FLOWN = {("case-b", 0): 0.010, ("case-b", 18): 0.025, ("case-c", 0): 0.025}
-
-
-def imported(name: str, path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
 
 
 def compiled() -> SimpleNamespace:
@@ -689,14 +669,20 @@ PROOFS: tuple[Callable[..., None], ...] = (
 )
 # flips that change nothing, each with the reason
 HARMLESS = {
-    "control/plumbline.py: commanded_attitude: cross(F, b1_d) [0]": "only its length is used",
-    "control/plumbline.py: load_position: sub(add(F_after, F_before), scale(2.0, F)) [1]": "along F",
-    "control/plumbline.py: load_position: scale(2.0, F) [0]": "along F, where F'' turns nothing",
+    f"{plumbline.__name__}: commanded_attitude: cross(F, b1_d) [0]": "only its length is used",
+    f"{plumbline.__name__}: load_position: sub(add(F_after, F_before), scale(2.0, F)) [1]": "along F",
+    f"{plumbline.__name__}: load_position: scale(2.0, F) [0]": "along F, where F'' turns nothing",
     **{
-        f"control/plumbline.py: {where}: vehicle.rotor_max - vehicle.rotor_min [right]": "least force 0"
+        f"{plumbline.__name__}: {where}: vehicle.rotor_max - vehicle.rotor_min [right]": "least force 0"
         for where in ("commanded_attitude", "load_position")
     },
 }
+
+
+@pytest.fixture(scope="module")
+def own_sources(law_sources: dict[str, str]) -> dict[str, str]:
+    """Source texts, by module, of the law and its actuators, without what the thesis has proved."""
+    return sources(plumbline, rotor_lag, actuation, prediction, observer, without=law_sources)
 
 
 @pytest.mark.parametrize("proved", PROOFS, ids=lambda function: function.__name__)
@@ -704,19 +690,17 @@ def test_proved(proved: Callable[..., None], model: SimpleNamespace, bebop: Vehi
     proved(compiled(), model, bebop)
 
 
-def test_each_flip_fails_a_proof(model: SimpleNamespace, bebop: Vehicle) -> None:
+def test_each_flip_fails_a_proof(own_sources: dict[str, str], model: SimpleNamespace, bebop: Vehicle) -> None:
     """Every sign of the law's own files, turned over one at a time, makes a proof fail."""
-    flipper = imported("flipper_of_plumbline", HERE / "test_proofs.py")
-    texts = {name: (ROOM / name).read_text() for name in FILES}
-    survivors, count = flipper.surviving(
-        texts, PROOFS, lambda file, name: f"{file}: {name}" in HARMLESS, model, bebop
-    )
+    survivors, count = surviving(own_sources, PROOFS, HARMLESS, model, bebop)
     assert not survivors, "\n".join(survivors)
     assert count > 40, f"only {count} flips were found"
 
 
-def test_compiled_and_plain_agree_to_the_bit(model: SimpleNamespace, bebop: Vehicle) -> None:
-    plain, fast = model.plain_laws({name: (ROOM / name).read_text() for name in FILES}), compiled()
+def test_compiled_and_plain_agree_to_the_bit(
+    own_sources: dict[str, str], model: SimpleNamespace, bebop: Vehicle
+) -> None:
+    plain, fast = plain_laws(own_sources), compiled()
     constants = actuation_constants(0.010, 0.02, TICK)
     rng = np.random.default_rng(27)
     memories = [(law.start(), actuation.steady(4.9), law.nominal(bebop)) for law in (plain, fast)]
@@ -812,7 +796,7 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
 def test_a_vehicle_file_may_leave_out_rotor_lag_and_drag(tmp_path: Path) -> None:
     believed = load_belief("thesis")
     assert (believed.rotor_tau_s, believed.quad_drag_n_s_m, believed.quad_drag_quadratic_n_s2_m2) == (0, 0, 0)
-    text = (ROOM / "vehicle" / "thesis.toml").read_text() + "rotor_tau_s = -0.01\n"
+    text = (Path(belief.__file__).parent / "thesis.toml").read_text() + "rotor_tau_s = -0.01\n"
     (tmp_path / "backwards.toml").write_text(text)
     with pytest.raises(BeliefError, match=r"rotor_tau_s = -0.01; must be >= 0"):
         load_belief(str(tmp_path / "backwards.toml"))
@@ -824,20 +808,19 @@ def test_a_vehicle_file_may_leave_out_rotor_lag_and_drag(tmp_path: Path) -> None
 def test_margins_and_noise_are_what_the_filter_was_chosen_for() -> None:
     """docs/control.md: 12 ms of delay more or less, a factor of 2 in gain, three deviations within the
     limits."""
-    tool = imported("margin_of_plumbline", HERE.parents[1] / "benchmarks" / "cascade_margin.py")
-    late = tool.margin(tool.Settings(rotor_tau=0.02, delay=0.072, loop="plumbline"))
+    late = cascade_margin.margin(cascade_margin.Settings(rotor_tau=0.02, delay=0.072, loop="plumbline"))
     assert late.stable
     assert late.delay > 0.012
     assert late.sooner > 0.012
-    settings = tool.Settings(rotor_tau=0.02, loop="plumbline")
-    margin = tool.margin(settings)
+    settings = cascade_margin.Settings(rotor_tau=0.02, loop="plumbline")
+    margin = cascade_margin.margin(settings)
     assert margin.stable
     assert margin.phase_deg > 30.0
     assert margin.gain_up > 2.0
     assert margin.gain_down < 0.5
     assert margin.delay > 0.012
-    deviation = math.sqrt(sum(newtons**2 for _, _, newtons in tool.rotor_noise(settings)))
-    assert 3.0 * deviation < tool.BEBOP.rotor_max - tool.HOVER
+    deviation = math.sqrt(sum(newtons**2 for _, _, newtons in cascade_margin.rotor_noise(settings)))
+    assert 3.0 * deviation < cascade_margin.BEBOP.rotor_max - cascade_margin.HOVER
 
 
 def aloft(truth: Truth) -> PlantState:

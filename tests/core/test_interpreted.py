@@ -32,7 +32,7 @@ def fingerprint() -> str:
     for _ in range(TICKS):
         craft.tick()
     digest = hashlib.sha256(b"".join(craft.answers))
-    for value in numbers(craft.onboard._state.estimator):
+    for value in numbers(craft.estimate):
         digest.update(struct.pack("<d", value))
     return digest.hexdigest()
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from autopilot.estimation.records import EstimatorState
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold
 from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.snapshot import Options
+from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.state import Flight, Phase
@@ -19,7 +22,9 @@ from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator
 from sitl.plant.records import PlantState
+from sitl.sim_core import SimCore
 from sitl.vehicles.files import load_truth
+from tests.doubles.insides import core_of, state_of
 
 ACCEPTED = ACCEPTANCE.result
 GCS = "gcs"
@@ -30,14 +35,25 @@ LOAD_WEIGHT_N = TRUTH.load_mass * TRUTH.gravity
 class Craft:
     """Onboard and simulator joined tick by tick, without a ground station but for the commands given here.
 
-    `truth` reads the simulator's state; nothing of it reaches the autopilot but by sensors.
+    `truth` reads the simulator's state; nothing of it reaches the autopilot but by sensors. The clock waits
+    for the autopilot unless it is told otherwise.
     """
 
-    def __init__(self, *steps: Step, sensors: str = "lab", seed: int = 1, **settings_: float) -> None:
+    def __init__(
+        self,
+        *steps: Step,
+        sensors: str = "lab",
+        seed: int = 1,
+        clock_waits: bool = True,
+        **settings_: float,
+    ) -> None:
         conditions = Conditions(sensors=sensors, seed=seed, settings=settings_)
         items = encode_steps(steps, Home()) if steps else ()
         mission = StoredMission(items, located_steps(items, Home()))
         self.onboard: Onboard = build_onboard(conditions, Home(), mission)
+        if not clock_waits:
+            table = self.onboard.parameters
+            self.onboard = Onboard(table, identity_of(table), Options(Home(), 0, clock_waits=False), mission)
         self.simulator: HilSimulator = build_simulator(conditions, Home())
         self.onboard.add_link(GCS)
         self._writer = FrameWriter(255, 190)
@@ -47,11 +63,19 @@ class Craft:
 
     @property
     def truth(self) -> PlantState:
-        return self.simulator._core.state
+        return self.world.state
+
+    @property
+    def world(self) -> SimCore:
+        return core_of(self.simulator)
+
+    @property
+    def estimate(self) -> EstimatorState:
+        return state_of(self.onboard).estimator
 
     @property
     def flight(self) -> Flight:
-        return self.onboard._state.flight
+        return state_of(self.onboard).flight
 
     @property
     def texts(self) -> list[str]:

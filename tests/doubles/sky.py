@@ -63,7 +63,7 @@ class Sky:
 
     def tick(self) -> None:
         self.now_us += STEP_US
-        self.view = self._obey()
+        self.view = self.obey()
         self.flight, report = advance(self.flight, self.view, self.settings)
         self.texts += [text for _, text in report.texts]
         self.reached += report.reached
@@ -92,7 +92,8 @@ class Sky:
         self.wait(2.0)
         return self
 
-    def _obey(self) -> View:
+    def obey(self) -> View:
+        """What is seen after a tick in which all went as the present leg wants it."""
         last, flight = self.view, self.flight
         if not flight.legs:
             return last._replace(now_us=self.now_us, v_quad=ZERO, v_load=ZERO)

@@ -9,9 +9,11 @@ seeds are what counts.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from autopilot.estimation.records import (
@@ -31,7 +33,7 @@ from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.state import Phase
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
-from tests.doubles.motion import Array
+from tests.doubles.insides import history_of
 
 PLUMBLINE = 2.0
 SEEDS = range(1, 11)
@@ -47,11 +49,11 @@ PARTS = {
 SCALARS = {POSE: 6, LOAD: 3, FIX: 6, PRESSURE: 1, MAGNETIC: 1, SIGHT: 2}
 
 
-def error_of(craft: Craft) -> Array:
+def error_of(craft: Craft) -> NDArray[Any]:
     """The error state but for biases, truth minus estimate, of one more tick."""
     truth = craft.truth  # a tick ends with the world moved on
     craft.tick()
-    estimate = craft.onboard._state.estimator
+    estimate = craft.estimate
     vehicle, load = estimate.vehicle, estimate.load
     error = np.zeros(RATE + 2)
     error[POSITION : POSITION + 3] = np.subtract(truth.x_quad, vehicle.x_quad)
@@ -66,7 +68,7 @@ def error_of(craft: Craft) -> Array:
 
 
 @cache
-def flown(sensors: str) -> tuple[dict[str, Array], Array]:
+def flown(sensors: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
     """NEES of each part, (seeds, instants); mean NIS of each sensor per scalar over all seeds."""
     nees: dict[str, list[list[float]]] = {name: [] for name in PARTS}
     consistency = np.zeros((7, 2))
@@ -75,7 +77,7 @@ def flown(sensors: str) -> tuple[dict[str, Array], Array]:
         craft = Craft(*steps, sensors=sensors, seed=seed, CTL_LAW=PLUMBLINE)
         craft.begin()
         craft.wait(SETTLED_S - 1.0)
-        history = craft.onboard._history
+        history = history_of(craft.onboard)
         history.consistency[:] = 0.0
         for values in nees.values():
             values.append([])

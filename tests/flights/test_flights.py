@@ -75,7 +75,7 @@ def test_sensors_all_late_are_flown_with_if_that_is_known() -> None:
         craft.tick()
         fastest = max(fastest, norm(craft.truth.v_load))
         if len(truths) > ticks:
-            estimated, then = craft.onboard._state.estimator.load.x_load, truths[-1 - ticks].x_load
+            estimated, then = craft.estimate.load.x_load, truths[-1 - ticks].x_load
             off = max(off, norm(sub(estimated, then)))
     assert fastest > 1.2  # within 40 ms the load moves 50 mm
     assert 0.0 < off < 0.003  # 1 mm
@@ -92,7 +92,7 @@ def test_a_plain_receiver_lifts_and_sets_down(seed: int) -> None:
     craft = Craft(*load_mission("hover").steps, sensors="gps", seed=seed)
     craft.begin()
     craft.run(at_phase(Phase.LIFT))
-    estimated = craft.onboard._state.estimator.vehicle.x_quad[2]
+    estimated = craft.estimate.vehicle.x_quad[2]
     assert abs(estimated - craft.truth.x_quad[2]) < 0.06  # at most 0.03; 0.10 to 0.15 without
     craft.run(at_phase(Phase.DISARMED), 90.0)
     assert "Load on the ground" in craft.texts
@@ -109,7 +109,7 @@ def test_a_fast_load_is_where_the_estimate_has_it() -> None:
         truth = craft.truth
         craft.tick()
         fastest = max(fastest, norm(truth.v_load))
-        off = max(off, norm(sub(craft.onboard._state.estimator.load.x_load, truth.x_load)))
+        off = max(off, norm(sub(craft.estimate.load.x_load, truth.x_load)))
     assert fastest > 9.0
     assert off < 0.004  # 2 mm; 8 mm without EST_LOAD_DRAG
 

@@ -6,16 +6,12 @@ import math
 
 import pytest
 
-from autopilot.guidance.legs import QUAD_POSITION
-from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
-from autopilot.supervisor.machine import _enter as enter
-from autopilot.supervisor.requests.decide import decide
-from autopilot.supervisor.state import Phase
+from autopilot.supervisor.flight import Phase
 from autopilot.wire.dialect import plumbline as mavlink
-from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint
+from missions.model import Delay, Land, Takeoff, Waypoint
 from missions.model import Release as ReleaseStep
 from tests.doubles.craft import Craft, at_phase
-from tests.doubles.sky import ACCEPTED, Sky, hanging
+from tests.doubles.sky import ACCEPTED
 
 GRIPPER, TAKEOFF, ARM = 211, 22, 400
 DENIED = mavlink.MAV_RESULT_DENIED
@@ -63,8 +59,8 @@ def test_the_vehicle_stays_where_it_was_and_the_load_falls(settings_: dict[str, 
     assert craft.truth.x_load == pytest.approx((before.x_load[0], before.x_load[1], 0.02), abs=0.03)
     assert (craft.truth.taut, craft.truth.tension) == (0.0, 0.0)
     # the estimate follows the load down
-    assert craft.onboard._state.estimator.load.x_load == pytest.approx(craft.truth.x_load, abs=0.005)
-    assert craft.onboard._state.estimator.load.taut == 0.0
+    assert craft.estimate.load.x_load == pytest.approx(craft.truth.x_load, abs=0.005)
+    assert craft.estimate.load.taut == 0.0
 
 
 def test_alone_it_takes_a_place_returns_and_lands_clear_of_the_load() -> None:
@@ -124,7 +120,7 @@ def test_with_receiver_and_camera_the_vehicle_flies_on_as_well() -> None:
     before = craft.truth.x_quad
     craft.wait(4.0)
     assert math.dist(craft.truth.x_quad, before) < 0.15  # as well as the receiver knows; measured 0.05
-    assert craft.onboard._state.estimator.load.x_load[2] < 0.3
+    assert craft.estimate.load.x_load[2] < 0.3
     assert craft.command(21) == ACCEPTED
     landed(craft)
 
@@ -142,71 +138,12 @@ DELIVERY = (
 def test_a_mission_delivers_and_lands_beside_what_it_delivered() -> None:
     craft = Craft(*DELIVERY)
     craft.begin()
-    craft.run(lambda c: c.flight.cable.released)
-    assert craft.flight.mission.active
+    craft.run(lambda c: c.flight.released)
+    assert craft.flight.on_mission
     landed(craft)
-    assert craft.flight.mission.done
+    assert craft.flight.mission_done
     assert craft.truth.x_load == pytest.approx((1.0, 0.5, 0.02), abs=0.03)
     assert 0.3 < math.dist(craft.truth.x_quad[:2], (1.0, 0.5)) < 0.4
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
     assert sorted(set(reached)) == [0, 1, 2, 3, 4, 5]
     assert craft.texts.count("Load released") == 1
-
-
-def test_released_by_command_a_mission_is_held_and_goes_on_as_the_vehicles() -> None:
-    sky = Sky(Takeoff(1.0), Waypoint(3.0, 0.0, 1.0, 2.0), Waypoint(0.0, 0.0, 2.0, 1.0), Land())
-    sky.airborne()
-    assert sky.ask(StartMission(1)).result == ACCEPTED
-    sky.wait(1.0)
-    verdict = sky.ask(Release())
-    assert (verdict.result, verdict.text) == (ACCEPTED, "Load released, mission held")
-    assert (sky.flight.phase, sky.flight.mission.active) == (Phase.HOLD, False)
-    assert sky.ask(StartMission(None)).result == ACCEPTED
-    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
-    flown = [(mode, jet[0]) for _, mode, jet in sky.setpoints[-500:]]
-    assert {mode for mode, _ in flown} == {QUAD_POSITION}
-    assert sky.flight.mission.done
-
-
-SIGNALS = Signals(4.0, (Term("x", 0.1, 0.0, 2.0, None, 0.0),))
-
-
-@pytest.mark.parametrize("step", [SIGNALS, AttitudeRun("load", 0.1, 0.0, 1.0)])
-def test_what_swings_the_load_is_refused_without_it(step: Signals | AttitudeRun) -> None:
-    sky = Sky(Takeoff(1.0), Delay(1.0), step, Land())
-    sky.airborne()
-    sky.ask(Release())
-    verdict = sky.ask(StartMission(1))
-    assert verdict.result == DENIED
-    assert "needs the load, which is released" in str(verdict.text)
-    assert sky.ask(FollowAttitude((0.0, 0.0, 1.0), None)).result == DENIED
-
-
-@pytest.mark.parametrize("phase", [p for p in Phase if p not in (Phase.DISARMED, Phase.ARMED)])
-def test_a_release_is_never_refused(phase: Phase) -> None:
-    """Whatever is flown, the vehicle goes on alone; what it asks for begins where it is."""
-    sky = Sky(Takeoff(1.0), Waypoint(3.0, 0.0, 1.0, 9.0), Land()).airborne()
-    if phase == Phase.MISSION:
-        sky.ask(StartMission(1))
-    else:
-        sky.flight = enter(sky.flight, phase, sky.view, sky.settings)
-    flight, verdict = decide(sky.flight, Release(), hanging(sky.now_us), sky.settings)
-    assert verdict.result == ACCEPTED
-    assert flight.cable.released
-    if phase in (Phase.FAILSAFE, Phase.SET_DOWN):
-        assert flight.phase == phase
-        return
-    assert flight.legs[0].control_mode == QUAD_POSITION
-    assert flight.legs[0].jet(0.0)[0] == pytest.approx(hanging().x_quad, abs=1e-9)
-
-
-def test_a_load_out_of_reach_is_not_taken() -> None:
-    sky = Sky()
-    sky.ask(Release())
-    sky.view = sky.view._replace(x_load=(2.0, 0.0, 0.02))
-    verdict = sky.ask(Grab())
-    assert verdict.result == DENIED
-    assert verdict.text == "Gripper: the load lies 1.9 m away, the cable reaches 0.7 m"
-    sky.view = sky.view._replace(x_load=(0.5, 0.0, 0.02))
-    assert sky.ask(Grab()).result == ACCEPTED
-    assert not sky.flight.cable.released

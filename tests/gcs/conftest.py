@@ -127,11 +127,11 @@ class ScriptedVehicle:
 
     def receive(self, datagram: bytes) -> None:
         for one in decode(datagram)[0]:
-            handler = getattr(self, f"_on_{one.message.get_type().lower()}", None)
+            handler = getattr(self, f"on_{one.message.get_type().lower()}", None)
             if handler is not None and not self.silent:
                 handler(one.message)
 
-    def _on_command_long(self, message: Any) -> None:
+    def on_command_long(self, message: Any) -> None:
         self.commands.append(message)
         if message.command in self.silent_commands:
             return
@@ -150,12 +150,12 @@ class ScriptedVehicle:
                 )
         self.send(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, 255, 190))
 
-    def _on_param_request_list(self, message: Any) -> None:
+    def on_param_request_list(self, message: Any) -> None:
         for index, name in enumerate(self.parameters):
             if index not in self.lost_list_indices:
                 self._value(name)
 
-    def _on_param_request_read(self, message: Any) -> None:
+    def on_param_request_read(self, message: Any) -> None:
         names = list(self.parameters)
         if message.param_index >= 0:
             self._value(names[message.param_index])
@@ -168,7 +168,7 @@ class ScriptedVehicle:
                 )
             )
 
-    def _on_param_set(self, message: Any) -> None:
+    def on_param_set(self, message: Any) -> None:
         if message.param_id not in self.parameters:
             return
         if message.param_id not in self.fixed:
@@ -186,7 +186,7 @@ class ScriptedVehicle:
     def _items(self, kind: int) -> list[WireItem]:
         return self.areas.get(kind, []) if kind else self.mission
 
-    def _on_mission_count(self, message: Any) -> None:
+    def on_mission_count(self, message: Any) -> None:
         self._upload, self._upload_count, self._kind = [], message.count, message.mission_type
         self._asked_us = self.now_us
         self._ask()
@@ -208,7 +208,7 @@ class ScriptedVehicle:
     def _acknowledge(self, result: int) -> None:
         self.send(mavlink.MAVLink_mission_ack_message(255, 190, result, self._kind))
 
-    def _on_mission_item_int(self, message: Any) -> None:
+    def on_mission_item_int(self, message: Any) -> None:
         if self._upload is None:
             if message.seq == len(self._items(self._kind)) - 1:
                 self._acknowledge(mavlink.MAV_MISSION_ACCEPTED)
@@ -220,16 +220,16 @@ class ScriptedVehicle:
             self._upload.append(_item(message))
             self._ask()
 
-    def _on_mission_request_list(self, message: Any) -> None:
+    def on_mission_request_list(self, message: Any) -> None:
         kind = message.mission_type
         self.send(mavlink.MAVLink_mission_count_message(255, 190, len(self._items(kind)), kind))
 
-    def _on_mission_request_int(self, message: Any) -> None:
+    def on_mission_request_int(self, message: Any) -> None:
         kind = message.mission_type
         item = self._items(kind)[message.seq]
         self.send(mavlink.MAVLink_mission_item_int_message(255, 190, message.seq, *item, mission_type=kind))
 
-    def _on_mission_clear_all(self, message: Any) -> None:
+    def on_mission_clear_all(self, message: Any) -> None:
         self._kind = 0
         self.mission = []
         self._acknowledge(mavlink.MAV_MISSION_ACCEPTED)

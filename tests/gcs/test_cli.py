@@ -279,14 +279,14 @@ def test_single_commands(live):
 
 def test_a_refusal_is_one_line_with_the_reason(live):
     vehicle, port = live
-    original = vehicle._on_command_long
+    original = vehicle.on_command_long
 
     def refuse(message):
         vehicle.command_results[message.command] = [mavlink.MAV_RESULT_DENIED]
         original(message)
         vehicle.say("Disarming denied: in the air")
 
-    vehicle._on_command_long = refuse
+    vehicle.on_command_long = refuse
     line = one_line(run("disarm", "--connect", port), EXIT_ERROR)
     assert line == "gcs: disarm: denied; Disarming denied: in the air"
 
@@ -422,7 +422,7 @@ def test_parameters(live, tmp_path):
 
 def test_status(live, monkeypatch):
     vehicle, port = live
-    monkeypatch.setattr(status_module, "_LISTEN_S", 0.3)
+    monkeypatch.setattr(status_module, "LISTEN_S", 0.3)
     vehicle.started_us = 0
     record = json.loads(run("status", "--json", "--connect", port).stdout)
     assert record["mode"] == "hold"

@@ -30,6 +30,7 @@ from autopilot.guidance.legs import (
     brake_leg,
     carry_leg,
     least_move_s,
+    reel_leg,
     slow_leg,
     transfer_leg,
 )
@@ -215,3 +216,16 @@ def test_carrying_is_never_quicker_than_the_pendulum_and_else_as_quick_as_it_may
 def test_the_least_duration_of_a_move_at_the_cable_of_table_4_1() -> None:
     assert least_move_s(0.7, 9.81) == pytest.approx(2.0, abs=0.03)
     assert least_move_s(2.8, 9.81) == pytest.approx(2.0 * least_move_s(0.7, 9.81))
+
+
+@pytest.mark.parametrize(("wanted", "speed"), [(1.9, 0.3), (0.75, 0.3), (0.4, 0.05), (0.7005, 0.3)])
+def test_a_reel_keeps_to_rate_and_acceleration(wanted: float, speed: float) -> None:
+    leg = reel_leg((1.0, 2.0, 3.0), 0.7, wanted, speed, 0.3)
+    t = np.linspace(0.0, leg.duration_s, 2001)
+    jets = np.array([leg.jet(float(s)) for s in t])
+    assert leg.jet(0.0)[0] == (1.0, 2.0, 3.0)
+    assert leg.end == pytest.approx((1.0, 2.0, 3.7 - wanted), abs=1e-12)
+    assert jets[-2, 0] == pytest.approx(leg.end, abs=1e-6)
+    assert np.abs(jets[:, 1, 2]).max() <= speed * (1.0 + 1e-9)
+    assert np.abs(jets[:, 2, 2]).max() <= 0.3 * 1.001
+    assert np.abs(jets[:, :, :2] - jets[0, :, :2]).max() == 0.0

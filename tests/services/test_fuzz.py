@@ -139,7 +139,7 @@ def test_any_bytes(rig_with, items, datagram):
 
 
 def test_all_that_is_handled_is_tried(rig):
-    assert set(rig.endpoint._handlers) <= set(HANDLED)
+    assert set(rig.endpoint.handlers) <= set(HANDLED)
 
 
 # ---- a model of what may change, and by what

@@ -397,8 +397,8 @@ def test_a_cable_that_never_comes_taut_ends_the_climb() -> None:
     sky = Sky()
     sky.ask(Arm(True, False))
     assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
-    never = Sky._obey
-    sky._obey = lambda: never(sky)._replace(taut=False)
+    never = Sky.obey
+    sky.obey = lambda: never(sky)._replace(taut=False)
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     assert any("never taut" in text for text in sky.texts)
     assert max(jet[0][2] for _, _, jet in sky.setpoints) < 0.02 + 1.35 * SETTINGS.cable_length_m

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,27 +9,16 @@ import numpy as np
 import pytest
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import Hold, Pass, Run, asked_jet
-from autopilot.onboard.onboard import Onboard
-from autopilot.onboard.snapshot import Options
+from autopilot.guidance.legs import Hold, Pass, Run
 from autopilot.services.requests import Arm, Pause, StartMission
-from autopilot.supervisor.mission import with_plan
-from autopilot.supervisor.state import Phase, jet_ahead, leg_time_s
+from autopilot.supervisor.flight import Phase, asked_setpoint, jet_ahead
+from autopilot.supervisor.requests import with_plan
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
-from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.tlog import TlogWriter, read_tlog
-from gcs.analysis.metrics import step_numbers, tracking_numbers
-from gcs.analysis.samples import samples_of
-from gcs.analysis.telemetry import telemetry_of
-from gcs.closed_loop import Conditions, fly
 from missions import model
-from missions.fileformat import load_mission
 from missions.model import Delay, Signals, Step, Takeoff, Term, Waypoint
-from tests.doubles.craft import Craft
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
 
-PLUMBLINE = 2.0  # CTL_LAW
 IN_PROGRESS, DENIED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_DENIED
 EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 ROUND = (
@@ -45,7 +33,7 @@ LIMITS = SETTINGS.limits._replace(shaped=True)
 
 def prepared_sky(*steps: Step, limits: object = LIMITS) -> Sky:
     sky = Sky(*steps)
-    plan = sky.flight.mission.plan
+    plan = sky.flight.plan
     found = prepare(plan.steps, plan.sequence, limits)  # type: ignore[arg-type]
     sky.flight = with_plan(sky.flight, replace(plan, prepared=found))
     return sky
@@ -78,7 +66,8 @@ def test_getting_ready_is_taken_from_the_delay_before() -> None:
     assert isinstance(run, Run)
     assert run.path.lead_s > 0.3
     assert (sky.now_us - begun) * 1e-6 == pytest.approx(3.0 - run.path.lead_s, abs=1e-6 * STEP_US)
-    asked = asked_jet(run, leg_time_s(sky.flight, sky.now_us))
+    asked = asked_setpoint(sky.flight, sky.now_us)
+    assert asked is not None
     assert asked == run.asked(0.0)
     assert norm(asked[1]) == 0.0
 
@@ -132,7 +121,7 @@ def test_a_load_beside_the_beginning_of_a_path_is_led_onto_it() -> None:
 @pytest.mark.parametrize("item", [1, 2])
 def test_a_passage_is_paused_and_gone_on_with(item: int) -> None:
     sky = started(Takeoff(2.0), *ROUND, model.Land())
-    sky.run(lambda s: s.flight.mission.step == item and s.flight.phase == Phase.MISSION)
+    sky.run(lambda s: s.flight.step == item and s.flight.phase == Phase.MISSION)
     sky.wait(1.0)
     assert isinstance(sky.flight.legs[0], Pass)
     assert sky.ask(Pause()).result == ACCEPTED
@@ -156,52 +145,9 @@ def test_what_cannot_be_flown_is_refused_with_the_item_and_the_reason() -> None:
 
 def test_a_start_before_the_paths_are_there_is_for_later() -> None:
     sky = prepared_sky(Takeoff(2.0), *ROUND, model.Land())
-    ready = sky.flight.mission.plan.prepared
-    sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, prepared=PENDING))
+    ready = sky.flight.plan.prepared
+    sky.flight = with_plan(sky.flight, replace(sky.flight.plan, prepared=PENDING))
     assert sky.ask(StartMission(None)).result == IN_PROGRESS
-    sky.flight = replace(
-        sky.flight, mission=replace(sky.flight.mission, plan=replace(sky.flight.mission.plan, prepared=ready))
-    )
+    sky.flight = replace(sky.flight, plan=replace(sky.flight.plan, prepared=ready))
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
-
-
-def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() -> None:
-    craft = Craft(Takeoff(2.0), Delay(1.0), EDGE, model.Land(), CTL_LAW=PLUMBLINE)
-    onboard: Onboard = craft.onboard
-    assert onboard.work is None
-    onboard._options = Options(Home(), 0, clock_waits=False)
-    flying = replace(onboard._state.flight, phase=Phase.HOLD)
-    onboard._state = onboard._state._replace(flight=flying)
-    onboard._take_plan(onboard.endpoint.mission)
-    work = onboard.work
-    assert work is not None
-    assert onboard._state.flight.mission.plan.prepared.pending
-    onboard.finish(work, work.done())
-    assert onboard.work is None
-    assert not onboard._state.flight.mission.plan.prepared.pending
-    onboard.finish(work, PENDING)
-    assert not onboard._state.flight.mission.plan.prepared.pending, "an answer that nobody waits for"
-
-
-def flown(name: str) -> dict[str, float | int | None]:
-    log = io.BytesIO()
-    outcome = fly(load_mission(name), Conditions(settings={"CTL_LAW": PLUMBLINE}), TlogWriter(log))
-    assert outcome.name == "completed"
-    log.seek(0)
-    samples = samples_of(telemetry_of(read_tlog(log)))
-    return {**tracking_numbers(samples), **step_numbers(samples)}
-
-
-def test_case_a_beats_the_thesis_with_true_rotor_limits() -> None:
-    """Thesis, without limits: 0.61 s, 15 %, 1.26 s."""
-    found = flown("case-a")
-    rise, settling = found["rise_time_90_s"], found["settling_time_5pct_s"]
-    assert rise is not None
-    assert settling is not None
-    # measured: 0.588 s, 1.5 %, 0.63 s
-    assert rise < 0.61
-    assert (found["overshoot_pct"] or 0.0) < 4.0
-    assert settling < 0.8
-    assert (found["shaping_distance_max_m"] or 1.0) < 0.013
-    assert (found["tracking_error_max_m"] or 1.0) < 0.01

@@ -118,14 +118,14 @@ def test_a_flight_survives_a_bad_link(world, fly):
 def test_arming_refused(world, fly):
     vehicle = world.vehicle
     vehicle.command_results[mavlink.MAV_CMD_COMPONENT_ARM_DISARM] = [mavlink.MAV_RESULT_DENIED]
-    original = vehicle._on_command_long
+    original = vehicle.on_command_long
 
     def with_reason(message):
         if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             vehicle.say("Arming denied: load not on the ground")
         original(message)
 
-    vehicle._on_command_long = with_reason
+    vehicle.on_command_long = with_reason
     client, _ = fly()
     assert client.outcome.name == "refused"
     assert client.outcome.reason == "arm: denied; Arming denied: load not on the ground"

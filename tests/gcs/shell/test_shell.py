@@ -256,7 +256,7 @@ def test_a_deaf_child_is_killed(tmp_path, monkeypatch):
 def test_an_early_end_is_one_line_with_the_last_words(tmp_path):
     with Processes() as processes:
         child = processes.start("timeit", ["--no-such-option"], tmp_path / "log")
-        child._process.wait(WAIT_S)
+        assert child.wait(WAIT_S)
         line = processes.ended()
     assert line.startswith("timeit ended with exit code 2: ")
     assert "\n" not in line
@@ -308,8 +308,7 @@ def poll_until(condition, child) -> None:
     for _ in range(int(WAIT_S / 0.05)):
         if condition():
             return
-        with pytest.raises(subprocess.TimeoutExpired):
-            child._process.wait(0.05)
+        assert not child.wait(0.05)
     pytest.fail("never came")
 
 

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import pytest
 
+from benchmarks import cascade_margin
 from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import SweepPlan
-
-ROOT = Path(__file__).parents[3]
 
 
 def limits(law: str, name: str, nominal: float, to: tuple[float, float]) -> str:
@@ -19,12 +14,7 @@ def limits(law: str, name: str, nominal: float, to: tuple[float, float]) -> str:
 
 
 def test_delay_of_the_thesis_cascade_is_that_of_the_margin_tool() -> None:
-    spec = importlib.util.spec_from_file_location("sweep_margin_tool", ROOT / "benchmarks/cascade_margin.py")
-    assert spec is not None and spec.loader is not None
-    tool = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = tool  # its dataclasses look their module up
-    spec.loader.exec_module(tool)
-    expected_ms = 1e3 * tool.margin(tool.Settings(rotor_tau=0.02, loop="position")).delay
+    expected_ms = 1e3 * cascade_margin.margin(cascade_margin.Settings(rotor_tau=0.02, loop="position")).delay
     low, high = limits("thesis", "SIM_ACT_DELAY_MS", 0.0, (0.0, 40.0)).split(" … ")
     assert low == "0"
     # both bisect to 0.1 ms or better

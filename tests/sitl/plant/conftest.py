@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Callable
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -111,16 +107,3 @@ def rotation(state: PlantState) -> Array:
 @pytest.fixture(scope="session")
 def rotation_of() -> Callable[[PlantState], Array]:
     return rotation
-
-
-@pytest.fixture(scope="session")
-def convergence() -> ModuleType:
-    """benchmarks/plant_convergence.py: the cases there are the cases here."""
-    path = Path(__file__).resolve().parents[3] / "benchmarks" / "plant_convergence.py"
-    spec = importlib.util.spec_from_file_location("plant_convergence", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.geometry.so3 import quat_exp
+from benchmarks import plant_convergence as convergence
 from sitl.plant.step import advance, advance_many, initial_state
 
 CALM = (0.0, 0.0, 0.0)
@@ -150,7 +151,7 @@ def test_take_off_with_the_load(bebop):
     assert state.slack_events < 10.0
 
 
-def test_order_of_the_step_near_the_ground(convergence):
+def test_order_of_the_step_near_the_ground():
     errors, order = convergence.study("contact", (5e-4, 2.5e-4, 1.25e-4, 6.25e-5))
     assert order > ORDER_LOW
     assert errors[5e-4] < 1e-3

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks import plant_convergence as convergence
 from sitl.plant.records import Motion
 from sitl.plant.step import advance, advance_many, initial_state, stretched
 
@@ -152,13 +153,13 @@ def test_a_step_tells_at_which_speed_the_cable_came_taut(thesis):
 
 
 @pytest.mark.parametrize("case", ["taut", "slack", "switching"])
-def test_order_of_the_step_in_the_air(convergence, case):
+def test_order_of_the_step_in_the_air(case):
     errors, order = convergence.study(case, (4e-3, 2e-3, 1e-3, 5e-4))
     assert ORDER_LOW < order < ORDER_HIGH
     assert errors[4e-3] < 1e-7  # m: far below any sensor
 
 
-def test_the_switching_case_switches(convergence):
+def test_the_switching_case_switches():
     _, end = convergence.fly(convergence.CASES["switching"](), 4e-3)
     assert end.slack_events >= 2.0
 

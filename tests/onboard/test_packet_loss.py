@@ -1,4 +1,4 @@
-"""A lossy ground link, and jobs on every n-th tick."""
+"""A lossy ground link: as many datagrams are lost as asked, and the same ones every time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.core.scheduler import RateError, divider, is_due
 from autopilot.onboard.packet_loss import Loss
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
@@ -58,23 +57,3 @@ def test_losses_are_the_same_every_time_and_not_the_same_both_ways() -> None:
 @given(datagram=st.binary(max_size=40))
 def test_any_bytes_can_be_lost(datagram: bytes) -> None:
     Loss(0).drops(datagram, 50.0)
-
-
-@pytest.mark.parametrize(
-    ("tick_hz", "job_hz", "every"),
-    [(250.0, 250.0, 1), (250.0, 125.0, 2), (1000.0, 100.0, 10), (1e6 / 1600, 125.0, 5)],
-)
-def test_a_rate_that_divides(tick_hz: float, job_hz: float, every: int) -> None:
-    assert divider(tick_hz, job_hz, "JOB") == every
-    assert sum(is_due(tick, every) for tick in range(100 * every)) == 100
-
-
-@pytest.mark.parametrize(
-    ("tick_hz", "job_hz"), [(250.0, 400.0), (250.0, 100.0), (100.0, 250.0), (250.0, 249.0)]
-)
-def test_a_rate_that_does_not_names_both(tick_hz: float, job_hz: float) -> None:
-    with pytest.raises(RateError) as caught:
-        divider(tick_hz, job_hz, "CTL_RATE_HZ")
-    assert f"CTL_RATE_HZ = {job_hz:g} Hz" in str(caught.value)
-    assert f"{tick_hz:g} Hz" in str(caught.value)
-    assert "SIM_RATE_HZ" in str(caught.value)

@@ -1,0 +1,154 @@
+"""The motion towards a setpoint, a velocity or round a circle: smooth, bounded, at rest in the end."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from autopilot.geometry.linear import ZERO, Vec3, norm, sub
+from autopilot.guidance.legs import LOAD_POSITION, transfer_leg
+from autopilot.guidance.setpoint_follower import (
+    NOWHERE,
+    Circle,
+    Follow,
+    FollowLimits,
+    PositionSetpoint,
+    begin_following,
+    governed,
+)
+
+PACE = FollowLimits(1.5, 5.0, 1.5, 13.1)
+
+
+def led(
+    asked: PositionSetpoint | Circle, seconds: float, leg: Follow | None = None, begin_us: int = 0
+) -> list[Any]:
+    """Jets at every 20 ms on the way."""
+    leg = leg or begin_following((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    found = []
+    for k in range(round(seconds / 0.02)):
+        now_us = begin_us + 20_000 * k
+        leg = leg.onward(0.02 if k else 0.0, asked, PACE, now_us)
+        found.append(leg.jet(0.0))
+    return [*found, leg]
+
+
+finite = st.floats(-20.0, 20.0)
+vectors = st.tuples(finite, finite, finite)
+
+
+@settings(max_examples=40, deadline=None)
+@given(asked=st.lists(vectors, min_size=2, max_size=5), kinds=st.lists(st.booleans(), min_size=5, max_size=5))
+def test_no_derivative_jumps_whatever_is_asked(asked: list[Vec3], kinds: list[bool]) -> None:
+    leg = begin_following(((0.0, 0.0, 5.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    now_us = 0
+    for vector, is_place in zip(asked, kinds, strict=False):
+        wish = (
+            PositionSetpoint(vector, NOWHERE, NOWHERE, now_us)
+            if is_place
+            else PositionSetpoint(velocity=vector, since_us=now_us)
+        )
+        for _ in range(10):
+            now_us += 20_000
+            after = leg.onward(0.02, wish, PACE, now_us)
+            for n, (before_, after_) in enumerate(zip(leg.jet(0.02), after.jet(0.0), strict=True)):
+                # derivative n is of the size rate^n of what is moved, and is kept to rounding
+                assert norm(sub(before_, after_)) <= 1e-9 * 40.0 * PACE.rate**n
+            leg = after
+
+
+@settings(max_examples=60, deadline=None)
+@given(at_s=st.floats(0.0, 9.7), place=vectors, is_place=st.booleans())
+def test_from_any_motion_it_goes_on_within_the_acceleration(at_s: float, place: Vec3, is_place: bool) -> None:
+    before = transfer_leg((0.0, 0.0, 3.0), (10.0, 0.0, 3.0), 3.0, PACE.accel, LOAD_POSITION)
+    wish = PositionSetpoint(place) if is_place else PositionSetpoint(velocity=place)
+    *jets, _ = led(wish, 3.0, begin_following(before.jet(at_s), PACE.rate))
+    # 300 of them: 1.50 m/s^2 and 5.9 m/s^3; with a point begun at the velocity alone 1.63 and 16.5
+    assert max(norm(jet[2]) for jet in jets) < 1.05 * PACE.accel
+    assert max(norm(jet[3]) for jet in jets) < 8.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(height=st.floats(0.3, 6.0), wish=vectors, seconds=st.floats(0.1, 8.0))
+def test_it_comes_to_rest_over_the_floor_wherever_it_was_led(
+    height: float, wish: Vec3, seconds: float
+) -> None:
+    leg = begin_following(((0.0, 0.0, height), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    *_, leg = led(PositionSetpoint(velocity=wish), seconds, leg)
+    legs, end = leg.stopped(0.013, PACE.accel)
+    last = leg.jet(0.013)
+    for leg in legs:
+        for n, (before_, after_) in enumerate(zip(last, leg.jet(0.0), strict=True)):
+            assert norm(sub(before_, after_)) <= 1e-9 * 40.0 * PACE.rate**n
+        for k in range(21):
+            jet = leg.jet(k / 20 * leg.duration_s)
+            # 300 of them: no lower than 0.29999 m, and 1.50 m/s^2
+            assert jet[0][2] > 0.299
+            assert norm(jet[2]) < 1.05 * PACE.accel
+        last = leg.jet(leg.duration_s)
+    assert norm(sub(last[0], end)) < 1e-9 and norm(last[1]) < 1e-9
+
+
+def test_derivatives_are_those_of_the_motion() -> None:
+    *_, leg = led(PositionSetpoint((3.0, -2.0, 4.0)), 1.0)
+    h = 1e-4
+    for n in range(6):
+        change = sub(leg.jet(0.1 + h)[n], leg.jet(0.1 - h)[n])
+        slope = leg.jet(0.1)[n + 1]
+        wrong = norm(
+            (change[0] / (2 * h) - slope[0], change[1] / (2 * h) - slope[1], change[2] / (2 * h) - slope[2])
+        )
+        # a central difference is wrong by h^2 / 6 of the derivative two orders on
+        assert wrong < 1e-5 * PACE.rate ** (n + 1) + 1e-6
+
+
+def test_a_far_place_is_reached_within_speed_and_acceleration_and_not_overshot() -> None:
+    *jets, leg = led(PositionSetpoint((12.0, 0.0, 3.0)), 15.0)
+    assert norm(sub(leg.jet(0.0)[0], (12.0, 0.0, 3.0))) < 1e-3
+    assert max(norm(jet[1]) for jet in jets) < 1.001 * PACE.speed
+    assert max(norm(jet[2]) for jet in jets) < 1.001 * PACE.accel
+    assert max(jet[0][0] for jet in jets) < 12.001  # measured: 4 um short of it
+
+
+def test_a_velocity_is_reached_and_held_and_stops() -> None:
+    *_, leg = led(PositionSetpoint((math.nan, math.nan, 2.0), (2.0, 1.0, math.nan)), 6.0)
+    assert norm(sub(leg.jet(0.0)[1], (2.0, 1.0, 0.0))) < 1e-2
+    *_, leg = led(PositionSetpoint(velocity=ZERO), 6.0, leg)
+    assert norm(leg.jet(0.0)[1]) < 1e-3
+    still = leg.jet(0.0)[0]
+    *_, leg = led(PositionSetpoint(velocity=ZERO), 5.0, leg)
+    assert norm(sub(leg.jet(0.0)[0], still)) < 1e-3
+
+
+def test_no_velocity_leads_below_the_floor() -> None:
+    leg = begin_following(((0.0, 0.0, 3.0), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), PACE.rate)
+    *jets, leg = led(PositionSetpoint(velocity=(0.0, 0.0, -3.0)), 12.0, leg)
+    assert 0.27 < min(jet[0][2] for jet in jets) <= leg.jet(0.0)[0][2] + 0.03
+    assert leg.jet(0.0)[0][2] == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_place_that_moves_is_followed_without_lag() -> None:
+    *_, leg = led(PositionSetpoint(ZERO, (1.0, 0.0, 0.0)), 10.0)
+    # the last update was at 9.98 s
+    assert leg.jet(0.0)[0][0] == pytest.approx(9.98, abs=5e-3)
+
+
+def test_a_circle_is_flown_on_its_radius() -> None:
+    circle = Circle((0.0, 0.0, 3.0), 2.0, 0.6, 0.0, 0, 3.0)
+    *jets, _ = led(circle, 30.0)
+    for jet in jets[-300:]:
+        assert math.hypot(jet[0][0], jet[0][1]) == pytest.approx(2.0, abs=2e-3)
+        assert norm(jet[1]) == pytest.approx(1.2, abs=2e-3)
+
+
+@given(x=vectors, v=vectors, place=vectors, now=st.integers(0, 10**9))
+def test_the_governor_never_asks_for_more_than_its_acceleration(
+    x: Vec3, v: Vec3, place: Vec3, now: int
+) -> None:
+    point = governed(x, v, PositionSetpoint(place, v, x, 0), PACE, now)
+    assert all(map(math.isfinite, (*point[0], *point[1], *point[2])))
+    assert norm(point[2]) <= PACE.accel * 1.000001

@@ -1,0 +1,75 @@
+"""The load released: what the supervisor does with every phase, and what it refuses without a load."""
+
+from __future__ import annotations
+
+import pytest
+
+from autopilot.guidance.legs import QUAD_POSITION
+from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
+from autopilot.supervisor.advance import enter
+from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.requests import decide
+from autopilot.wire.dialect import plumbline as mavlink
+from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint
+from tests.doubles.sky import ACCEPTED, Sky, hanging
+
+DENIED = mavlink.MAV_RESULT_DENIED
+
+
+def test_released_by_command_a_mission_is_held_and_goes_on_as_the_vehicles() -> None:
+    sky = Sky(Takeoff(1.0), Waypoint(3.0, 0.0, 1.0, 2.0), Waypoint(0.0, 0.0, 2.0, 1.0), Land())
+    sky.airborne()
+    assert sky.ask(StartMission(1)).result == ACCEPTED
+    sky.wait(1.0)
+    verdict = sky.ask(Release())
+    assert (verdict.result, verdict.text) == (ACCEPTED, "Load released, mission held")
+    assert (sky.flight.phase, sky.flight.on_mission) == (Phase.HOLD, False)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    flown = [(mode, jet[0]) for _, mode, jet in sky.setpoints[-500:]]
+    assert {mode for mode, _ in flown} == {QUAD_POSITION}
+    assert sky.flight.mission_done
+
+
+SIGNALS = Signals(4.0, (Term("x", 0.1, 0.0, 2.0, None, 0.0),))
+
+
+@pytest.mark.parametrize("step", [SIGNALS, AttitudeRun("load", 0.1, 0.0, 1.0)])
+def test_what_swings_the_load_is_refused_without_it(step: Signals | AttitudeRun) -> None:
+    sky = Sky(Takeoff(1.0), Delay(1.0), step, Land())
+    sky.airborne()
+    sky.ask(Release())
+    verdict = sky.ask(StartMission(1))
+    assert verdict.result == DENIED
+    assert "needs the load, which is released" in str(verdict.text)
+    assert sky.ask(FollowAttitude((0.0, 0.0, 1.0), None)).result == DENIED
+
+
+@pytest.mark.parametrize("phase", [p for p in Phase if p not in (Phase.DISARMED, Phase.ARMED)])
+def test_a_release_is_never_refused(phase: Phase) -> None:
+    """Whatever is flown, the vehicle goes on alone; what it asks for begins where it is."""
+    sky = Sky(Takeoff(1.0), Waypoint(3.0, 0.0, 1.0, 9.0), Land()).airborne()
+    if phase == Phase.MISSION:
+        sky.ask(StartMission(1))
+    else:
+        sky.flight = enter(sky.flight, phase, sky.view, sky.settings)
+    flight, verdict = decide(sky.flight, Release(), hanging(sky.now_us), sky.settings)
+    assert verdict.result == ACCEPTED
+    assert flight.released
+    if phase in (Phase.FAILSAFE, Phase.SET_DOWN):
+        assert flight.phase == phase
+        return
+    assert flight.legs[0].control_mode == QUAD_POSITION
+    assert flight.legs[0].jet(0.0)[0] == pytest.approx(hanging().x_quad, abs=1e-9)
+
+
+def test_a_load_out_of_reach_is_not_taken() -> None:
+    sky = Sky()
+    sky.ask(Release())
+    sky.view = sky.view._replace(x_load=(2.0, 0.0, 0.02))
+    verdict = sky.ask(Grab())
+    assert verdict.result == DENIED
+    assert verdict.text == "Gripper: the load lies 1.9 m away, the cable reaches 0.7 m"
+    sky.view = sky.view._replace(x_load=(0.5, 0.0, 0.02))
+    assert sky.ask(Grab()).result == ACCEPTED
+    assert not sky.flight.released
