@@ -18,7 +18,7 @@ from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.items import encode_mission
 from autopilot.wire.signing import Signing, timestamp_of
 from autopilot.wire.tlog import TlogWriter
 from gcs.analysis.record import FlightMeta, Record

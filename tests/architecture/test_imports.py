@@ -216,7 +216,7 @@ GOOD = {
     "autopilot/control/laws/thesis.py": (
         "from autopilot.geometry.linear import Vec3\nfrom ..records import Command"
     ),
-    "autopilot/wire/mission_items.py": "from missions.model import Step",
+    "autopilot/wire/items/table.py": "from missions.model import Step",
     "autopilot/trajectory/timeline.py": "from missions.model import Step",
     "gcs/closed_loop.py": "from sitl.hil import HilSimulator\nfrom autopilot.onboard.onboard import Onboard",
     "gcs/commands/fly.py": "import subprocess, signal\nfrom autopilot.vehicle.parameters import LAWS",

@@ -23,7 +23,7 @@ from autopilot.supervisor.flight import Phase, Settings
 from autopilot.supervisor.requests import decide
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon
-from autopilot.wire.mission_items import LocatedStep
+from autopilot.wire.items import LocatedStep
 from missions.model import Takeoff, Waypoint
 
 from .conftest import ACCEPTED, SETTINGS, Sky
