@@ -17,7 +17,7 @@ from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
-from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, TruthQueue

@@ -65,7 +65,7 @@ from autopilot.services.virtual_files import information_message, made_files, me
 from autopilot.wire.codec import Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 

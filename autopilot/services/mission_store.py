@@ -13,7 +13,7 @@ import zlib
 from dataclasses import dataclass
 
 from autopilot.wire.convert import Home
-from autopilot.wire.mission_items import LocatedStep, MissionItemError, WireItem, located_steps
+from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
 
 MAX_ITEMS = 2000
 

@@ -32,7 +32,7 @@ from autopilot.services.streams import NEVER_US
 from autopilot.wire.convert import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.mission_items import LocatedStep, MissionItemError, WireItem, located_steps
+from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
 
 ASK_US = 500_000  # an item that was asked for is asked for again after this silence
 MAX_ASKS = 6  # times that one item is asked for: once, and five times more

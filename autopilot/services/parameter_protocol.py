@@ -22,7 +22,8 @@ from autopilot.services.records import (
 )
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameter_table import ParameterError, ParameterTable, from_the_wire, on_the_wire
+from autopilot.wire.parameter_encoding import from_the_wire, on_the_wire
+from autopilot.wire.parameter_table import ParameterError, ParameterTable
 
 _BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
 LIST_PACE_US = 2000  # between two values of a list: 500 a second

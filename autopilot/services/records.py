@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from autopilot.services.mission_store import StoredMission
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 
 Link = Hashable  # opaque name of a way to a client, chosen by the shell
 

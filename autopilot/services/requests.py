@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from autopilot.geometry.linear import Vec3
-from autopilot.wire.mission_items import LocatedStep
+from autopilot.wire.items import LocatedStep
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from autopilot.services.files import Path
 from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterTable
 
 PARAMETERS: Path = ("@PARAM", "param.pck")

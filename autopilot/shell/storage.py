@@ -22,7 +22,7 @@ from autopilot.shell.sd_card import DirectoryCard
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.mission_items import MissionItemError, WireItem
+from autopilot.wire.items import MissionItemError, WireItem
 from autopilot.wire.parameter_table import ParameterError, ParameterTable, parse_text
 from autopilot.wire.signing import Signing
 

@@ -43,9 +43,8 @@ class Belief:
 
 def shipped_vehicles() -> tuple[str, ...]:
     """Names of the vehicle files that come with the autopilot."""
-    return tuple(
-        sorted(p.name.removesuffix(".toml") for p in files(__package__).iterdir() if p.name.endswith(".toml"))
-    )
+    names = (p.name for p in files(__package__).iterdir() if p.name != "parameters.toml")
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
 def load_belief(name_or_path: str) -> Belief:

@@ -13,7 +13,7 @@ from math import hypot
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import MissionItemError, WireItem
+from autopilot.wire.items import MissionItemError, WireItem
 
 Spot = tuple[float, float]  # east, north, m
 

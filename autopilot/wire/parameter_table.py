@@ -13,11 +13,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from autopilot.wire.dialect import plumbline as mavlink
-
 NAME_LENGTH = 16  # PARAM_VALUE.param_id
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*")
-_FLOAT32, _INT32 = struct.Struct("<f"), struct.Struct("<i")
+_FLOAT32 = struct.Struct("<f")
 _EXACT_INTEGER = 2**24  # a float32 holds every integer up to here
 
 
@@ -95,28 +93,6 @@ def decimal_from_float32(value: float) -> float:
         if float32(decimal) == value:
             return decimal
     return float(f"{value:.9g}") if float32(value) == value else value
-
-
-def on_the_wire(value: float, whole: bool, bytewise: bool) -> tuple[float, int]:
-    """`value` as PARAM_VALUE and PARAM_SET carry it, and its MAV_PARAM_TYPE.
-
-    An INT32 (`whole`) travels in the field of a float: by its bits (PX4) or by its value (ArduPilot).
-    """
-    if not whole:
-        return value, mavlink.MAV_PARAM_TYPE_REAL32
-    number = round(value)
-    carried: float = _FLOAT32.unpack(_INT32.pack(number))[0] if bytewise else float(number)
-    return carried, mavlink.MAV_PARAM_TYPE_INT32
-
-
-def from_the_wire(carried: float, kind: int) -> float:
-    """The value that a PARAM_VALUE or PARAM_SET of this MAV_PARAM_TYPE means.
-
-    Of an INT32 the encoding shows: the bits of one below 1e9 are no whole number as a float, but for 0.
-    """
-    if kind != mavlink.MAV_PARAM_TYPE_INT32 or carried.is_integer() or math.isinf(carried):
-        return decimal_from_float32(carried)
-    return float(_INT32.unpack(_FLOAT32.pack(carried))[0])
 
 
 class ParameterTable:

@@ -21,7 +21,7 @@ from enum import Enum
 from typing import Literal
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 from gcs.clients import command
 from gcs.clients.connection import LINK_TIMEOUT_US, Connection
 from gcs.clients.datagrams import messages

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
 
 RETRY_US = 300_000

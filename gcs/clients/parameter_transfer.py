@@ -9,7 +9,8 @@ import math
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameter_table import NAME_LENGTH, decimal_from_float32, float32, from_the_wire
+from autopilot.wire.parameter_encoding import from_the_wire
+from autopilot.wire.parameter_table import NAME_LENGTH, decimal_from_float32, float32
 from gcs.clients.operation import GROUND, Result, Retry, Status, Target, addressed
 
 RETRY_US = 500_000

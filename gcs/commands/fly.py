@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
 from gcs.commands.options import AddressType, PositiveType, SettingType, json_option, print_json
 from gcs.shell.display import say
 from gcs.shell.link import DEFAULT_PORT, Address
@@ -18,8 +19,8 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
 @click.argument("mission")
 @click.option(
     "--law",
-    type=click.Choice(["thesis", "lqr", "plumbline"]),
-    default="plumbline",
+    type=click.Choice(LAWS),
+    default=DEFAULT_LAW,
     show_default=True,
     help="Control law to fly with.",
 )

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 
+from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
 from gcs.commands.options import SettingType, json_option, print_json
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
 from gcs.shell.display import say
@@ -19,9 +20,9 @@ from gcs.shell.display import say
 @click.option(
     "--law",
     "laws",
-    type=click.Choice(["thesis", "lqr", "plumbline"]),
+    type=click.Choice(LAWS),
     multiple=True,
-    help="Control law to fly with; may be given again.  [default: plumbline]",
+    help=f"Control law to fly with; may be given again.  [default: {DEFAULT_LAW}]",
 )
 @click.option("--sensors", default="lab", show_default=True, help="What the vehicle senses with, as gcs fly.")
 @click.option("--vehicle", default="bebop", show_default=True, help="What really flies, as gcs fly.")
@@ -109,7 +110,7 @@ def sweep_command(
         mission,
         vehicle,
         sensors,
-        laws or ("plumbline",),
+        laws or (DEFAULT_LAW,),
         tuple(range(1, seeds + 1)),
         [read_varied(text, sample is not None) for text in varied],
         dict(_setting(text) for text in settings),

@@ -10,7 +10,7 @@ import click
 
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem, encode_mission
+from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.missions import MissionClear, MissionDownload, MissionUpload
 from gcs.commands.options import connect_option, json_option, print_json, print_table
 from gcs.errors import GcsError

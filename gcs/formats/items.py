@@ -7,7 +7,7 @@ import struct
 from typing import NamedTuple
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import decimal_from_float32
 from gcs.errors import GcsError
 

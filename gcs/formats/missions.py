@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import FLOWN_COMMANDS, MissionItemError, WireItem, located_steps
+from autopilot.wire.items import Fate, MissionItemError, WireItem, fate, located_steps
 from gcs.formats.items import FormatError, command_name
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEAD, read_waypoints, write_waypoints
@@ -84,7 +84,7 @@ def judge(plan: Plan, home: Home) -> Judged:
         _, where = left.pop(0)
         told.append((0, f"item 0 ({where}): the home row, but the vehicle's home is elsewhere; left out"))
     for number, (item, _) in zip(numbers, left, strict=True):
-        if item.command > mavlink.MAV_CMD_NAV_LAST and item.command not in FLOWN_COMMANDS:
+        if fate(item.command) is Fate.KEPT:
             passed.setdefault(item.command, []).append(number)
     while True:
         try:
@@ -137,7 +137,7 @@ def _command_too(command: int) -> str:
 def _advice(item: WireItem, text: str) -> str:
     if item.command in _INSTEAD:
         return f"cannot be flown; {_INSTEAD[item.command]}"
-    if item.command not in FLOWN_COMMANDS:
+    if fate(item.command) is not Fate.FLOWN:
         return "cannot be flown; take it out, or use waypoints"
     return text
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 from gcs.formats.items import FileItem, FormatError, item_of, params_of
 
 _TRANSECT = "TransectStyleComplexItem"  # surveys and corridors hold the items they stand for

@@ -32,7 +32,7 @@ from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem, encode_mission
+from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.flight import READY_LIMIT_US, TIME_FACTOR, TIME_MARGIN_S
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from autopilot.wire.convert import Home
-from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.items import encode_mission
 from gcs.experiments.reuse import code_fingerprint
 from gcs.sweep.flight import Boarding, Flown, boarding, fly
 from gcs.sweep.plan import Case, PlanError, SweepPlan

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.wire.convert import Home
-from autopilot.wire.mission_items import WireItem, decode_items
+from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
 from gcs.workflows.vehicle_limits import load_limits
 from missions.fileformat import MissionFileError, load_mission

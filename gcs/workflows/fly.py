@@ -15,9 +15,10 @@ from pathlib import Path
 
 from autopilot.geometry import kernel
 from autopilot.trajectory.timeline import expected_duration_s
+from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import encode_mission
+from autopilot.wire.items import encode_mission
 from autopilot.wire.signing import Signing, timestamp_of
 from autopilot.wire.tlog import TlogWriter
 from gcs.analysis.record import FlightMeta, Record
@@ -43,7 +44,6 @@ from gcs.workflows.flight_loops import run_lockstep, run_wall_clock
 from gcs.workflows.report import make_report
 from missions.model import Mission
 
-LAWS = {"thesis": 0, "lqr": 1, "plumbline": 2}  # the value of CTL_LAW
 _LAST_COMPILED = Path(kernel.__file__).parents[1] / "control" / "laws" / "plumbline_tick.py"
 ONBOARD_LOG = "flight.ulg"
 WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
@@ -180,7 +180,7 @@ def _start(
         say("the first flight compiles the kernels of simulator and autopilot: about a minute")
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
-    both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS[options.law]}"]
+    both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS.index(options.law)}"]
     if options.force:
         both += ["--set", "MIS_INFEASIBLE=0"]
     for setting in options.settings:

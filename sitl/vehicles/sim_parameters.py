@@ -1,63 +1,34 @@
-"""The simulator's parameters, SIM_*: what an experiment changes without writing a truth file."""
+"""The simulator's parameters, SIM_*: what an experiment changes without writing a vehicle file."""
 
 from __future__ import annotations
 
-from autopilot.wire.parameter_table import Parameter, ParameterTable
+import tomllib
+from functools import cache
+from importlib.resources import files
+
+from autopilot.wire.parameter_file import ParameterFile, parameter_file
+from autopilot.wire.parameter_table import ParameterTable
 from sitl.plant.records import Truth
+
+FILE = "sim_parameters.toml"
+
+
+@cache
+def definitions() -> ParameterFile:
+    """What `sim_parameters.toml` says."""
+    text = (files("sitl") / FILE).read_text(encoding="utf-8")
+    return parameter_file(tomllib.loads(text), FILE)
 
 
 def sim_parameters(truth: Truth) -> ParameterTable:
-    """The table, with the values of the truth file as defaults."""
-    return ParameterTable(
-        [
-            Parameter("SIM_ACT_DELAY_MS", 0.0, 0.0, 200.0, "ms", "Transport delay of actuator commands"),
-            Parameter(
-                "SIM_ROTOR_TAU_MS", truth.rotor_tau * 1e3, 0.0, 1000.0, "ms", "Time constant of the rotor lag"
-            ),
-            Parameter(
-                "SIM_ENGINE_FAIL",
-                0.0,
-                0.0,
-                15.0,
-                "",
-                "Rotors that fail, a bit for each: 1, 2, 4, 8 for rotor 1, 2, 3, 4",
-                integer=True,
-            ),
-            Parameter("SIM_ENGINE_MUL", 0.0, 0.0, 1.0, "", "Share of its command that a failing rotor gives"),
-            Parameter("SIM_NOISE_SCALE", 1.0, 0.0, 100.0, "", "Factor on the noise and bias of every sensor"),
-            Parameter(
-                "SIM_SENS_LAT_MS", 0.0, 0.0, 500.0, "ms", "Latency added to that of every sensor", fixed=True
-            ),
-            Parameter("SIM_DROP_PCT", 0.0, 0.0, 100.0, "%", "Drop-out added to each sensor's own"),
-            Parameter(
-                "SIM_RATE_HZ", 250.0, 100.0, 1000.0, "Hz", "Ticks per second", integer=True, fixed=True
-            ),
-            _around("SIM_QUAD_MASS", truth.quad_mass, "kg", "Mass of the vehicle"),
-            _around("SIM_LOAD_MASS", truth.load_mass, "kg", "Mass of the load"),
-            _around("SIM_CABLE_LEN", truth.cable_length, "m", "Length of the cable", fixed=True),
-            Parameter("SIM_DRAG_SCALE", 1.0, 0.0, 100.0, "", "Factor on all drag of vehicle and load"),
-            Parameter("SIM_WIND_E", 0.0, -50.0, 50.0, "m/s", "Wind towards the east"),
-            Parameter("SIM_WIND_N", 0.0, -50.0, 50.0, "m/s", "Wind towards the north"),
-            Parameter("SIM_WIND_U", 0.0, -50.0, 50.0, "m/s", "Wind upwards"),
-            Parameter("SIM_GUST_STD", 0.0, 0.0, 20.0, "m/s", "Standard deviation of gusts, each axis"),
-            Parameter("SIM_GUST_TAU_S", 1.0, 0.05, 60.0, "s", "Correlation time of gusts"),
-            Parameter("SIM_GUST_E", 0.0, -50.0, 50.0, "m/s", "Gust pulse on the wind, towards the east"),
-            Parameter("SIM_GUST_N", 0.0, -50.0, 50.0, "m/s", "Gust pulse on the wind, towards the north"),
-            Parameter("SIM_GUST_U", 0.0, -50.0, 50.0, "m/s", "Gust pulse on the wind, upwards"),
-            Parameter(
-                "SIM_GUST_AT_S", -1.0, -1.0, 1e6, "s", "Simulated time at which the pulse begins; -1: never"
-            ),
-            Parameter("SIM_GUST_FOR_S", 2.0, 0.0, 1e6, "s", "Duration of the pulse"),
-            Parameter(
-                "SIM_GUST_NOW", 0.0, 0.0, 1.0, "", "1: the pulse begins at the next tick", integer=True
-            ),
-        ]
-    )
-
-
-def _around(name: str, value: float, unit: str, text: str, fixed: bool = False) -> Parameter:
-    """A mass or length of the truth file, free within two decades."""
-    return Parameter(name, value, value / 100.0, value * 100.0, unit, text, fixed=fixed)
+    """The table, with the values of the vehicle file as defaults."""
+    vehicle = {
+        "quad_mass_kg": truth.quad_mass,
+        "load_mass_kg": truth.load_mass,
+        "cable_length_m": truth.cable_length,
+        "rotor_tau_ms": truth.rotor_tau * 1e3,
+    }
+    return ParameterTable(definitions().definitions(vehicle))
 
 
 def apply(truth: Truth, table: ParameterTable) -> Truth:

@@ -2,9 +2,9 @@
 
 Missions and geometry stand alone; trajectory and wire on both; the vehicle on the wire; services, laws,
 estimator and guidance on those; the supervisor on guidance and services; the core of the flight on everything
-below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths; only
-`gcs/closed_loop.py` and `gcs/sweep` join the cores. Sockets, clocks, threads and logging belong to the shells
-alone.
+below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths and the definitions of
+parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. Sockets, clocks, threads and logging
+belong to the shells alone.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "gcs": (
         "autopilot.geometry",
         "autopilot.trajectory",
+        "autopilot.vehicle.parameters",
         "autopilot.wire",
         "autopilot.shell.options",
         "missions",
@@ -203,6 +204,7 @@ BAD = {
     "sitl/sensors/imu.py": "from gcs.analysis import align",
     "sitl/vehicles/loader.py": "from sitl.__main__ import main",
     "gcs/clients/flight.py": "from autopilot.core.tick import step",
+    "gcs/analysis/axes.py": "from autopilot.vehicle.belief import load_belief",
     "gcs/analysis/align.py": "from sitl.plant.records import Truth",
     "gcs/clients/link.py": "from asyncio import sleep",
     "gcs/report/page.py": "import logging.handlers",
@@ -214,10 +216,10 @@ GOOD = {
     "autopilot/control/laws/thesis.py": (
         "from autopilot.geometry.linear import Vec3\nfrom ..records import Command"
     ),
-    "autopilot/wire/mission_items.py": "from missions.model import Step",
+    "autopilot/wire/items/table.py": "from missions.model import Step",
     "autopilot/trajectory/timeline.py": "from missions.model import Step",
     "gcs/closed_loop.py": "from sitl.hil import HilSimulator\nfrom autopilot.onboard.onboard import Onboard",
-    "gcs/commands/fly.py": "import subprocess, signal",
+    "gcs/commands/fly.py": "import subprocess, signal\nfrom autopilot.vehicle.parameters import LAWS",
     "sitl/__main__.py": "import selectors\nfrom sitl.hil import HilSimulator",
     "missions/fileformat.py": "import pydantic, datetime, timeit",
 }

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from autopilot.vehicle import parameters
 from autopilot.vehicle.belief import load_belief
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.parameter_file import ParameterFile, group_of
 from autopilot.wire.parameter_table import ParameterTable
+from sitl.vehicles import sim_parameters
 from sitl.vehicles.files import load_truth
-from sitl.vehicles.sim_parameters import sim_parameters
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 HEAD = """# Parameters
@@ -21,37 +22,48 @@ Every number that can be set by name, with the value it has for the vehicle `beb
 parameter protocol: `gcs param list`, `gcs param set NAME VALUE`, or any ground station. The autopilot shows
 the simulator's parameters beside its own. A change of its own is stored at once and is there again after a
 restart; a change of the world lasts as long as the world, unless PREFLIGHT_STORAGE saves it. Those
-marked *fixed* take effect at start only.
+marked *fixed* take effect at start only. Defaults marked *vehicle* are taken from the vehicle file.
+
+This page is made of `autopilot/vehicle/parameters.toml` and `sitl/sim_parameters.toml`.
 """
 AUTOPILOT = """
 ## Autopilot
 
-What the autopilot believes of its vehicle (`VEH_`), the control laws, the estimator, missions and failsafes.
-
+What the autopilot believes of its vehicle, the control laws, the estimator, missions and failsafes.
 """
 SIMULATOR = """
 ## Simulator
 
 What is true, whatever the autopilot believes.
-
 """
 
 
-def rows(table: ParameterTable) -> str:
-    """The parameters of a table as a Markdown table."""
-    lines = ["| name | value | range | unit | meaning |", "|---|---|---|---|---|"]
-    for name in table.names:
-        p = table.describe(name)
-        text = p.text + (" (*fixed*)" if p.fixed else "")
-        lines.append(f"| `{name}` | {p.default:g} | {p.low:g} ... {p.high:g} | {p.unit} | {text} |")
+def tables(definitions: ParameterFile, table: ParameterTable) -> str:
+    """A Markdown table for each group of parameters, in the order of the file."""
+    lines = []
+    for group, title in definitions.groups.items():
+        lines += [
+            "",
+            f"### {title}",
+            "",
+            "| name | default | range | unit | meaning |",
+            "|---|---|---|---|---|",
+        ]
+        for name, spec in definitions.parameters.items():
+            if group_of(name) == group:
+                p = table.describe(name)
+                default = f"{p.default:g}" + (" *vehicle*" if spec.vehicle_keys else "")
+                text = p.text + (" (*fixed*)" if p.fixed else "")
+                lines.append(f"| `{name}` | {default} | {p.low:g} ... {p.high:g} | {p.unit} | {text} |")
     return "\n".join(lines) + "\n"
 
 
 def page() -> str:
     """The page as it should be."""
-    autopilot = rows(autopilot_parameters(load_belief("bebop")))
-    simulator = rows(sim_parameters(load_truth("bebop")))
-    return HEAD + AUTOPILOT + autopilot + SIMULATOR + simulator
+    autopilot = parameters.autopilot_parameters(load_belief("bebop"))
+    world = sim_parameters.sim_parameters(load_truth("bebop"))
+    simulated = tables(sim_parameters.definitions(), world)
+    return HEAD + AUTOPILOT + tables(parameters.definitions(), autopilot) + SIMULATOR + simulated
 
 
 def test_the_page_is_what_the_programs_have() -> None:

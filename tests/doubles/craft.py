@@ -17,7 +17,7 @@ from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import encode_steps, located_steps
+from autopilot.wire.items import encode_steps, located_steps
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator

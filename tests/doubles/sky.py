@@ -19,7 +19,7 @@ from autopilot.supervisor.state import Flight, MissionPlan, Phase, View
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
-from autopilot.wire.mission_items import encode_steps, located_steps
+from autopilot.wire.items import encode_steps, located_steps
 from missions.model import Step
 
 ACCEPTED = ACCEPTANCE.result

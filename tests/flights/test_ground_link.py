@@ -19,7 +19,7 @@ from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import encode_steps
+from autopilot.wire.items import encode_steps
 from gcs.clients.missions import MissionDownload, MissionUpload
 from gcs.clients.operation import GROUND, Operation, Target
 from gcs.clients.parameter_transfer import ParameterList

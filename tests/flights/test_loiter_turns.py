@@ -9,7 +9,7 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Phase
 from autopilot.wire.convert import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.mission_items import WireItem, located_steps
+from autopilot.wire.items import WireItem, located_steps
 from tests.doubles.craft import Craft
 from tests.doubles.sky import SETTINGS
 

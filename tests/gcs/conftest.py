@@ -15,7 +15,7 @@ import pytest
 
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 
 TICK_US = 20_000
 

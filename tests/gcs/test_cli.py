@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import encode_steps
+from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module

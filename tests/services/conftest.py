@@ -16,7 +16,7 @@ from autopilot.services.snapshot import Snapshot
 from autopilot.wire.codec import FrameWriter, Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem, encode_steps, located_steps
+from autopilot.wire.items import WireItem, encode_steps, located_steps
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from missions.model import Takeoff, Waypoint
 

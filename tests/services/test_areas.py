@@ -11,7 +11,7 @@ from autopilot.services.records import AreasChanged, MissionChanged
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Polygon, read_fence, read_rally
-from autopilot.wire.mission_items import MissionItemError, WireItem
+from autopilot.wire.items import MissionItemError, WireItem
 
 HOME = Home()
 LAT, LON = round(HOME.latitude_deg * 1e7), round(HOME.longitude_deg * 1e7)

@@ -20,7 +20,7 @@ from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.mission_items import MissionItemError, WireItem, encode_steps, located_steps
+from autopilot.wire.items import MissionItemError, WireItem, encode_steps, located_steps
 from autopilot.wire.parameter_table import ParameterError, decimal_from_float32
 from autopilot.wire.signing import NEWEST, Signing
 from missions.model import Takeoff, Waypoint

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
 from autopilot.wire.convert import Home
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 
 HOME = Home()
 CAMERA = WireItem(2, 2000, 0, 1, math.nan, -0.0, 0.5, math.inf, 2**31 - 1, -(2**31), math.nan)

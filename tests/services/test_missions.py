@@ -14,7 +14,7 @@ from autopilot.services.missions import ASK_US, ECHO_US, ECHOES, INT_ASKS, LATE_
 from autopilot.services.records import MissionChanged, Verdict
 from autopilot.services.requests import ReplaceMission
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.mission_items import WireItem
+from autopilot.wire.items import WireItem
 
 ACK, INT, REQUEST = "MISSION_ACK", "MISSION_REQUEST_INT", "MISSION_REQUEST"
 

@@ -23,7 +23,7 @@ from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon
-from autopilot.wire.mission_items import LocatedStep
+from autopilot.wire.items import LocatedStep
 from missions.model import Takeoff, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, Sky
 

@@ -16,11 +16,7 @@ from autopilot.trajectory.signals import evaluate, signal_table
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import EARTH_RADIUS_M, Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import (
-    FASTEST_M_S,
-    LONGEST_S,
-    MOST_FACTORS,
-    MOST_TERMS,
+from autopilot.wire.items import (
     LocatedStep,
     MissionItemError,
     WireItem,
@@ -30,6 +26,7 @@ from autopilot.wire.mission_items import (
     located_steps,
     unflown,
 )
+from autopilot.wire.items.limits import FASTEST_M_S, LONGEST_S, MOST_FACTORS, MOST_TERMS
 from missions.fileformat import load_mission, shipped
 from missions.model import (
     AttitudeRun,

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.codec import decode
 from gcs.analysis.record import FlightMeta, flight_record
 from gcs.analysis.telemetry import telemetry_of
 from gcs.closed_loop import Conditions, fly
 from gcs.experiments import thesis
 from gcs.experiments.plan import LAW_NAMES
-from gcs.workflows.fly import LAWS as LAW_PARAMETER
 from missions.fileformat import load_mission
 from tests.gcs.experiments import tolerances
 
@@ -41,7 +41,7 @@ def documented(law):
 @pytest.mark.parametrize("law", ["thesis", "lqr"])
 def test_case_a_is_what_the_page_says(law):
     log = Frames()
-    conditions = Conditions("thesis", "ideal", settings={"CTL_LAW": float(LAW_PARAMETER[law])})
+    conditions = Conditions("thesis", "ideal", settings={"CTL_LAW": float(LAWS.index(law))})
     fly(load_mission("case-a"), conditions, log)
     record = flight_record(telemetry_of(log.records), FlightMeta())
     for key, value in zip(KEYS, documented(law), strict=True):

@@ -15,7 +15,7 @@ from pymavlink import mavwp
 
 from autopilot.wire.convert import Home
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.mission_items import WireItem, encode_mission
+from autopilot.wire.items import WireItem, encode_mission
 from autopilot.wire.parameter_table import parse_text
 from gcs.clients.operation import Target
 from gcs.formats.items import NO_INT, FormatError
@@ -133,6 +133,14 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
         "item 6, DO_SET_ROI (201): kept on the vehicle but not done",
     ]
     assert [item.command for item in judged.items] == [22, 206, 16, 31004, 201]
+
+
+def test_what_is_refused_is_left_out_and_not_kept() -> None:
+    judged = judge(read_plan(plan_text(TAKEOFF, simple(208, 2), simple(80, 2), simple(21))), HOME)
+    (line,) = judged.left_out
+    assert line.startswith("item 1 (") and "DO_PARACHUTE (208)" in line
+    assert judged.kept == ["item 2, NAV_ROI (80): kept on the vehicle but not done"]
+    assert [item.command for item in judged.items] == [22, 80, 21]
 
 
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:

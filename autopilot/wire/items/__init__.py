@@ -1,0 +1,32 @@
+"""Missions as mission items and back, by one table of commands (`table`).
+
+`decode_items(encode_mission(mission, home), home)` equals `mission.steps` up to what the fields hold: float32
+(heights, holds, speeds, delays, amplitudes, rises, falls, phases, tilts), milliseconds (starts, durations and
+holds of signals), microseconds (periods) and 1e-7 degrees (the place of a waypoint: 5.6 mm). Items that were
+made here come back unchanged: `encode(decode(items)) == items`.
+
+Positions are positions of the load. DO_JUMP is flown by flying its items again.
+"""
+
+from autopilot.wire.items.command import Command, Fate
+from autopilot.wire.items.decode import decode_items, located_steps, unflown
+from autopilot.wire.items.encode import encode_mission, encode_steps
+from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
+from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, fate
+
+__all__ = [
+    "COMMAND",
+    "COMMANDS",
+    "FLOWN_COMMANDS",
+    "Command",
+    "Fate",
+    "LocatedStep",
+    "MissionItemError",
+    "WireItem",
+    "decode_items",
+    "encode_mission",
+    "encode_steps",
+    "fate",
+    "located_steps",
+    "unflown",
+]

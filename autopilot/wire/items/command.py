@@ -1,0 +1,108 @@
+"""A row of the table of mission commands, and an item that is read by one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from autopilot.geometry.linear import Vec3
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items.fields import Field
+from autopilot.wire.items.limits import HOME_ROW_M
+from autopilot.wire.items.records import (
+    ABSOLUTE_FRAMES,
+    FRAME_MISSION,
+    PLACE_FRAMES,
+    MissionItemError,
+    WireItem,
+    wrong_frame,
+)
+from missions.model import Step
+
+
+class Fate(Enum):
+    """What becomes of an item."""
+
+    FLOWN = "flown"
+    KEPT = "kept"  # stored and given back, and not flown
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class LoadState:
+    """What the steps so far have led to."""
+
+    left_at: Vec3 | None = None  # where the load hangs (the vehicle, once it is released), if that is known
+    released: bool = False
+    speed_m_s: float | None = None  # the last that was set
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: what becomes of it, its parameters, and what is flown."""
+
+    number: int
+    text: str  # what is flown, or why not
+    fields: tuple[Field, ...] = ()
+    makes: type[Any] | None = None  # the record that its fields make: a step, or part of one
+    written: bool = False  # the record is written as this command
+    constants: Mapping[str, float] = field(default_factory=dict)  # written beside the fields
+    reads: Callable[[Asked], Iterable[Step]] | None = None  # None: one record of all fields
+    mission_frame: bool = False  # its frame must be MAV_FRAME_MISSION
+    needs_load: bool = False  # refused behind a release
+    fate: Fate = Fate.FLOWN
+
+
+@dataclass(frozen=True)
+class Asked:
+    """An item, the row of its command, and what the items before it have led to."""
+
+    seq: int
+    item: WireItem
+    home: Home
+    state: LoadState
+    command: Command
+
+    def __getitem__(self, attribute: str) -> Any:
+        """What its parameters say of an attribute, within limits."""
+        one = next(one for one in self.command.fields if attribute in one.gives)
+        return one.read(self.seq, self.item, self.home)[one.gives.index(attribute)]
+
+    def record(self) -> Any:
+        """The record of the command, of all its fields."""
+        assert self.command.makes is not None, self.command.number
+        values: dict[str, Any] = {}
+        for one in self.command.fields:
+            values |= zip(one.gives, one.read(self.seq, self.item, self.home), strict=True)
+        return self.command.makes(**values)
+
+    def expect_frame(self) -> None:
+        """MissionItemError where the command asks for MAV_FRAME_MISSION and the item has another."""
+        if self.command.mission_frame and self.item.frame != FRAME_MISSION:
+            raise wrong_frame(self.seq, self.item, (FRAME_MISSION,))
+
+    def expect_load(self) -> None:
+        """Signals, attitude runs and the winch move a load."""
+        if self.state.released:
+            raise self.refused("needs the load, which an item before it has released")
+
+    def is_placed(self) -> bool:
+        """Whether the item names a place."""
+        return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) != (0, 0)
+
+    def is_home_row(self) -> bool:
+        """Whether it is home itself as item 0, as MAVProxy and Mission Planner write it."""
+        item = self.item
+        if self.seq != 0 or item.current != 1 or item.frame not in ABSOLUTE_FRAMES:
+            return False
+        place = enu_from_geodetic(item.x, item.y, 0, self.home)
+        height = item.z - self.home.altitude_m
+        return math.hypot(place[0], place[1]) < HOME_ROW_M and abs(height) < HOME_ROW_M
+
+    def refused(self, text: str, result: int = mavlink.MAV_MISSION_INVALID) -> MissionItemError:
+        """The error that refuses this item."""
+        return MissionItemError(self.seq, text, result)

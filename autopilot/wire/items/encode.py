@@ -1,0 +1,53 @@
+"""Steps to mission items, by the table of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.items.command import Command
+from autopilot.wire.items.decode import located_steps
+from autopilot.wire.items.fields import WIRE_FIELD, Height, Place
+from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE, WireItem
+from autopilot.wire.items.table import COMMANDS
+from autopilot.wire.parameter_table import float32
+from missions.model import Mission, Signals, Step
+
+_WRITTEN: dict[type[Any], Command] = {row.makes: row for row in COMMANDS if row.makes and row.written}
+
+
+def encode_mission(mission: Mission, home: Home) -> tuple[WireItem, ...]:
+    """The items of a mission; MissionItemError if a number does not fit its field or could not be flown."""
+    return encode_steps(mission.steps, home)
+
+
+def encode_steps(steps: Sequence[Step], home: Home) -> tuple[WireItem, ...]:
+    """The items of the steps."""
+    items: list[WireItem] = []
+    for step in steps:
+        items.extend([_item(record, home, len(items)) for record in _records(step)])
+    located_steps(items, home)  # the vehicle would refuse what this refuses
+    return tuple(items)
+
+
+def _records(step: Step) -> Iterator[Any]:
+    """What has an item of its own: a step, or the terms and factors of signals before their run."""
+    if isinstance(step, Signals):
+        for term in step.terms:
+            yield term
+            yield from term.factors
+    yield step
+
+
+def _item(record: Any, home: Home, seq: int) -> WireItem:
+    """The item of a step, term or factor."""
+    row = _WRITTEN[type(record)]
+    wire = {**dict.fromkeys(WIRE_FIELD, 0.0), **row.constants}
+    frame = FRAME_MISSION
+    for field in row.fields:
+        if all(hasattr(record, attribute) for attribute in field.gives):
+            wire |= field.write(seq, home, *(getattr(record, attribute) for attribute in field.gives))
+            frame = FRAME_RELATIVE if isinstance(field, Place | Height) else frame
+    p1, p2, p3, p4, z = (float32(wire[name]) for name in (*WIRE_FIELD[:4], "z"))
+    return WireItem(frame, row.number, 0, 1, p1, p2, p3, p4, int(wire["x"]), int(wire["y"]), z)

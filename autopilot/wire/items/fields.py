@@ -1,0 +1,260 @@
+"""What a parameter of a mission command holds: how it is read, checked, written and described.
+
+A field gives one or two attributes of the record that an item stands for. Parameters are numbered as in
+MAV_CMD: 1 ... 4 are floats, 5 and 6 are x and y (int32), 7 is z (float).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+from autopilot.geometry.frames import enu_from_ned
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items.limits import FARTHEST_M, LOWEST_M
+from autopilot.wire.items.records import (
+    ABSOLUTE_FRAMES,
+    GLOBAL_FRAMES,
+    PLACE_FRAMES,
+    MissionItemError,
+    WireItem,
+    wrong_frame,
+)
+from autopilot.wire.parameter_table import decimal_from_float32
+from missions.model import Axis
+
+WIRE_FIELD = ("param1", "param2", "param3", "param4", "x", "y", "z")
+_WHOLE = (5, 6)
+_INT32_MAX = 2**31 - 1
+_COUNTS = {1e3: "ms", 1e6: "us"}  # units of x and y by counts per second
+_PARAM_RESULT = (
+    mavlink.MAV_MISSION_INVALID_PARAM1,
+    mavlink.MAV_MISSION_INVALID_PARAM2,
+    mavlink.MAV_MISSION_INVALID_PARAM3,
+    mavlink.MAV_MISSION_INVALID_PARAM4,
+    mavlink.MAV_MISSION_INVALID_PARAM5_X,
+    mavlink.MAV_MISSION_INVALID_PARAM6_Y,
+    mavlink.MAV_MISSION_INVALID_PARAM7,
+)
+
+
+class Field(Protocol):
+    """One or two parameters of a command."""
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        """The attributes of the record that it holds."""
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[Any, ...]:
+        """Their values; MissionItemError if one is out of its limits."""
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        """The fields of MISSION_ITEM_INT that hold these values; MissionItemError if they do not fit."""
+
+    def described(self) -> str:
+        """Parameter, name and limits, for the documentation."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number within limits. x and y hold it as a whole number of 1/`per_unit`."""
+
+    param: int
+    attribute: str
+    name: str
+    unit: str
+    low: float
+    high: float
+    per_unit: float = 1.0
+    none: float | None = None  # the number on the wire that stands for None
+    none_means: str = "none"
+    magnitude: bool = False  # its sign does not count
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        return (self.attribute,)
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[float | None]:
+        sent: float = getattr(item, WIRE_FIELD[self.param - 1])
+        if self.none is not None and sent == self.none:
+            return (None,)
+        value = abs(sent) if self.magnitude else sent / self.per_unit
+        return (check(seq, self.param, self.name, value, self.unit, self.low, self.high),)
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        (value,) = values
+        if value is None:
+            assert self.none is not None, self.attribute
+            value = self.none
+        elif self.param in _WHOLE:
+            longest = _INT32_MAX / self.per_unit
+            check(seq, self.param, self.name, value, self.unit, -longest, longest)
+            value = round(value * self.per_unit)
+        return {WIRE_FIELD[self.param - 1]: value}
+
+    def described(self) -> str:
+        low, high, counted = self.low, self.high, ""
+        if self.param in _WHOLE:
+            longest = _INT32_MAX / self.per_unit
+            low, high, counted = max(low, -longest), min(high, longest), f" in {_COUNTS[self.per_unit]}"
+        absent = "" if self.none is None else f", {self.none:g} {self.none_means}"
+        return (
+            f"{_place(self.param)} {self.name} {low:.6g} ... {high:.6g} {self.unit}".rstrip()
+            + counted
+            + absent
+        )
+
+
+@dataclass(frozen=True)
+class Fall(Number):
+    """The fall of a term, which may be 0 only where the term is held for ever (y -1)."""
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[float | None]:
+        low = 0.0 if item.y == -1 else self.low
+        return (check(seq, self.param, self.name, item.param4, self.unit, low, self.high),)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of some whole numbers, each of which stands for something."""
+
+    param: int
+    attribute: str
+    name: str
+    meanings: Mapping[int, Any]
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        return (self.attribute,)
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[Any]:
+        sent = getattr(item, WIRE_FIELD[self.param - 1])
+        return (self.meanings[choice(seq, self.param, self.name, sent, tuple(self.meanings))],)
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        (code,) = (code for code, meaning in self.meanings.items() if meaning == values[0])
+        return {WIRE_FIELD[self.param - 1]: float(code)}
+
+    def described(self) -> str:
+        listed = ", ".join(
+            str(code) if code == meaning else f"{code} {meaning}" for code, meaning in self.meanings.items()
+        )
+        return f"{_place(self.param)} {self.name}: {listed}"
+
+
+# PLUMBLINE_LOAD_SIGNAL_TERM.param1 and the sign of the amplitude; ned_from_enu of the unit vectors
+_AXIS_CODE: dict[Axis, tuple[int, float]] = {"x": (1, 1.0), "y": (0, 1.0), "z": (2, -1.0)}
+_AXIS_OF_CODE: dict[int, tuple[Axis, float]] = {code: (axis, s) for axis, (code, s) in _AXIS_CODE.items()}
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """Axis and amplitude of a term: NED on the wire, ENU in the record, so that z changes its sign."""
+
+    gives: ClassVar[tuple[str, ...]] = ("axis", "amplitude_m")
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[Axis, float]:
+        axis, sign = _AXIS_OF_CODE[choice(seq, 1, "axis", item.param1, tuple(_AXIS_OF_CODE))]
+        return axis, sign * check(seq, 2, "amplitude", item.param2, "m", -FARTHEST_M, FARTHEST_M)
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        code, sign = _AXIS_CODE[values[0]]
+        return {"param1": float(code), "param2": sign * values[1]}
+
+    def described(self) -> str:
+        return f"p1 axis: 0 north, 1 east, 2 down; p2 amplitude {-FARTHEST_M:g} ... {FARTHEST_M:g} m"
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in m from home: latitude and longitude, or north and east in MAV_FRAME_LOCAL_NED."""
+
+    gives: ClassVar[tuple[str, ...]] = ("east_m", "north_m")
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[float, float]:
+        if item.frame in GLOBAL_FRAMES:
+            check(seq, 5, "latitude", item.x * 1e-7, "deg", -90.0, 90.0)
+            check(seq, 6, "longitude", item.y * 1e-7, "deg", -180.0, 180.0)
+            east, north, _ = enu_from_geodetic(item.x, item.y, 0, home)
+        elif item.frame == mavlink.MAV_FRAME_LOCAL_NED:
+            east, north, _ = enu_from_ned((item.x / 1e4, item.y / 1e4, 0.0))
+        else:
+            raise wrong_frame(seq, item, PLACE_FRAMES)
+        check(seq, 5, "place north of home", north, "m", -FARTHEST_M, FARTHEST_M)
+        check(seq, 6, "place east of home", east, "m", -FARTHEST_M, FARTHEST_M)
+        return east, north
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        east, north = values
+        check(seq, 5, "east or north", max(abs(east), abs(north)), "m", 0.0, FARTHEST_M)
+        latitude, longitude, _ = geodetic_from_enu((east, north, 0.0), home)
+        return {"x": latitude, "y": longitude}
+
+    def described(self) -> str:
+        return f"x, y place within {FARTHEST_M / 1e3:g} km of home"
+
+
+@dataclass(frozen=True)
+class HomePlace:
+    """The place of home, written for ground stations that draw the item; not read."""
+
+    gives: ClassVar[tuple[str, ...]] = ()
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[()]:
+        return ()
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        latitude, longitude, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
+        return {"x": latitude, "y": longitude}
+
+    def described(self) -> str:
+        return "x, y not used"
+
+
+@dataclass(frozen=True)
+class Height:
+    """Height in m above home; above the ground, for a load hangs there."""
+
+    gives: ClassVar[tuple[str, ...]] = ("altitude_m",)
+
+    def read(self, seq: int, item: WireItem, home: Home) -> tuple[float]:
+        if item.frame not in PLACE_FRAMES:
+            raise wrong_frame(seq, item, PLACE_FRAMES)
+        height = item.z
+        if item.frame in ABSOLUTE_FRAMES:
+            height -= home.altitude_m
+        elif item.frame == mavlink.MAV_FRAME_LOCAL_NED:
+            height = enu_from_ned((0.0, 0.0, height))[2]
+        return (check(seq, 7, "height above home", height, "m", LOWEST_M, FARTHEST_M),)
+
+    def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
+        return {"z": values[0]}
+
+    def described(self) -> str:
+        return "z height"
+
+
+def check(seq: int, param: int, name: str, value: float, unit: str, low: float, high: float) -> float:
+    """`value`, a float32 as the decimal that somebody wrote, if it lies within its limits; NaN does not."""
+    decimal = decimal_from_float32(value)
+    if low <= decimal <= high:
+        return decimal
+    text = f"{name} = {value:.7g} {unit}; must be {low:.7g} ... {high:.7g}"
+    raise MissionItemError(seq, text, _PARAM_RESULT[param - 1])
+
+
+def choice(
+    seq: int, param: int, name: str, value: float, allowed: Sequence[int], shown: str | None = None
+) -> int:
+    """`value` as a whole number, if it is one of those allowed."""
+    if value in allowed:
+        return int(value)
+    wanted = shown or f"one of {', '.join(map(str, sorted(allowed)))}"
+    text = f"{name} = {value:.7g}; must be {wanted}"
+    raise MissionItemError(seq, text, _PARAM_RESULT[param - 1])
+
+
+def _place(param: int) -> str:
+    return f"p{param}" if param < 5 else WIRE_FIELD[param - 1]

@@ -1,0 +1,54 @@
+"""A mission item as it travels, the step it stands for, and the error for one that is refused."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.wire.dialect import plumbline as mavlink
+from missions.model import Step
+
+FRAME_MISSION = mavlink.MAV_FRAME_MISSION
+FRAME_RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+ABSOLUTE_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
+GLOBAL_FRAMES = (*ABSOLUTE_FRAMES, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, FRAME_RELATIVE)
+PLACE_FRAMES = (*GLOBAL_FRAMES, mavlink.MAV_FRAME_LOCAL_NED)
+
+
+class WireItem(NamedTuple):
+    """The fields of MISSION_ITEM_INT that belong to the item and not to its transfer."""
+
+    frame: int
+    command: int
+    current: int
+    autocontinue: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int
+    y: int
+    z: float
+
+
+class LocatedStep(NamedTuple):
+    """A step and the items it was made of: `first` ... `last`, both included."""
+
+    first: int
+    last: int
+    step: Step
+
+
+class MissionItemError(ValueError):
+    """An item that is refused; `result` is the MAV_MISSION_RESULT to answer with."""
+
+    def __init__(self, seq: int, text: str, result: int) -> None:
+        super().__init__(f"mission item {seq}: {text}")
+        self.seq = seq
+        self.text = text
+        self.result = result
+
+
+def wrong_frame(seq: int, item: WireItem, allowed: tuple[int, ...]) -> MissionItemError:
+    """The error for an item whose frame is none of those allowed."""
+    text = f"frame {item.frame}; must be {' or '.join(map(str, sorted(allowed)))} for command {item.command}"
+    return MissionItemError(seq, text, mavlink.MAV_MISSION_UNSUPPORTED_FRAME)

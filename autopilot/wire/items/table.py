@@ -1,0 +1,258 @@
+"""The mission commands: what each asks for, and what becomes of it.
+
+Encoding, decoding and the table in docs/missions.md follow from these rows. A command without a row is
+refused up to MAV_CMD_NAV_LAST, for somebody relies on being taken there, and kept above it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.items import readers
+from autopilot.wire.items.command import Command, Fate
+from autopilot.wire.items.fields import Amplitude, Choice, Fall, Height, HomePlace, Number, Place
+from autopilot.wire.items.limits import (
+    FASTEST_M_S,
+    FASTEST_REEL_M_S,
+    LARGEST_PHASE_RAD,
+    LONGEST_CABLE_M,
+    LONGEST_S,
+    MOST_FLOWN,
+    MOST_JUMPS,
+    MOST_RADIUS_M,
+    MOST_TURNS,
+    SHORTEST_EDGE_S,
+    SHORTEST_PERIOD_S,
+    SHORTEST_RUN_S,
+    SLOWEST_M_S,
+    TURN_ACCEL_M_S2,
+    TURN_SPEED_M_S,
+)
+from autopilot.wire.items.records import GLOBAL_FRAMES
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    Release,
+    ReturnHome,
+    Signals,
+    Sine,
+    Speed,
+    Takeoff,
+    Term,
+    Waypoint,
+    Winch,
+)
+
+_DELAY = (Number(1, "duration_s", "delay", "s", 0.0, LONGEST_S),)
+_POINT = (Place(), Height())
+_HELD_POINT = (Number(1, "hold_s", "hold", "s", 0.0, LONGEST_S), *_POINT)
+_SPEED_TYPE = {0: "airspeed", 1: "ground speed", 2: "climb", 3: "descent"}
+_ANY_OF_TWO = {0: 0, 1: 1}  # grippers, winches: there is one
+_GRIPPER_ACTION = {0: "release", 1: "grab", 2: "hold"}
+_BY_LENGTH = m.WINCH_RELATIVE_LENGTH_CONTROL
+_ATTITUDE_OF = {m.PLUMBLINE_CONTROL_QUAD_ATTITUDE: "vehicle", m.PLUMBLINE_CONTROL_LOAD_ATTITUDE: "load"}
+_UPRIGHT = math.pi / 2.0
+_MS, _US = 1e3, 1e6  # x and y: counts per second
+_CANNOT = "somebody would rely on it, and the vehicle cannot do it in a mission"
+
+COMMANDS: tuple[Command, ...] = (
+    Command(
+        m.MAV_CMD_NAV_TAKEOFF,
+        "the cable is pulled taut and the load lifted straight up",
+        (HomePlace(), Height()),
+        Takeoff,
+        written=True,
+    ),
+    Command(
+        m.MAV_CMD_NAV_WAYPOINT,
+        "the load is carried there; home itself as item 0 is not flown",
+        _HELD_POINT,
+        Waypoint,
+        written=True,
+        reads=readers.waypoint,
+    ),
+    Command(m.MAV_CMD_NAV_SPLINE_WAYPOINT, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, reads=readers.waypoint),
+    Command(m.MAV_CMD_NAV_LOITER_TIME, "as NAV_WAYPOINT", _HELD_POINT, Waypoint, reads=readers.waypoint),
+    Command(m.MAV_CMD_NAV_LOITER_TO_ALT, "as NAV_WAYPOINT", _POINT, Waypoint, reads=readers.waypoint),
+    Command(
+        m.MAV_CMD_NAV_LOITER_UNLIM,
+        "as NAV_WAYPOINT, held for a day",
+        _POINT,
+        reads=readers.waypoint_for_a_day,
+    ),
+    Command(
+        m.MAV_CMD_NAV_LOITER_TURNS,
+        "to the centre, out along a spiral of one turn, the turns (clockwise for a positive radius), back "
+        f"along another; at the last speed that was set ({TURN_SPEED_M_S:g} m/s before any), with at most "
+        f"{TURN_ACCEL_M_S2:g} m/s^2 inwards",
+        (
+            Number(1, "turns", "turns", "", 0.0, MOST_TURNS),
+            Number(3, "radius_m", "radius", "m", -MOST_RADIUS_M, MOST_RADIUS_M),
+            *_POINT,
+        ),
+        reads=readers.turns,
+    ),
+    Command(
+        m.MAV_CMD_CONDITION_GATE,
+        "a waypoint; at the height of the waypoint before where p2 is 0",
+        _POINT,
+        reads=readers.gate,
+    ),
+    Command(
+        m.MAV_CMD_DO_CHANGE_ALTITUDE,
+        "to the height p1 (m) where the load hangs; refused where no item before it says where",
+        (Choice(2, "frame", "frame", {frame: frame for frame in GLOBAL_FRAMES}),),
+        reads=readers.change_altitude,
+    ),
+    Command(
+        m.MAV_CMD_DO_CHANGE_SPEED,
+        "peak speed of the transfers that follow; climb, descent and a speed of -1 change nothing",
+        (
+            Choice(1, "kind", "speed type", _SPEED_TYPE),
+            Number(2, "speed_m_s", "speed", "m/s", SLOWEST_M_S, FASTEST_M_S),
+        ),
+        Speed,
+        written=True,
+        constants={"param1": 1.0, "param3": -1.0},
+        reads=readers.change_speed,
+    ),
+    Command(
+        m.MAV_CMD_NAV_DELAY,
+        "a hold",
+        _DELAY,
+        Delay,
+        written=True,
+        constants={"param2": -1.0, "param3": -1.0, "param4": -1.0},
+    ),
+    Command(m.MAV_CMD_CONDITION_DELAY, "a hold", _DELAY, Delay),
+    Command(
+        m.MAV_CMD_DO_JUMP,
+        f"the items from item p1 on again, p2 times (0 ... {MOST_JUMPS}); without end (-1) it is "
+        f"refused, and so is a mission of more than {MOST_FLOWN} items with all repetitions",
+    ),
+    Command(
+        m.MAV_CMD_DO_GRIPPER,
+        "the load is released; behind that a place to land at needs a waypoint before it, and grab is "
+        "refused. Grab and hold where the load is held: nothing",
+        (
+            Choice(1, "gripper", "gripper", _ANY_OF_TWO),
+            Choice(2, "action", "gripper action", _GRIPPER_ACTION),
+        ),
+        Release,
+        written=True,
+        constants={"param1": 1.0, "param2": float(m.GRIPPER_ACTION_RELEASE)},
+        reads=readers.gripper,
+    ),
+    Command(
+        m.MAV_CMD_DO_WINCH,
+        "the cable gets longer, or shorter for a negative length, where the load hangs. "
+        "Refused where no item before it says how high the load hangs",
+        (
+            Choice(1, "winch", "winch", _ANY_OF_TWO),
+            Choice(2, "action", "winch action", {_BY_LENGTH: "length"}),
+            Number(3, "length_m", "length", "m", -LONGEST_CABLE_M, LONGEST_CABLE_M),
+            Number(
+                4,
+                "speed_m_s",
+                "rate",
+                "m/s",
+                0.0,
+                FASTEST_REEL_M_S,
+                none=0.0,
+                none_means="`WNC_SPEED`",
+                magnitude=True,
+            ),
+        ),
+        Winch,
+        written=True,
+        constants={"param1": 1.0, "param2": float(_BY_LENGTH)},
+        reads=readers.winch,
+        needs_load=True,
+    ),
+    Command(
+        m.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        "over home at the height it has; as the last item and down, as a return that is ordered by mode",
+        (),
+        ReturnHome,
+        written=True,
+    ),
+    Command(
+        m.MAV_CMD_NAV_LAND,
+        "the load is set down and the vehicle lands beside it; at a place that is not where the load hangs, "
+        "there first",
+        (Place(),),
+        Land,
+        written=True,
+        reads=readers.land,
+    ),
+    Command(
+        m.PLUMBLINE_LOAD_SIGNAL_TERM,
+        "begins a term of signals",
+        (
+            Amplitude(),
+            Number(5, "start_s", "start", "s", 0.0, LONGEST_S, _MS),
+            Number(3, "rise_s", "rise", "s", SHORTEST_EDGE_S, LONGEST_S),
+            Number(6, "hold_s", "hold", "s", 0.0, LONGEST_S, _MS, none=-1.0, none_means="for ever"),
+            Fall(4, "fall_s", "fall", "s", SHORTEST_EDGE_S, LONGEST_S),
+            Number(7, "rise_90_by_s", "rise by", "s", SHORTEST_EDGE_S, LONGEST_S, none=0.0),
+        ),
+        Term,
+        written=True,
+        mission_frame=True,
+    ),
+    Command(
+        m.PLUMBLINE_LOAD_SIGNAL_FACTOR,
+        "multiplies the last term by a sine",
+        (
+            Number(5, "period_s", "period", "s", SHORTEST_PERIOD_S, LONGEST_S, _US),
+            Number(1, "phase_rad", "phase", "rad", -LARGEST_PHASE_RAD, LARGEST_PHASE_RAD),
+            Number(6, "start_s", "start", "s", -LONGEST_S, LONGEST_S, _MS),
+        ),
+        Sine,
+        written=True,
+        mission_frame=True,
+    ),
+    Command(
+        m.PLUMBLINE_LOAD_SIGNAL_RUN,
+        "flies the terms before it",
+        (Number(5, "duration_s", "duration", "s", SHORTEST_RUN_S, LONGEST_S, _MS),),
+        Signals,
+        written=True,
+        mission_frame=True,
+        needs_load=True,
+    ),
+    Command(
+        m.PLUMBLINE_ATTITUDE_RUN,
+        "leans the thrust axis (vehicle) or the line from load to vehicle (load) out and back",
+        (
+            Choice(1, "controlled", "mode", _ATTITUDE_OF),
+            Number(2, "tilt_north_rad", "tilt north", "rad", -_UPRIGHT, _UPRIGHT),
+            Number(3, "tilt_east_rad", "tilt east", "rad", -_UPRIGHT, _UPRIGHT),
+            Number(5, "duration_s", "duration", "s", SHORTEST_EDGE_S, LONGEST_S, _MS),
+        ),
+        AttitudeRun,
+        written=True,
+        mission_frame=True,
+        needs_load=True,
+    ),
+    Command(m.MAV_CMD_NAV_ROI, "nothing is pointed at it", fate=Fate.KEPT),
+    Command(m.MAV_CMD_DO_SET_MODE, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_DO_SET_HOME, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_DO_FLIGHTTERMINATION, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_DO_PARACHUTE, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_DO_REPOSITION, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_DO_ORBIT, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_DO_PAUSE_CONTINUE, _CANNOT, fate=Fate.REFUSED),
+    Command(m.MAV_CMD_COMPONENT_ARM_DISARM, _CANNOT, fate=Fate.REFUSED),
+)
+COMMAND: dict[int, Command] = {row.number: row for row in COMMANDS}
+FLOWN_COMMANDS = frozenset(row.number for row in COMMANDS if row.fate is Fate.FLOWN)
+
+
+def fate(command: int) -> Fate:
+    """What becomes of an item with this command, if its parameters will do."""
+    if command in COMMAND:
+        return COMMAND[command].fate
+    return Fate.REFUSED if command <= m.MAV_CMD_NAV_LAST else Fate.KEPT

@@ -1,0 +1,72 @@
+"""docs/missions.md: its table of mission commands is the one that the autopilot reads items by.
+
+To write the table anew: python tests/documentation/test_mission_commands.py > part, and put it in the page.
+"""
+
+from __future__ import annotations
+
+from itertools import groupby
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import COMMANDS, Command, Fate, fate
+from gcs.formats.items import command_name
+from missions.model import Sine, Step, Term
+
+PAGE = Path(__file__).parents[2] / "docs" / "missions.md"
+HEAD = "| command | parameters | |\n|---|---|---|\n"
+WORDS = {Fate.FLOWN: "", Fate.KEPT: "kept: ", Fate.REFUSED: "refused: "}
+OTHERS = (
+    f"| all others up to {mavlink.MAV_CMD_NAV_LAST} | | refused: somebody would rely on being taken there |\n"
+    f"| all others above {mavlink.MAV_CMD_NAV_LAST} (camera, gimbal, CONDITION_YAW ...) | | "
+    "kept: nothing is flown, a text names them |\n"
+)
+
+
+def rows() -> str:
+    """The table; neighbours that say the same share a row."""
+    lines = [
+        f"| {', '.join(f'{command_name(row.number)} {row.number}' for row in same)} | {cells}\n"
+        for cells, same in groupby(COMMANDS, cells_of)
+    ]
+    return HEAD + "".join(lines) + OTHERS
+
+
+def cells_of(row: Command) -> str:
+    return f"{'; '.join(field.described() for field in row.fields)} | {WORDS[row.fate]}{row.text} |"
+
+
+def test_the_page_has_the_table_of_the_program() -> None:
+    assert rows() in PAGE.read_text(encoding="utf-8"), f"run: python {Path(__file__).name}"
+
+
+def test_every_command_has_one_row_and_every_record_is_written_by_one() -> None:
+    numbers = [row.number for row in COMMANDS]
+    assert len(set(numbers)) == len(numbers)
+    records = [row.makes for row in COMMANDS if row.written]
+    assert set(records) == {*get_args(Step), Term, Sine}
+    assert len(records) == len(set(records))
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        (mavlink.MAV_CMD_NAV_WAYPOINT, Fate.FLOWN),
+        (mavlink.MAV_CMD_DO_JUMP, Fate.FLOWN),
+        (mavlink.MAV_CMD_NAV_ROI, Fate.KEPT),
+        (mavlink.MAV_CMD_NAV_VTOL_TAKEOFF, Fate.REFUSED),
+        (mavlink.MAV_CMD_NAV_LAST, Fate.REFUSED),
+        (mavlink.MAV_CMD_NAV_LAST + 1, Fate.KEPT),
+        (mavlink.MAV_CMD_DO_PARACHUTE, Fate.REFUSED),
+        (mavlink.MAV_CMD_IMAGE_START_CAPTURE, Fate.KEPT),
+    ],
+)
+def test_what_becomes_of_a_command(command: int, expected: Fate) -> None:
+    assert fate(command) is expected
+
+
+if __name__ == "__main__":
+    print(rows(), end="")

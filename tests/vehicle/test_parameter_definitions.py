@@ -1,0 +1,84 @@
+"""The autopilot's parameters: where defaults come from, and what importing the definitions costs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import fields
+
+import pytest
+
+from autopilot.vehicle.belief import Belief, load_belief, shipped_vehicles
+from autopilot.vehicle.parameters import (
+    DEFAULT_LAW,
+    LAWS,
+    MEASURED,
+    SHAPE_ALWAYS,
+    SHAPE_NEVER,
+    SHAPE_WITH_PLUMBLINE,
+    autopilot_parameters,
+    definitions,
+)
+from sitl.vehicles.files import load_truth
+from sitl.vehicles.sim_parameters import definitions as sim_definitions
+from sitl.vehicles.sim_parameters import sim_parameters
+
+
+def test_the_laws_are_the_values_of_their_parameter():
+    law = autopilot_parameters(load_belief("bebop")).describe("CTL_LAW")
+    assert (law.low, law.high, law.integer, law.fixed) == (0.0, len(LAWS) - 1.0, True, True)
+    assert LAWS[int(law.default)] == DEFAULT_LAW == "plumbline"
+    assert law.text == "Control law: 0 thesis, 1 lqr, 2 plumbline"
+
+
+def test_the_constants_of_shaping_are_its_values():
+    named = definitions().parameters["MIS_SHAPE"].values
+    assert named is not None
+    never, with_plumbline, always = (named[str(n)] for n in (SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS))
+    assert (never, with_plumbline, always) == ("never", "with the law plumbline", "always")
+
+
+@pytest.mark.parametrize("name", shipped_vehicles())
+def test_the_numbers_of_the_vehicle_are_the_defaults(name):
+    belief = load_belief(name)
+    table = autopilot_parameters(belief)
+    assert table["VEH_QUAD_MASS"] == belief.quad_mass_kg
+    assert (table["VEH_J_XX"], table["VEH_J_YY"], table["VEH_J_ZZ"]) == belief.inertia_kg_m2
+    assert table["VEH_ROTOR_TAU"] == 1e3 * belief.rotor_tau_s
+    assert table["VEH_ROTOR_LIM"] == float(belief.limited)
+    assert table["QP_KZ"] == pytest.approx(16.0 * belief.quad_mass_kg)
+    truth = load_truth(name)
+    world = sim_parameters(truth)
+    assert world["SIM_QUAD_MASS"] == truth.quad_mass
+    assert world.describe("SIM_QUAD_MASS").low == truth.quad_mass / 100.0
+    assert world.describe("SIM_QUAD_MASS").high == truth.quad_mass * 100.0
+
+
+def test_every_number_of_the_vehicle_has_a_parameter():
+    """Each field of the belief, moved, moves a default."""
+    belief = load_belief("heavy")
+    before = autopilot_parameters(belief).values()
+    for field in fields(Belief):
+        value = getattr(belief, field.name)
+        moved = tuple(1.5 * v for v in value) if isinstance(value, tuple) else not value
+        if isinstance(value, float):
+            moved = 1.5 * value + 1e-3
+        after = autopilot_parameters(Belief(**{**vars(belief), field.name: moved})).values()
+        assert after != before, field.name
+
+
+def test_parameters_are_no_vehicle():
+    assert shipped_vehicles() == ("bebop", "heavy", "thesis")
+
+
+def test_what_is_measured_on_the_bench_has_a_parameter_on_either_side():
+    assert MEASURED.keys() <= sim_definitions().parameters.keys()
+    assert set(MEASURED.values()) <= definitions().parameters.keys()
+
+
+def test_naming_the_laws_costs_no_heavy_import():
+    """The options of the command line name the laws: its help has to come at once."""
+    heavy = ("numpy", "numba", "pydantic", "autopilot.wire.dialect.plumbline")
+    check = f"import sys, autopilot.vehicle.parameters; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
