@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autopilot.vehicle.belief import Belief
+from autopilot.vehicle.model import Vehicle
+from autopilot.wire.convert import ROTOR_FMAX
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 
 SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
@@ -37,8 +38,10 @@ def apply_settings(table: ParameterTable, settings: Iterable[tuple[str, float]])
             table.set(belief.name, min(max(value, belief.low), belief.high))
 
 
-def autopilot_parameters(belief: Belief) -> ParameterTable:
+def autopilot_parameters(belief: Vehicle) -> ParameterTable:
     """The table, with the vehicle's numbers taken from `belief`."""
+    # where there is no limit the parameters keep the forces of Table 4-1 and the mixer ignores them
+    rotor_min, rotor_max = (belief.rotor_min_n, belief.rotor_max_n) if belief.limited else (0.0, ROTOR_FMAX)
     j_xx, j_yy, j_zz = belief.inertia_kg_m2
     p = Parameter
     heavier = belief.quad_mass_kg / TUNED_FOR_KG
@@ -58,8 +61,8 @@ def autopilot_parameters(belief: Belief) -> ParameterTable:
             p("VEH_J_XX", j_xx, 1e-6, 100.0, "kg m^2", "Moment of inertia about the forward axis"),
             p("VEH_J_YY", j_yy, 1e-6, 100.0, "kg m^2", "Moment of inertia about the left axis"),
             p("VEH_J_ZZ", j_zz, 1e-6, 100.0, "kg m^2", "Moment of inertia about the upward axis"),
-            p("VEH_ROTOR_MIN", belief.rotor_min_n, -1000.0, 1000.0, "N", "Least force of one rotor"),
-            p("VEH_ROTOR_MAX", belief.rotor_max_n, 0.01, 1000.0, "N", "Greatest force of one rotor"),
+            p("VEH_ROTOR_MIN", rotor_min, -1000.0, 1000.0, "N", "Least force of one rotor"),
+            p("VEH_ROTOR_MAX", rotor_max, 0.01, 1000.0, "N", "Greatest force of one rotor"),
             p(
                 "VEH_ROTOR_LIM",
                 1.0 if belief.limited else 0.0,

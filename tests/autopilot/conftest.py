@@ -35,7 +35,7 @@ from autopilot.supervisor.advance import advance
 from autopilot.supervisor.flight import Flight, MissionPlan, Phase, Settings, View, settings_from
 from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.requests import decide, with_plan
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
@@ -45,7 +45,7 @@ from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator
 from sitl.plant.records import PlantState
-from sitl.vehicles.files import load_truth
+from sitl.vehicles.truth import load_truth
 
 Array = NDArray[Any]
 TICK_S = 0.004
@@ -55,7 +55,7 @@ ACCEPTED = ACCEPTANCE.result
 
 def bebop_tuning() -> EstimatorTuning:
     """The estimator as delivered, for the vehicle of Table 4-1."""
-    return estimator_tuning(autopilot_parameters(load_belief("bebop")))
+    return estimator_tuning(autopilot_parameters(load_vehicle("bebop")))
 
 
 class Motion:
@@ -233,7 +233,7 @@ def motion() -> Motion:
 
 # ---- the supervisor in a world that does as it is told
 
-TABLE = autopilot_parameters(load_belief("bebop"))
+TABLE = autopilot_parameters(load_vehicle("bebop"))
 SETTINGS = settings_from(TABLE, build_law(TABLE).ramp_lag_s)
 STEP_US = 20_000
 LOAD_RADIUS, GEAR = 0.02, 0.06

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.parameter_table import ParameterTable
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 HEAD = """# Parameters
@@ -49,7 +49,7 @@ def rows(table: ParameterTable) -> str:
 
 def page() -> str:
     """The page as it should be."""
-    autopilot = rows(autopilot_parameters(load_belief("bebop")))
+    autopilot = rows(autopilot_parameters(load_vehicle("bebop")))
     simulator = rows(sim_parameters(load_truth("bebop")))
     return HEAD + AUTOPILOT + autopilot + SIMULATOR + simulator
 
