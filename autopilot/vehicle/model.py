@@ -52,7 +52,8 @@ class Vehicle(BaseModel):
     name: str = Field("", description="what it is called; the programs go by the name of the file")
     rotors: Literal[4] = Field(4, description="number of rotors; only quadrotors can be flown")
 
-    quad_mass_kg: float = _quantity("kg", 0.01, 100.0, "mass of the vehicle without its load")
+    # the gains that grow with the mass (QP_) end at 62 kg
+    quad_mass_kg: float = _quantity("kg", 0.01, 60.0, "mass of the vehicle without its load")
     load_mass_kg: float = _quantity("kg", 0.001, 100.0, "mass of the load")
     cable_length_m: float = _quantity("m", 0.05, 100.0, "length of the cable")
     arm_m: float = _quantity("m", 0.01, 5.0, "from the centre of mass to a rotor's axis")

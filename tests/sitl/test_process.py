@@ -1,0 +1,174 @@
+"""The `sitl` program as a process: served, resent, taken over, stopped. Sockets, but no sleeps."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from autopilot.wire import convert
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.dialect import plumbline as mavlink
+
+PATIENCE_S = 30.0  # the first start compiles
+
+pytestmark = pytest.mark.processes
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "sitl", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+class Pilot:
+    """A socket that behaves like an autopilot."""
+
+    def __init__(self, port: int) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.connect(("127.0.0.1", port))
+        self.socket.settimeout(PATIENCE_S)
+        self.writer = FrameWriter(1, 1)
+
+    def greet(self) -> None:
+        self.socket.send(self.writer.frame(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)))
+
+    def sensors(self, after_us: int = -1) -> tuple[bytes, int]:
+        """The next sensor datagram of a time after `after_us`: on a busy machine one may have come again."""
+        while True:
+            datagram = self.socket.recv(65535)
+            time_us = decode(datagram)[0][-1].message.time_usec
+            if time_us > after_us:
+                return datagram, time_us
+
+    def answer(self, time_us: int) -> None:
+        message = convert.hil_actuator_controls_message(time_us, (1.0,) * 4, True, True)
+        self.socket.send(self.writer.frame(message))
+
+
+@pytest.fixture
+def port() -> int:
+    return free_port()
+
+
+@pytest.fixture
+def lockstep_sitl(port: int) -> Iterator[subprocess.Popen[str]]:
+    process = start("--lockstep", "--listen", f"127.0.0.1:{port}", "--truth", f"127.0.0.1:{free_port()}")
+    assert process.stdout is not None
+    assert "waiting for an autopilot" in process.stdout.readline()
+    yield process
+    process.kill()
+    process.communicate()
+
+
+def test_lockstep_over_udp(port: int, lockstep_sitl: subprocess.Popen[str]) -> None:
+    first = Pilot(port)
+    first.greet()
+    time_us = -1
+    for tick in range(20):
+        _, time_us = first.sensors(after_us=time_us)
+        assert time_us == tick * 4000
+        first.answer(time_us)
+        if tick == 10:
+            Pilot(port).greet()  # another autopilot, started by accident: not while the first one answers
+    unanswered, time_us = first.sensors(after_us=time_us)
+    assert first.sensors() == (unanswered, time_us)  # silence: it comes again
+
+    first.socket.send(b"\xfd\x00rubbish")
+    stranger = Pilot(port)
+    stranger.answer(time_us)  # no heartbeat: not taken for the autopilot
+    assert first.sensors() == (unanswered, time_us)
+
+    for _ in range(2):  # sent again after 50, 100, 200 and 400 ms: the first one counts as gone
+        assert first.sensors() == (unanswered, time_us)
+    second = Pilot(port)  # the autopilot was restarted: served from the present tick
+    second.greet()
+    assert second.sensors() == (unanswered, time_us)
+    second.answer(time_us)
+    assert second.sensors(after_us=time_us)[1] == time_us + 4000
+
+    lockstep_sitl.send_signal(signal.SIGTERM)
+    output, errors = lockstep_sitl.communicate(timeout=PATIENCE_S)
+    assert lockstep_sitl.returncode == 0
+    assert errors == ""
+    assert f"stopped at t = {(time_us + 4000) / 1e6:.3f} s" in output
+    assert output.count("is not served") == 1
+    assert output.count("serving the autopilot at") == 2
+
+
+def test_real_time_over_udp(port: int) -> None:
+    process = start(
+        *("--speed", "4", "--sensors", "ideal", "--listen", f"127.0.0.1:{port}"),
+        *("--truth", f"127.0.0.1:{free_port()}"),
+    )
+    assert process.stdout is not None
+    assert "at 4 x real time" in process.stdout.readline()
+    pilot = Pilot(port)
+    pilot.greet()
+    times = []
+    while not times or times[-1] < 400_000:
+        times.append(pilot.sensors()[1])
+        pilot.answer(times[-1])
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
+    assert errors == ""
+    assert times == list(range(0, times[-1] + 1, 4000))
+    assert "ticks/s, late p50" in output
+
+
+def test_lockstep_goes_no_faster_than_it_may(port: int) -> None:
+    process = start("--lockstep", "--speed", "10", "--listen", f"127.0.0.1:{port}")
+    assert process.stdout is not None
+    assert "in lockstep, at most 10 x real time" in process.stdout.readline()
+    pilot = Pilot(port)
+    pilot.greet()
+    time_us = pilot.sensors()[1]
+    began = time.monotonic()
+    while time_us < 2_000_000:
+        pilot.answer(time_us)
+        time_us = pilot.sensors(after_us=time_us)[1]
+    # 0.2 s from when the first tick was sent, which may have been a while before it was received
+    assert time.monotonic() - began > 0.1
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, errors) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "complaint"),
+    [
+        (
+            ["--listen", "127.0.0.1:{busy}"],
+            1,
+            "sitl: cannot listen on 127.0.0.1:{busy}: address already in use; ",
+        ),
+        (["--sensors", "nothing"], 1, "sitl: unknown sensors 'nothing'; shipped: gps, ideal, lab, rtk; or"),
+        (["--set", "SIM_RATE_HZ=300"], 1, "sitl: SIM_RATE_HZ = 300 Hz; a tick must be"),
+        (["--set", "SIM_RATE_HZ"], 2, "'SIM_RATE_HZ'; must be NAME=VALUE with a number"),
+        (["--listen", "4560"], 2, "'4560'; must be HOST:PORT"),
+    ],
+)
+def test_what_cannot_start_says_why(arguments: list[str], code: int, complaint: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as busy:
+        busy.bind(("127.0.0.1", 0))
+        taken = str(busy.getsockname()[1])
+        free = ["--listen", f"127.0.0.1:{free_port()}"] if "--listen" not in arguments else []
+        process = start(*(a.format(busy=taken) for a in arguments), *free)
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == code
+    assert complaint.format(busy=taken) in errors
