@@ -45,7 +45,7 @@ from autopilot.shell.options import (
 from autopilot.shell.path_worker import Aside
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.tcp_server import TcpServer
-from autopilot.vehicle.file import VehicleFileError, load_vehicle
+from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
@@ -406,7 +406,11 @@ def _address_or_none(text: str) -> Address | None:
     help="One ground station that shares our clock, in place of --gcs and --api.",
 )
 @click.option(
-    "--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help="What is believed to fly."
+    "--vehicle",
+    default="bebop",
+    show_default=True,
+    metavar="NAME|FILE",
+    help=f"What is believed to fly: {VEHICLES.choice()}.",
 )
 @click.option(
     "--set",

@@ -44,7 +44,7 @@ def _check(table: ParameterTable, name: str, value: float) -> None:
 
 def _unknown(name: str, names: list[str]) -> str:
     """What is said of an unknown parameter: the nearest one, and all that begin as it does."""
-    near = get_close_matches(name, names, n=1)
+    near = get_close_matches(name, names, n=1, cutoff=0.75)
     hint = f"did you mean {near[0]}? " if near else ""
     prefix = name.partition("_")[0] + "_"
     kin = sorted(known for known in names if known.startswith(prefix))

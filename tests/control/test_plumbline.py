@@ -812,8 +812,11 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
 def test_a_vehicle_file_may_leave_out_rotor_lag_and_drag(tmp_path: Path) -> None:
     believed = load_vehicle("thesis")
     assert (believed.rotor_tau_s, believed.quad_drag_n_s_m, believed.quad_drag_quadratic_n_s2_m2) == (0, 0, 0)
-    text = (ROOM / "vehicle" / "thesis.toml").read_text() + "rotor_tau_s = -0.01\n"
-    (tmp_path / "backwards.toml").write_text(text)
+    lines = (ROOM / "vehicle" / "vehicles" / "thesis.toml").read_text().splitlines()
+    kept = [line for line in lines if "_drag_" not in line and not line.startswith("rotor_tau_s")]
+    (tmp_path / "short.toml").write_text("\n".join(kept))
+    assert load_vehicle(str(tmp_path / "short.toml")) == believed
+    (tmp_path / "backwards.toml").write_text("\n".join([*kept, "rotor_tau_s = -0.01"]))
     with pytest.raises(VehicleFileError, match=r"rotor_tau_s = -0.01; must be >= 0"):
         load_vehicle(str(tmp_path / "backwards.toml"))
 
