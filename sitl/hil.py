@@ -24,9 +24,9 @@ from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
 from sitl.settings import SECOND_US, settings_of
 from sitl.sim_core import STOPPED, Readings, SimCore
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 VEHICLE_SYSTEM = 1
 SIMULATOR_COMPONENT = 26

@@ -23,7 +23,7 @@ from missions.model import Step
 from sitl.hil import HilSimulator
 from sitl.plant.records import PlantState
 from sitl.sim_core import SimCore
-from sitl.vehicles.files import load_truth
+from sitl.vehicles.truth import load_truth
 from tests.doubles.insides import core_of, state_of
 
 ACCEPTED = ACCEPTANCE.result

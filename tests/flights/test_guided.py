@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from autopilot.supervisor.flight import Phase, setpoint
+
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.guidance.setpoint_follower import Follow
-from autopilot.supervisor.flight import Phase, setpoint
 from autopilot.wire.dialect import plumbline as m
 from missions import model
 from tests.doubles.craft import Craft

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
-
 from autopilot.supervisor.flight import Phase
+
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Waypoint
 from missions.model import Release as ReleaseStep

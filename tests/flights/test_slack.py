@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import pytest
+from autopilot.supervisor.flight import Phase
 
 from autopilot.geometry.linear import norm
-from autopilot.supervisor.flight import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Signals, Sine, Takeoff, Term
 from tests.doubles.craft import Craft, at_phase

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import pytest
+from autopilot.supervisor.flight import Phase
 
 from autopilot.guidance.legs import Hold
-from autopilot.supervisor.flight import Phase
 from missions.model import Delay, Land, Takeoff, Waypoint, Winch
 from tests.doubles.craft import Craft, at_phase
 from tests.doubles.sky import ACCEPTED

@@ -250,7 +250,7 @@ def test_no_value_breaks_the_messages(value: object) -> None:
     for key in ("altitude_m", "terms", "axis", "speed_m_s"):
         for kind in missions.fileformat.ITEMS:
             document = {"title": "T", "items": [{"type": kind, key: value}]}
-            with patch.object(missions.fileformat.tomllib, "loads", return_value=document):
+            with patch.object(missions.toml_files.tomllib, "loads", return_value=document):
                 try:
                     missions.fileformat.parse_mission("", "x", "x.toml")
                 except missions.fileformat.MissionFileError as error:

@@ -14,8 +14,8 @@ from sitl.plant.step import initial_state
 from sitl.sensors.files import load_profile, parse_profile
 from sitl.settings import settings_of
 from sitl.sim_core import SimCore
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply, sim_parameters
+from sitl.vehicles.truth import load_truth
 
 Forces = tuple[float, float, float, float]
 

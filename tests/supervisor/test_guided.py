@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from autopilot.supervisor.flight import Guide, Phase, pace_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -32,7 +33,6 @@ from autopilot.services.requests import (
     SetMode,
     Takeoff,
 )
-from autopilot.supervisor.flight import Guide, Phase, pace_of
 from autopilot.wire.dialect import plumbline as m
 from tests.doubles.motion import CABLE_LENGTH
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky

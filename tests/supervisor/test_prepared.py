@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from autopilot.supervisor.flight import Phase, asked_setpoint, jet_ahead
 
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold, Pass, Run
 from autopilot.services.requests import Arm, Pause, StartMission
-from autopilot.supervisor.flight import Phase, asked_setpoint, jet_ahead
 from autopilot.supervisor.requests import with_plan
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.dialect import plumbline as mavlink

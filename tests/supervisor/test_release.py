@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from autopilot.supervisor.flight import Phase
 
 from autopilot.guidance.legs import QUAD_POSITION
 from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
 from autopilot.supervisor.advance import enter
-from autopilot.supervisor.flight import Phase
 from autopilot.supervisor.requests import decide
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from autopilot.supervisor.flight import Flight, Phase
+
 from autopilot.guidance.legs import Catch, Hold
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.flight import Flight, Phase
 from tests.doubles.sky import SETTINGS, hanging
 
 

@@ -6,13 +6,13 @@ import math
 from dataclasses import replace
 
 import pytest
-
 from autopilot.core.winch import cable_now, commanded_rate
+from autopilot.supervisor.flight import Flight, Phase
+
 from autopilot.guidance.legs import Hold, Reel, Slow, top_of
 from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor.advance import enter
-from autopilot.supervisor.flight import Flight, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Winch
 from tests.doubles.sky import ACCEPTED, SETTINGS, Sky

@@ -8,7 +8,7 @@ from dataclasses import fields
 
 import pytest
 
-from autopilot.vehicle.belief import Belief, load_belief, shipped_vehicles
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import (
     DEFAULT_LAW,
     LAWS,
@@ -19,13 +19,13 @@ from autopilot.vehicle.parameters import (
     autopilot_parameters,
     definitions,
 )
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import definitions as sim_definitions
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 
 def test_the_laws_are_the_values_of_their_parameter():
-    law = autopilot_parameters(load_belief("bebop")).describe("CTL_LAW")
+    law = autopilot_parameters(load_vehicle("bebop")).describe("CTL_LAW")
     assert (law.low, law.high, law.integer, law.fixed) == (0.0, len(LAWS) - 1.0, True, True)
     assert LAWS[int(law.default)] == DEFAULT_LAW == "plumbline"
     assert law.text == "Control law: 0 thesis, 1 lqr, 2 plumbline"
@@ -40,7 +40,7 @@ def test_the_constants_of_shaping_are_its_values():
 
 @pytest.mark.parametrize("name", shipped_vehicles())
 def test_the_numbers_of_the_vehicle_are_the_defaults(name):
-    belief = load_belief(name)
+    belief = load_vehicle(name)
     table = autopilot_parameters(belief)
     assert table["VEH_QUAD_MASS"] == belief.quad_mass_kg
     assert (table["VEH_J_XX"], table["VEH_J_YY"], table["VEH_J_ZZ"]) == belief.inertia_kg_m2
@@ -56,7 +56,7 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
 
 def test_every_number_of_the_vehicle_has_a_parameter():
     """Each field of the belief, moved, moves a default."""
-    belief = load_belief("heavy")
+    belief = load_vehicle("heavy")
     before = autopilot_parameters(belief).values()
     for field in fields(Belief):
         value = getattr(belief, field.name)
