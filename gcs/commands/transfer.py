@@ -20,7 +20,7 @@ from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 from gcs.workflows.check_mission import check_items, load_checked
-from gcs.workflows.fly import vehicle_home
+from gcs.workflows.running_flight import vehicle_home
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _FENCE = mavlink.MAV_MISSION_TYPE_FENCE

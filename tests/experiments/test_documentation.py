@@ -12,7 +12,7 @@ from gcs.analysis.telemetry import telemetry_of
 from gcs.closed_loop import Conditions, fly
 from gcs.experiments import thesis
 from gcs.experiments.plan import LAW_NAMES
-from gcs.workflows.fly import LAWS as LAW_PARAMETER
+from gcs.workflows.flight_options import LAWS as LAW_PARAMETER
 from missions.fileformat import load_mission
 
 PAGE = Path(__file__).parents[2] / "docs" / "thesis.md"
