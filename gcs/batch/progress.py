@@ -22,6 +22,7 @@ class BatchDisplay(LiveBars):
         self._began_s = time.monotonic()
         self.flown = 0  # in this run
         self.completed = 0  # of them
+        self._told = -1  # flown at the last plain line
 
     @property
     def elapsed_s(self) -> float:
@@ -33,7 +34,8 @@ class BatchDisplay(LiveBars):
         self.flown += flown
         self.completed += completed
         last = flown > 0 and self._stored + self.flown == self._total
-        self._show(lambda: self._rows(running), lambda: self._line(running), at_once=last)
+        plain = (lambda: self._line(running)) if self.flown != self._told else None
+        self._show(lambda: self._rows(running), plain, at_once=last)
 
     def _columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
@@ -61,6 +63,7 @@ class BatchDisplay(LiveBars):
         return f"flights, {100.0 * self.completed / self.flown:.0f} % completed, {_pace(pace)}"
 
     def _line(self, running: Running) -> str:
+        self._told = self.flown
         left = self._total - self._stored - self.flown
         minutes = left * self.elapsed_s / max(self.flown, 1) / 60.0
         remaining = f", {minutes:.1f} min remaining" if left and self.flown else ""
