@@ -24,11 +24,10 @@ from gcs.shell.stopping import StopRequest
 from gcs.workflows.check_mission import load_checked
 from gcs.workflows.flight_options import FlightOptions
 from gcs.workflows.own_flight import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, Stopwatch, fly_own
-from gcs.workflows.report import make_report
+from gcs.workflows.report import TLOG_FILE, make_report
 from gcs.workflows.running_flight import fly_running
 from missions.model import Mission
 
-TLOG_FILE = "flight.tlog"
 _EXIT = {
     "completed": EXIT_DONE,
     "diverged": EXIT_NOT_MET,
