@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from pathlib import Path
 
 import click
@@ -31,6 +30,5 @@ def capture_command(out: Path | None, duration_s: float | None, address: Address
     """
     from gcs.workflows.capture import capture_to
 
-    path = out or Path("flights") / f"capture-{datetime.now():%Y%m%d-%H%M%S}" / "flight.tlog"
-    records = capture_to(path, address, duration_s)
+    path, records = capture_to(out, address, duration_s)
     click.echo(f"{records} messages captured to {path}")

@@ -85,7 +85,7 @@ def takeoff_command(altitude_m: float | None, address: Address) -> None:
 
     The vehicle must be armed, or is armed next.
     """
-    from gcs.workflows.fly import vehicle_home
+    from gcs.workflows.running_flight import vehicle_home
 
     def make(session: Session) -> Operation:
         if altitude_m is None:

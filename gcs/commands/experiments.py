@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import click
 
 from gcs.commands.options import json_option, print_json
-from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
 from gcs.shell.display import say
-
-_POLL_S = 0.2
 
 
 @click.group("experiments")
@@ -42,7 +38,7 @@ def experiments_command() -> None:
 @click.option("--quiet", is_flag=True, help="No progress and no tables.")
 def thesis_command(
     out: Path, fresh: bool, jobs: int | None, docs: Path | None, as_json: bool, quiet: bool
-) -> int:
+) -> None:
     """Fly every experiment of chapter 4: four cases, NGC and LQR, the idealised and the true vehicle.
 
     Sixteen flights through the real processes in lockstep, with ideal sensors; then tables, results.json, a
@@ -53,56 +49,14 @@ def thesis_command(
     gcs experiments thesis
     gcs experiments thesis --out /tmp/thesis --fresh
     """
-    from gcs.experiments import flights, thesis
-    from gcs.experiments.launch import FlightProcesses, cores
     from gcs.experiments.page import PAGE_FILE
-    from gcs.experiments.plan import experiments
-    from gcs.experiments.progress import ExperimentDisplay
-    from gcs.experiments.reuse import code_fingerprint
-    from gcs.shell.stopping import StopRequest
+    from gcs.workflows.experiments import fly_thesis, print_tables
 
-    quiet = quiet or as_json
-    thesis.make_directory(out)
-    code = code_fingerprint()
-    with StopRequest("stopping; what is flown is kept, the same command goes on from there") as stop:
-        try:
-            with ExperimentDisplay(quiet) as display, FlightProcesses() as processes:
-                flights.fly_missing(
-                    experiments(),
-                    out / thesis.FLIGHTS,
-                    cores(jobs),
-                    code,
-                    processes.start,
-                    display.flights,
-                    lambda: time.sleep(_POLL_S),
-                    lambda: bool(stop),
-                    fresh,
-                )
-
-                def tell(done: int, total: int, name: str) -> None:
-                    if stop:
-                        raise flights.Interrupted
-                    display.figures(done, total, name)
-
-                report = thesis.write_report(out, code, tell)
-        except flights.Interrupted:
-            return EXIT_INTERRUPTED
-    if docs is not None:
-        thesis.write_docs(docs, out, report.records)
+    report = fly_thesis(out, jobs, docs, fresh, quiet or as_json)
     if as_json:
         print_json(report.records)
-        return EXIT_DONE
+        return
     if not quiet:
-        from rich.console import Console
-
-        from gcs.experiments.table import tables
-
-        shown = [table.rich() for table in tables(report.records)]
-        # on a narrow terminal lines wrap: better than numbers cut short
-        wide = max(Console(width=1000).measure(table).maximum for table in shown)
-        console = Console(width=max(wide, Console().width))
-        for table in shown:
-            console.print(table)
+        print_tables(report.records)
     click.echo(f"report: {out / PAGE_FILE}")
     say(f"thesis: {len(report.records)} flights, {len(report.drawn)} figures")
-    return EXIT_DONE

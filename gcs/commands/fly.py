@@ -112,7 +112,8 @@ def fly_command(
                 ctx,
             )
 
-    from gcs.workflows.fly import FlightOptions, fly
+    from gcs.workflows.flight_options import FlightOptions
+    from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record
 
     flight = fly(

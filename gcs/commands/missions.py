@@ -47,25 +47,11 @@ def check_command(mission: str, vehicle: str, as_asked: bool, as_json: bool) -> 
     far from the asked path it is, and what it takes of rotors, cable and tilt. With --as-asked the paths are
     judged as the laws thesis and lqr fly them, not shaped to what can be flown.
     """
-    from gcs.workflows.check_mission import load, path_reports, violations
+    from gcs.workflows.check_mission import check_mission
 
-    loaded = load(mission)
-    found = violations(loaded, vehicle, not as_asked)
-    reports = [] if found or as_asked else path_reports(loaded, vehicle)
+    found = check_mission(mission, vehicle, as_asked)
     if as_json:
-        print_json(
-            {
-                "mission": loaded.name,
-                "vehicle": vehicle,
-                "violations": [asdict(v) for v in found],
-                "paths": [asdict(r) for r in reports],
-            }
-        )
-    elif found:
-        for violation in found:
-            click.echo(str(violation))
+        print_json(asdict(found))
     else:
-        click.echo(f"{loaded.name}: vehicle {vehicle} can fly it")
-        for report in reports:
-            click.echo(str(report))
-    return EXIT_ERROR if found else EXIT_DONE
+        click.echo("\n".join(found.lines()))
+    return EXIT_ERROR if found.violations else EXIT_DONE

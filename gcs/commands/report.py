@@ -25,18 +25,14 @@ def report_command(source: Path, out: Path | None, as_json: bool, quiet: bool) -
     DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. Made are
     summary.json, flight.parquet, pictures and report.html, from the telemetry alone.
     """
-    from gcs.workflows.report import make_report, print_record
+    from gcs.workflows.report import print_record, report_again
 
-    tlog = source / "flight.tlog" if source.is_dir() else source
-    if not tlog.is_file():
-        raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds flight.tlog")
-    folder = out or (tlog.parent if tlog.name == "flight.tlog" else tlog.with_suffix(""))
-    record = make_report(tlog, folder, None, quiet or as_json)
+    record, folder = report_again(source, out, quiet or as_json)
     if as_json:
         print_json(record)
     elif not quiet:
         print_record(record)
     if record["outcome"] == "no telemetry":
-        raise GcsError(f"{tlog}: there is no telemetry of a Plumbline vehicle in it")
+        raise GcsError(f"{source}: holds no telemetry of a Plumbline vehicle")
     if not as_json:
         click.echo(f"report: {folder / 'report.html'}")

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import shlex
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
 import click
 
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
 from gcs.commands.options import SettingType, json_option, print_json, sensors_option, vehicle_option
-from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
 from gcs.shell.display import say
 
 
@@ -98,49 +96,31 @@ def sweep_command(
     if jobs is not None and scheduler is not None:
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
 
-    from gcs.experiments.launch import cores
-    from gcs.shell.stopping import StopRequest
-    from gcs.sweep.plan import make_plan, read_varied
-    from gcs.sweep.pool import dask_cluster, own_processes
-    from gcs.sweep.report import write_report
-    from gcs.sweep.run import sweep
+    from gcs.workflows.sweep import SweepOptions, run_sweep
 
-    quiet = quiet or as_json
-    plan = make_plan(
-        mission,
-        vehicle,
-        sensors,
-        laws or (DEFAULT_LAW,),
-        tuple(range(1, seeds + 1)),
-        [read_varied(text, sample is not None) for text in varied],
-        dict(_setting(text) for text in settings),
-        sample or 0,
-    )
-    directory = out or Path("sweeps") / Path(mission).stem
-    workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(jobs)))
-    with StopRequest("stopping; what is flown is kept, the same command goes on from there") as stop:
-        done = sweep(plan, directory, shlex.join(sys.argv), version("plumbline"), workers, stop, quiet, fresh)
-        page = write_report(directory, plan)
-    if as_json:
-        print_json(
-            {
-                "flights": done.flights,
-                "completed": done.completed,
-                "failed": done.flights - done.completed,
-                "planned": plan.flights,
-                "flown": done.flown,
-                "wall_s": round(done.wall_s, 3),
-                "flights_per_s": round(done.flights_per_s, 2),
-                "out": str(directory),
-            }
+    sweep = run_sweep(
+        SweepOptions(
+            mission=mission,
+            laws=laws or (DEFAULT_LAW,),
+            sensors=sensors,
+            vehicle=vehicle,
+            varied=varied,
+            settings=settings,
+            seeds=seeds,
+            sample=sample,
+            jobs=jobs,
+            scheduler=scheduler,
+            out=out,
+            fresh=fresh,
+            quiet=quiet or as_json,
+            command=shlex.join(sys.argv),
         )
+    )
+    if as_json:
+        print_json(sweep.record)
     else:
+        done = sweep.done
         pace = f", {done.flights_per_s:.1f} flights/s" if done.flown else ""
-        say(f"{mission}: {done.flights} of {plan.flights} flown, {done.completed} completed{pace}")
-        click.echo(f"report: {page}")
-    return EXIT_DONE if done.whole else EXIT_INTERRUPTED
-
-
-def _setting(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    return name, float(value)
+        say(f"{mission}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{pace}")
+        click.echo(f"report: {sweep.page}")
+    return sweep.exit_code

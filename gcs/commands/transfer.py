@@ -8,19 +8,15 @@ from typing import Any
 
 import click
 
-from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, encode_mission
-from gcs.clients.missions import MissionClear, MissionDownload, MissionUpload
+from autopilot.wire.items import WireItem
+from gcs.clients.missions import MissionClear
 from gcs.commands.options import connect_option, json_option, print_json, print_table, vehicle_option
-from gcs.errors import GcsError
 from gcs.formats.items import command_name
-from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
-from gcs.shell.display import say
+from gcs.formats.missions import is_foreign
 from gcs.shell.link import Address
 from gcs.shell.session import Session
-from gcs.workflows.check_mission import check_items, load_checked
-from gcs.workflows.fly import vehicle_home
+from gcs.workflows.transfer import download, download_to, upload
 
 _MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 _FENCE = mavlink.MAV_MISSION_TYPE_FENCE
@@ -42,41 +38,7 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
     station. The old mission stays in force until the new one is there whole. A .plan replaces fence and rally
     points too, as it does from QGroundControl.
     """
-    path = Path(mission)
-    if is_foreign(path):
-        plan = read_foreign(path)
-        with Session(address) as session:
-            target = session.find()
-            items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
-            if not force:
-                check_items(path.name, items, home, vehicle)
-            # the fence first: the vehicle judges the mission by it
-            for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
-                if area is not None:
-                    text = session.run(MissionUpload(target, area, kind)).text
-                    if area:
-                        click.echo(text)
-            click.echo(session.run(MissionUpload(target, items), "upload").text)
-        return
-    loaded = load_checked(mission, vehicle, force)
-    with Session(address) as session:
-        target = session.find()
-        items = encode_mission(loaded, vehicle_home(session))
-        click.echo(session.run(MissionUpload(target, items), "upload").text)
-
-
-def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
-    """The items to upload; what is not done is told, and what is left out is an error unless it may be."""
-    for line in (*judged.kept, *judged.left_out):
-        say(f"{path}: {line}")
-    if judged.left_out and not skip:
-        count = len(judged.left_out)
-        raise GcsError(
-            f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip goes on"
-        )
-    if not judged.items:
-        raise GcsError(f"{path}: nothing that can be flown; gcs clear takes the mission off the vehicle")
-    return judged.items
+    upload(mission, vehicle, force, skip, address, click.echo)
 
 
 @click.command("download")
@@ -92,30 +54,15 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
     """
     if file is not None and not is_foreign(file):
         raise click.BadParameter(f"{file}; must end in .plan or .waypoints", param_hint="FILE")
-    with Session(address) as session:
-        target = session.find()
-        items, fence, rally = (
-            _fetched(session, MissionDownload(target, kind))
-            if kind == _MISSION or (file is not None and file.suffix.lower() == PLAN_ENDING)
-            else []
-            for kind in (_MISSION, _FENCE, _RALLY)
-        )
-        home = vehicle_home(session) if file is not None else Home()
-    if file is not None:
-        write_foreign(file, items, home, fence, rally)
-        if not as_json:
-            click.echo(f"{len(items)} items written to {file}")
-            return
+    items = download(address) if file is None else download_to(file, address)
+    if file is not None and not as_json:
+        click.echo(f"{len(items)} items written to {file}")
+        return
     if as_json:
         print_json([{"seq": seq, **_record(item)} for seq, item in enumerate(items)])
         return
     header = ("seq", "command", "frame", "p1", "p2", "p3", "p4", "x", "y", "z")
     print_table([_row(seq, item) for seq, item in enumerate(items)], header)
-
-
-def _fetched(session: Session, operation: MissionDownload) -> list[WireItem]:
-    session.run(operation, "download")
-    return operation.items
 
 
 @click.command("clear")

@@ -1,9 +1,10 @@
-"""What a person sees while something lasts: on stderr, live on a terminal, a few plain lines elsewhere."""
+"""Progress on stderr: bars on a terminal, a plain line now and then elsewhere."""
 
 from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,7 +15,10 @@ if TYPE_CHECKING:
     from gcs.clients.flight import Progress
 
 _REFRESH_S = 0.1
-_PLAIN_S = 10.0  # between two plain lines of the same phase
+_PLAIN_S = 10.0  # between two plain lines of the same stage
+_OPENS_AFTER_S = 0.5  # a short step needs no bar
+
+Row = Mapping[str, Any]  # description, completed, total and the fields of one bar
 
 
 def say(line: str) -> None:
@@ -28,15 +32,63 @@ def is_live() -> bool:
 
 
 class LiveBars:
-    """Bars on a terminal, drawn when they are told to; they go as the `with` block is left."""
+    """The life cycle of all progress displays: opened by the first `_show`, closed with the `with` block.
 
-    _bars: Bars | None = None
+    On a terminal `_show` draws bars, at most ten times a second; elsewhere it prints a plain line when the
+    stage changes, and every ten seconds. A quiet display does neither.
+    """
 
-    def _open(self, *columns: ProgressColumn | str, transient: bool = False) -> Bars:
+    _transient = False  # whether the bars vanish when they are closed
+
+    def __init__(self, quiet: bool, delay_s: float = 0.0) -> None:
+        self._quiet = quiet
+        self._bars: Bars | None = None
+        self._tasks: dict[str, TaskID] = {}
+        self._next_s = time.monotonic() + delay_s
+        self._stage: str | None = None  # of the last plain line
+        self._plain_s = 0.0
+
+    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+        """Columns of the bars."""
+        raise NotImplementedError
+
+    def _show(
+        self,
+        rows: Callable[[], Mapping[str, Row]],
+        plain: Callable[[], str] | None,
+        stage: str = "",
+        at_once: bool = False,
+    ) -> None:
+        """Show progress if it is time to, or `at_once`; `rows` are the bars by name, `plain` the line."""
+        now_s = time.monotonic()
+        if self._quiet or (now_s < self._next_s and not at_once):
+            return
+        self._next_s = now_s + _REFRESH_S
+        if is_live():
+            self._draw(rows())
+        elif plain is not None and (at_once or stage != self._stage or now_s - self._plain_s > _PLAIN_S):
+            self._stage, self._plain_s = stage, now_s
+            say(plain())
+
+    def _draw(self, rows: Mapping[str, Row]) -> None:
+        bars = self._bars or self._open()
+        for name in [name for name in self._tasks if name not in rows]:
+            bars.remove_task(self._tasks.pop(name))
+        for name, row in rows.items():
+            if name in self._tasks:
+                bars.update(self._tasks[name], **row)
+            else:
+                self._tasks[name] = bars.add_task(**row)
+        bars.refresh()
+
+    def _open(self) -> Bars:
         from rich.console import Console
         from rich.progress import Progress
 
-        self._bars = Progress(*columns, console=Console(stderr=True), auto_refresh=False, transient=transient)
+        console = Console(stderr=True)
+        self._bars = Progress(
+            *self._columns(), console=console, auto_refresh=False, transient=self._transient
+        )
         self._bars.start()
         return self._bars
 
@@ -52,34 +104,41 @@ class LiveBars:
 
 
 class FlightDisplay(LiveBars):
-    """Where the flight is: phase, mission item, load error, rotor use, simulated time and its pace."""
+    """One flight: phase, mission item, load error, rotor use, simulated time and its ratio to real time."""
 
     def __init__(self, title: str, quiet: bool) -> None:
+        super().__init__(quiet)
         self._title = title
-        self._quiet = quiet
-        self._task: TaskID | None = None
-        self._next_s = 0.0
-        self._began: tuple[float, float] | None = (
-            None  # wall clock and vehicle clock at the first sign of life
-        )
-        self._told = ""  # the phase of the last plain line
-        self._told_s = 0.0
+        self._began: tuple[float, float] | None = None  # wall clock and vehicle clock, first message
 
     def update(self, progress: Progress) -> None:
         """Show `progress`, if it is time to."""
         now_s = time.monotonic()
-        if self._quiet or now_s < self._next_s:
-            return
-        self._next_s = now_s + _REFRESH_S
         if self._began is None and progress.sim_time_s > 0.0:
             self._began = (now_s, progress.sim_time_s)
-        if self._bars is not None and self._task is not None:
-            fields: dict[str, Any] = self._fields(progress, now_s)
-            self._bars.update(self._task, completed=progress.fraction, **fields)
-            self._bars.refresh()
-        elif progress.phase != self._told or now_s - self._told_s > _PLAIN_S:
-            self._told, self._told_s = progress.phase, now_s
-            say(self._line(self._fields(progress, now_s)))
+        self._show(
+            lambda: {"flight": self._row(progress, now_s)},
+            lambda: self._line(self._fields(progress, now_s)),
+            progress.phase,
+        )
+
+    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+        from rich.progress import BarColumn
+
+        return (
+            "[bold]{task.description}",
+            BarColumn(bar_width=24),
+            "{task.percentage:>3.0f}%",
+            "[cyan]{task.fields[phase]}",
+            "{task.fields[item]}",
+            "load {task.fields[error]}",
+            "rotors {task.fields[rotors]}",
+            "{task.fields[clock]} {task.fields[pace]}",
+        )
+
+    def _row(self, progress: Progress, now_s: float) -> Row:
+        bar = {"description": self._title, "completed": progress.fraction, "total": 1.0}
+        return {**bar, **self._fields(progress, now_s)}
 
     def _fields(self, progress: Progress, now_s: float) -> dict[str, str]:
         return {
@@ -104,51 +163,25 @@ class FlightDisplay(LiveBars):
         words.append(fields["pace"])
         return "  ".join(word for word in words if word)
 
-    def __enter__(self) -> Self:
-        if not self._quiet and is_live():
-            from rich.progress import BarColumn
-
-            bars = self._open(
-                "[bold]{task.description}",
-                BarColumn(bar_width=24),
-                "{task.percentage:>3.0f}%",
-                "[cyan]{task.fields[phase]}",
-                "{task.fields[item]}",
-                "load {task.fields[error]}",
-                "rotors {task.fields[rotors]}",
-                "{task.fields[clock]} {task.fields[pace]}",
-            )
-            blank: dict[str, Any] = dict.fromkeys(("item", "error", "rotors", "clock", "pace"), "")
-            self._task = bars.add_task(self._title, total=1.0, phase="starting", **blank)
-        return self
-
 
 class StepDisplay(LiveBars):
-    """A bar for anything else that takes more than a second; `update(done, total)` as it goes."""
+    """A bar for any other step that takes more than half a second; there is no plain line."""
+
+    _transient = True
 
     def __init__(self, title: str, quiet: bool = False) -> None:
+        super().__init__(quiet, _OPENS_AFTER_S)
         self._title = title
-        self._shown = not quiet and is_live()
-        self._task: TaskID | None = None
-        self._next_s = time.monotonic() + 0.5  # what is over sooner needs no bar
 
     def update(self, done: int, total: int, title: str | None = None) -> None:
-        """Show that `done` of `total` are done; a `total` of 0 means not known."""
-        now_s = time.monotonic()
-        if not self._shown or now_s < self._next_s:
-            return
-        self._next_s = now_s + _REFRESH_S
-        if self._bars is None:
-            from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
+        """Show that `done` of `total` are done; a `total` of 0 means that it is not known."""
+        row = {"description": title or self._title, "completed": done, "total": total or None}
+        self._show(lambda: {"step": row}, None)
 
-            columns = (SpinnerColumn(), "{task.description}", BarColumn(), MofNCompleteColumn())
-            self._bars = self._open(*columns, transient=True)
-            self._task = self._bars.add_task(self._title, total=None)
-        if self._task is not None:
-            self._bars.update(
-                self._task, completed=done, total=total or None, description=title or self._title
-            )
-        self._bars.refresh()
+    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+        from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
+
+        return (SpinnerColumn(), "{task.description}", BarColumn(), MofNCompleteColumn())
 
 
 def _or_dash(value: float | None, scale: float, unit: str) -> str:

@@ -11,7 +11,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from autopilot.vehicle.file import load_vehicle
@@ -25,7 +24,6 @@ from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
-PLAN_FILE = "plan.json"
 MOST_FLIGHTS = 10_000_000
 _MOST_VALUES = 10_000
 _DRAW_SEED = 1  # of the settings of `--sample`: part of the plan's meaning
@@ -233,32 +231,3 @@ def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
                 settings_of(world)
         except ParameterError as error:
             raise PlanError(str(error)) from None
-
-
-def store_plan(directory: Path, plan: SweepPlan, command: str, version: str, code: str) -> None:
-    """Write plan.json; PlanError if the directory holds another plan, or flights of other code."""
-    path = directory / PLAN_FILE
-    wanted = {"plan": plan.to_json(), "code": code}
-    if path.exists():
-        try:
-            found = json.loads(path.read_text(encoding="utf-8"))
-        except ValueError:
-            raise PlanError(f"{path} cannot be read; take another --out or remove {directory}") from None
-        if found.get("plan") != wanted["plan"]:
-            raise PlanError(f"{directory} holds another sweep; take another --out or remove it")
-        if found.get("code") != code:
-            raise PlanError(
-                f"{directory} holds flights of other code; take another --out, remove it, or give --fresh"
-            )
-        return
-    directory.mkdir(parents=True, exist_ok=True)
-    fields = {"command": command, "version": version, **wanted, "flights": plan.flights}
-    path.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
-
-
-def load_plan(directory: Path) -> SweepPlan:
-    """The plan of a sweep's directory."""
-    try:
-        return from_json(json.loads((directory / PLAN_FILE).read_text(encoding="utf-8"))["plan"])
-    except (OSError, ValueError, KeyError, TypeError):
-        raise PlanError(f"{directory} holds no sweep: {PLAN_FILE} is missing or cannot be read") from None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import math
 from collections import Counter
 from importlib.resources import files
@@ -15,7 +14,8 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.sweep.margin import linear_range
-from gcs.sweep.plan import PLAN_FILE, SweepPlan
+from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan_file import load_command
 from gcs.sweep.plots import draw_curve, draw_map
 from gcs.sweep.results import Flights, flights_of, reach
 from gcs.sweep.store import Store
@@ -45,7 +45,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
             picture = directory / f"map-{flights.law}-{first.lower()}-{second.lower()}.png"
             draw_map(picture, flights, plan, (first, second), units)
             maps.append(_picture(picture, f"law {flights.law}, {first} and {second}"))
-    story = json.loads((directory / PLAN_FILE).read_text(encoding="utf-8"))
+    command, version = load_command(directory)
     source = files("gcs.sweep").joinpath(_TEMPLATE).read_text(encoding="utf-8")
     page = directory / PAGE_FILE
     text = (
@@ -54,8 +54,8 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         .render(
             title=plan.mission,
             plan=plan,
-            command=story.get("command", ""),
-            version=story.get("version", ""),
+            command=command,
+            version=version,
             flown=sum(len(flights.outcome) for flights in laws),
             laws=[_law(flights) for flights in laws],
             reaches=margins(plan, laws, tables),

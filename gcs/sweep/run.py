@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from gcs.sweep.plan import SweepPlan, store_plan
-from gcs.sweep.pool import fly_all
-from gcs.sweep.progress import SweepDisplay
+from gcs.batch.pool import PoolCrew
+from gcs.batch.progress import BatchDisplay
+from gcs.batch.runner import Running, fly_all
+from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan_file import PLAN_FILE, store_plan, sweep_origin
+from gcs.sweep.results import COMPLETED
 from gcs.sweep.store import Row, Store
-from gcs.sweep.work import fingerprint, prepare
+from gcs.sweep.work import batches, fly_case, prepare
+
+BATCH = 4  # flights handed over at a time: about a second
+_KEEP_S = 5.0  # a flight is on disk so long after its end, at the latest
 
 
 @dataclass(frozen=True)
@@ -34,30 +42,30 @@ def sweep(
     plan: SweepPlan,
     directory: Path,
     command: str,
-    version: str,
     workers: AbstractContextManager[tuple[Executor, int]],
-    stopped: object,
+    stopped: Callable[[], bool],
     quiet: bool,
     fresh: bool,
 ) -> Swept:
-    """Fly what is missing of the plan and store all of it; `stopped` is true once somebody asked to stop."""
+    """Fly what is missing of the plan and store all of it; `stopped` says whether somebody asked to stop."""
     store = Store(directory, plan)
     if fresh:
         store.clear()
-        (directory / "plan.json").unlink(missing_ok=True)
-    store_plan(directory, plan, command, version, fingerprint(plan))
-    done = store.done()
-    missing = [case for case in plan.cases() if case.index not in done]
+        (directory / PLAN_FILE).unlink(missing_ok=True)
+    store_plan(directory, plan, command, sweep_origin(plan))
+    stored = store.done()
+    missing = [case for case in plan.cases() if case.index not in stored]
     whole, flown, wall_s = True, 0, 0.0
     if missing:
         work = prepare(plan)
-        with workers as (executor, count), SweepDisplay(len(done), plan.flights, quiet) as display:
+        with workers as (executor, count), BatchDisplay(len(stored), plan.flights, quiet) as display:
 
-            def told(rows: list[Row]) -> None:
-                display.add(len(rows), sum(row["outcome"] == "completed" for row in rows))
+            def told(rows: Sequence[Row], running: Running) -> None:
+                display.add(len(rows), sum(row["outcome"] == COMPLETED for row in rows), running)
 
-            whole = fly_all(work, missing, executor, count, store, told, lambda: bool(stopped))
+            crew = PoolCrew(executor, count, partial(fly_case, work))
+            whole = fly_all(batches(missing, BATCH), crew, store.add, told, stopped, _KEEP_S)
             flown, wall_s = display.flown, display.elapsed_s
     table = store.merge()
     outcomes = table.column("outcome").to_pylist()
-    return Swept(len(outcomes), flown, outcomes.count("completed"), wall_s, whole)
+    return Swept(len(outcomes), flown, outcomes.count(COMPLETED), wall_s, whole)

@@ -1,16 +1,10 @@
-"""A sweep as work that can be handed to anybody: what is flown, and the function that flies some of it."""
+"""A sweep as work for a crew: what every worker must know, and the function that flies one flight of it."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
-from pathlib import Path
 
-from autopilot.wire.convert import Home
-from autopilot.wire.items import encode_mission
-from gcs.experiments.reuse import code_fingerprint
 from gcs.sweep.flight import Boarding, Flown, boarding, fly
 from gcs.sweep.plan import Case, PlanError, SweepPlan
 from gcs.sweep.store import Row, row_of
@@ -48,7 +42,7 @@ def prepare(plan: SweepPlan) -> Work:
 
 
 def fly_case(work: Work, case: Case, clock: Clock) -> Row:
-    """Fly one of the flights. What cannot be flown at all is an outcome, too: `refused`."""
+    """Fly one of the flights. One that cannot be flown at all has the outcome `refused`."""
     began_s = clock()
     try:
         flown = fly(work.mission, work.plan.conditions(case), work.boardings[case.law])
@@ -67,16 +61,3 @@ def batches(cases: Sequence[Case], size: int) -> list[tuple[Case, ...]]:
             group = []
         group.append(case)
     return [*groups, tuple(group)] if group else groups
-
-
-def fingerprint(plan: SweepPlan) -> str:
-    """A hash of all that decides what happens in the flights, but for the plan."""
-    digest = hashlib.sha256(code_fingerprint().encode())
-    spec = find_spec("gcs.sweep")
-    for place in (spec.submodule_search_locations or ()) if spec else ():
-        for path in sorted(Path(place).glob("*.py")):
-            source = path.read_bytes()
-            if b"@kernel" in source or path.stem == "flight":
-                digest.update(source)
-    digest.update(repr(encode_mission(load_mission(plan.mission), Home())).encode())
-    return digest.hexdigest()[:16]

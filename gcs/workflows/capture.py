@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 
 from autopilot.wire.tlog import TlogWriter
@@ -13,10 +14,15 @@ from gcs.shell.display import say
 from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, monotonic_us, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
+from gcs.workflows.report import TLOG_FILE
 
 
-def capture_to(path: Path, address: Address, duration_s: float | None) -> int:
-    """Write what is said until `duration_s` is over or somebody asks to stop; returns how many messages."""
+def capture_to(out: Path | None, address: Address, duration_s: float | None) -> tuple[Path, int]:
+    """Record telemetry until `duration_s` is over or somebody asks to stop; the log and its messages' number.
+
+    Without `out` the log goes to flights/capture-TIME/flight.tlog.
+    """
+    path = out or Path("flights") / f"capture-{datetime.now():%Y%m%d-%H%M%S}" / TLOG_FILE
     with Session(address) as session, StopRequest("stopping") as stop:
         if not session.listen_to_truth():
             say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the log will have no truth of the simulator")
@@ -49,4 +55,4 @@ def capture_to(path: Path, address: Address, duration_s: float | None) -> int:
                     say(str(error))
             session.watch(lambda: bool(stop), duration_s, "capturing")
             capture.flush(monotonic_us())
-        return capture.records
+        return path, capture.records

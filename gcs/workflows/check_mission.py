@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.wire.convert import Home
@@ -29,6 +30,30 @@ def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Viol
 def path_reports(mission: Mission, vehicle: str) -> list[PathReport]:
     """How the vehicle flies it, its paths shaped by the autopilot."""
     return paths(mission, load_limits(vehicle))
+
+
+@dataclass(frozen=True)
+class Check:
+    """What `gcs check` found: what the vehicle cannot do, or else how it flies each path."""
+
+    mission: str
+    vehicle: str
+    violations: tuple[Violation, ...]
+    paths: tuple[PathReport, ...]
+
+    def lines(self) -> tuple[str, ...]:
+        """For people."""
+        if self.violations:
+            return tuple(map(str, self.violations))
+        return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths))
+
+
+def check_mission(name_or_path: str, vehicle: str, as_asked: bool) -> Check:
+    """Check a mission against a vehicle; `as_asked`: without shaping, and without a report of its paths."""
+    mission = load(name_or_path)
+    found = violations(mission, vehicle, not as_asked)
+    reports = [] if found or as_asked else path_reports(mission, vehicle)
+    return Check(mission.name, vehicle, tuple(found), tuple(reports))
 
 
 def load_checked(name_or_path: str, vehicle: str, force: bool, shaped: bool = True) -> Mission:

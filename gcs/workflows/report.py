@@ -8,6 +8,8 @@ from gcs.analysis.record import FlightMeta, Record
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
 
+TLOG_FILE = "flight.tlog"  # in a directory of gcs fly or gcs capture
+
 
 def make_report(tlog: Path, out: Path, meta: FlightMeta | None, quiet: bool) -> Record:
     """Make it in `out`; without `meta`, what stands in meta.json beside the log is taken."""
@@ -20,6 +22,15 @@ def make_report(tlog: Path, out: Path, meta: FlightMeta | None, quiet: bool) -> 
             raise GcsError(str(error)) from None
         except OSError as error:
             raise GcsError(f"{error.filename or out}: {error.strerror}") from None
+
+
+def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, Path]:
+    """The report of a log, or of the directory that holds it, made again; the record and its directory."""
+    tlog = source / TLOG_FILE if source.is_dir() else source
+    if not tlog.is_file():
+        raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
+    folder = out or (tlog.parent if tlog.name == TLOG_FILE else tlog.with_suffix(""))
+    return make_report(tlog, folder, None, quiet), folder
 
 
 def print_record(record: Record) -> None:

@@ -102,8 +102,10 @@ SHELLS = (
     "gcs.commands",
     "gcs.shell",
     "gcs.workflows",
-    "gcs.sweep.pool",
-    "gcs.sweep.progress",
+    "gcs.batch.pool",
+    "gcs.batch.programs",
+    "gcs.batch.progress",
+    "gcs.batch.runner",
     "autopilot.wire.dialect.plumbline",  # generated
     "autopilot.wire.dialect.generate",
 )

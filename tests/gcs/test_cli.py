@@ -18,11 +18,11 @@ from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
-from gcs.commands import status as status_module
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
 from gcs.shell.link import UdpSocket, free_port
+from gcs.workflows import status as status_module
 from missions.model import Land, Signals, Sine, Takeoff, Term
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from autopilot.supervisor.flight import Phase
-from autopilot.wire.mission_items import encode_steps
 
 from autopilot.trajectory.prepare import PENDING
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import encode_steps
 from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Status, Target
 from missions.model import Delay, Land, Signals, Takeoff, Term

@@ -7,14 +7,26 @@ from importlib.metadata import version
 
 import pytest
 
+from gcs.batch import reuse
+from gcs.batch.programs import ProgramCrew
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_NOT_MET, GcsError
-from gcs.experiments.flights import Interrupted, fly_missing
+from gcs.experiments import run
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, experiments
-from gcs.experiments.reuse import code_fingerprint, is_flown
+from gcs.experiments.store import begin, experiment_origin, is_flown
 
 CODE = "0123456789abcdef"
 CORES = (0, 3)
 A = Experiment("case-a", "thesis", "thesis")
+
+
+@pytest.fixture(autouse=True)
+def _code_of_the_test(monkeypatch):
+    written_by(monkeypatch, CODE)
+
+
+def written_by(monkeypatch, code):
+    """The flights of now are flown by other code."""
+    monkeypatch.setattr(reuse, "_code", lambda entries: code)
 
 
 class Sky:
@@ -26,8 +38,10 @@ class Sky:
         self.in_the_air = {}
         self.moments, self.exit_code, self.outcome = moments, exit_code, outcome
         self.paused = 0
+        self.terminated = []
 
     def start(self, experiment, directory, core):
+        begin(directory)
         assert core not in self.in_the_air, "two flights on one core"
         self.begun.append(experiment)
         flight = Flight(self, experiment, directory, core)
@@ -44,7 +58,7 @@ class Sky:
 class Flight:
     def __init__(self, sky, experiment, directory, core):
         self.sky, self.experiment, self.directory, self.core = sky, experiment, directory, core
-        self.left = sky.moments
+        self.left, self.result = sky.moments, sky.exit_code
         self.exit_code = None
 
     @property
@@ -57,13 +71,20 @@ class Flight:
             return
         del self.sky.in_the_air[self.core]
         leave(self.directory, self.experiment, self.sky.outcome)
-        self.exit_code = self.sky.exit_code
+        self.exit_code = self.result
 
     def last_line(self):
         return f"moment {self.left}"
 
     def obituary(self):
         return "gcs ended with exit code 1: no room"
+
+    def terminate(self):
+        self.sky.terminated.append(self.experiment)
+
+    def finish(self):
+        assert self.experiment in self.sky.terminated, "asked to end before it is waited for"
+        self.sky.in_the_air.pop(self.core, None)
 
 
 def leave(directory, experiment, outcome="completed", **changes):
@@ -82,9 +103,15 @@ def leave(directory, experiment, outcome="completed", **changes):
     (directory / "flight.tlog").write_bytes(b"")
 
 
-def fly(sky, directory, plan=None, code=CODE, fresh=False, stop=lambda: False, tell=lambda status: None):
-    plan = experiments() if plan is None else plan
-    return fly_missing(plan, directory, CORES, code, sky.start, tell, sky.pause, stop, fresh)
+def fly(sky, directory, plan=None, fresh=False, stop=lambda: False, tell=lambda ended, running: None):
+    """How many were to be flown, and whether all were."""
+    waiting = run.missing(experiments() if plan is None else plan, directory, fresh)
+    crew = ProgramCrew(CORES, lambda e, core: sky.start(e, directory / e.name, core), sky.pause)
+    return len(waiting), run.fly_missing(waiting, directory, crew, tell, stop)
+
+
+def is_stored(directory, experiment):
+    return is_flown(directory / experiment.name, experiment_origin(experiment))
 
 
 def test_the_plan_is_every_case_law_and_vehicle_once():
@@ -94,24 +121,27 @@ def test_the_plan_is_every_case_law_and_vehicle_once():
 
 def test_all_are_flown_one_on_each_core_and_none_again(tmp_path):
     sky, seen = Sky(), []
-    assert fly(sky, tmp_path, tell=seen.append) == 16
+    assert fly(sky, tmp_path, tell=lambda ended, running: seen.append((ended, running))) == (16, True)
     assert sorted(sky.begun) == sorted(experiments())
     assert sky.most == len(CORES)
-    assert (seen[0].done, len(seen[0].flying)) == (0, 2)
-    assert (seen[-1].done, seen[-1].total, seen[-1].flying) == (16, 16, ())
+    titles = [title for title, _ in seen[0][1]]
+    assert titles == [experiment.title for experiment in experiments()[:2]]
+    assert sorted(experiment for ended, _ in seen for experiment, _ in ended) == sorted(experiments())
+    assert seen[-1][1] == ()
     again = Sky()
-    assert fly(again, tmp_path) == 0
+    assert fly(again, tmp_path) == (0, True)
     assert again.begun == []
 
 
 def test_fresh_flies_all_anew(tmp_path):
     fly(Sky(), tmp_path)
-    assert fly(Sky(), tmp_path, fresh=True) == 16
+    assert fly(Sky(), tmp_path, fresh=True) == (16, True)
 
 
-def test_other_code_flies_anew(tmp_path):
+def test_other_code_flies_anew(tmp_path, monkeypatch):
     fly(Sky(), tmp_path)
-    assert fly(Sky(), tmp_path, code="other") == 16
+    written_by(monkeypatch, "other")
+    assert fly(Sky(), tmp_path) == (16, True)
 
 
 @pytest.mark.parametrize(
@@ -121,9 +151,9 @@ def test_other_code_flies_anew(tmp_path):
 )
 def test_a_flight_of_other_settings_is_not_this_one(tmp_path, changes):
     fly(Sky(), tmp_path, [A])
-    assert is_flown(tmp_path / A.name, A, CODE)
+    assert is_stored(tmp_path, A)
     leave(tmp_path / A.name, A, **changes)
-    assert not is_flown(tmp_path / A.name, A, CODE)
+    assert not is_stored(tmp_path, A)
 
 
 @pytest.mark.parametrize("file", ["meta.json", "flight.tlog", "flown.json"])
@@ -131,7 +161,7 @@ def test_a_directory_that_lacks_a_file_is_flown_again(tmp_path, file):
     fly(Sky(), tmp_path)
     (tmp_path / A.name / file).unlink()
     sky = Sky()
-    assert fly(sky, tmp_path) == 1
+    assert fly(sky, tmp_path) == (1, True)
     assert sky.begun == [A]
 
 
@@ -139,14 +169,14 @@ def test_a_directory_that_lacks_a_file_is_flown_again(tmp_path, file):
 def test_a_broken_mark_is_no_mark(tmp_path, text):
     fly(Sky(), tmp_path, [A])
     (tmp_path / A.name / "flown.json").write_text(text)
-    assert not is_flown(tmp_path / A.name, A, CODE)
+    assert not is_stored(tmp_path, A)
 
 
 def test_a_lost_flight_is_a_result_an_interrupted_one_is_not(tmp_path):
     fly(Sky(exit_code=EXIT_NOT_MET, outcome="diverged"), tmp_path, [A])
-    assert is_flown(tmp_path / A.name, A, CODE)
+    assert is_stored(tmp_path, A)
     leave(tmp_path / A.name, A, "interrupted")
-    assert not is_flown(tmp_path / A.name, A, CODE)
+    assert not is_stored(tmp_path, A)
 
 
 def test_a_flight_that_fails_ends_it_in_one_line(tmp_path):
@@ -154,25 +184,34 @@ def test_a_flight_that_fails_ends_it_in_one_line(tmp_path):
         fly(Sky(exit_code=EXIT_ERROR), tmp_path)
 
 
+def test_flights_that_ended_well_beside_a_failure_are_kept(tmp_path):
+    sky = Sky(moments=1)
+    good, bad = experiments()[:2]
+
+    def start(experiment, directory, core):
+        flight = Sky.start(sky, experiment, directory, core)
+        flight.result = EXIT_ERROR if experiment == bad else EXIT_DONE
+        return flight
+
+    sky.start = start
+    with pytest.raises(GcsError, match="no room"):
+        fly(sky, tmp_path)
+    assert is_stored(tmp_path, good) and not is_stored(tmp_path, bad)
+
+
 def test_interrupted_it_keeps_what_is_flown_and_goes_on_from_there(tmp_path):
     sky = Sky()
-    with pytest.raises(Interrupted):
-        fly(sky, tmp_path, stop=lambda: sky.paused == 7)
-    kept = [e for e in experiments() if is_flown(tmp_path / e.name, e, CODE)]
+    assert fly(sky, tmp_path, stop=lambda: sky.paused == 7) == (16, False)
+    kept = [e for e in experiments() if is_stored(tmp_path, e)]
     assert len(kept) == 4
+    assert len(sky.terminated) == 2 and not set(sky.terminated) & set(kept)
     rest = Sky()
-    assert fly(rest, tmp_path) == 12
+    assert fly(rest, tmp_path) == (12, True)
     assert not set(rest.begun) & set(kept)
 
 
 def test_a_flight_begun_anew_does_not_count_by_its_old_mark(tmp_path):
     fly(Sky(), tmp_path, [A])
     sky = Sky()
-    with pytest.raises(Interrupted):
-        fly(sky, tmp_path, [A], fresh=True, stop=lambda: sky.paused == 1)
-    assert not is_flown(tmp_path / A.name, A, CODE)
-
-
-def test_the_fingerprint_is_that_of_the_sources():
-    assert code_fingerprint() == code_fingerprint()
-    assert len(code_fingerprint()) == 16
+    assert fly(sky, tmp_path, [A], fresh=True, stop=lambda: sky.paused == 1) == (1, False)
+    assert not is_stored(tmp_path, A)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from gcs.batch.reuse import Origin
 from gcs.sweep.plan import (
     PlanError,
     SweepPlan,
     Varied,
     from_json,
-    load_plan,
     make_plan,
     read_varied,
-    store_plan,
 )
+from gcs.sweep.plan_file import load_command, load_plan, store_plan, sweep_origin
 
 
 def test_ranges_and_lists() -> None:
@@ -103,14 +104,41 @@ def test_drawn_settings_fill_their_ranges_and_are_always_the_same(short: str) ->
     assert list(from_json(plan.to_json()).cases()) == cases
 
 
+def origin(plan: SweepPlan, version: str = "1", code: str = "code") -> Origin:
+    return Origin({"plan": plan.to_json(), "files": {}}, version, code)
+
+
 def test_a_directory_holds_one_plan(plan: SweepPlan, tmp_path: Path) -> None:
-    store_plan(tmp_path, plan, "gcs sweep", "1", "code")
-    store_plan(tmp_path, plan, "gcs sweep again", "1", "code")
+    store_plan(tmp_path, plan, "gcs sweep", origin(plan))
+    store_plan(tmp_path, plan, "gcs sweep again", origin(plan))
     assert load_plan(tmp_path) == plan
+    assert load_command(tmp_path) == ("gcs sweep", "1")
     other = SweepPlan(plan.mission, "bebop", "lab", ("lqr",), (1,), (), ())
     with pytest.raises(PlanError, match="another sweep"):
-        store_plan(tmp_path, other, "gcs sweep", "1", "code")
+        store_plan(tmp_path, other, "gcs sweep", origin(other))
     with pytest.raises(PlanError, match="other code"):
-        store_plan(tmp_path, plan, "gcs sweep", "1", "changed")
+        store_plan(tmp_path, plan, "gcs sweep", origin(plan, code="changed"))
+    with pytest.raises(PlanError, match="version differ"):
+        store_plan(tmp_path, plan, "gcs sweep", origin(plan, version="2"))
     with pytest.raises(PlanError, match="no sweep"):
         load_plan(tmp_path / "empty")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"plan": {}, "code": "x"}'])
+def test_a_plan_that_cannot_be_read_is_not_overwritten(plan: SweepPlan, tmp_path: Path, text: str) -> None:
+    (tmp_path / "plan.json").write_text(text, encoding="utf-8")
+    with pytest.raises(PlanError, match="--fresh"):
+        store_plan(tmp_path, plan, "gcs sweep", origin(plan))
+    with pytest.raises(PlanError, match="no sweep"):
+        load_plan(tmp_path)
+    assert (tmp_path / "plan.json").read_text(encoding="utf-8") == text
+
+
+def test_a_mission_file_that_changed_is_another_sweep(plan: SweepPlan, tmp_path: Path) -> None:
+    mission = tmp_path / "mission.toml"
+    mission.write_bytes(Path(plan.mission).read_bytes())
+    moved = replace(plan, mission=str(mission))
+    before = sweep_origin(moved)
+    assert sweep_origin(moved).differences(before.to_json()) == ()
+    mission.write_text(mission.read_text(encoding="utf-8").replace("0.4", "0.5"), encoding="utf-8")
+    assert sweep_origin(moved).differences(before.to_json()) == ("settings",)

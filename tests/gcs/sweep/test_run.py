@@ -12,9 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
+from gcs.batch import pool
 from gcs.cli import gcs
-from gcs.sweep import pool, run
-from gcs.sweep.plan import SweepPlan, load_plan
+from gcs.sweep import run
+from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan_file import load_plan
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, flights_of, reach
 from gcs.sweep.store import Store, columns
@@ -23,7 +25,7 @@ from tests.gcs.sweep.conftest import AtOnce
 
 def swept(plan: SweepPlan, directory: Path, stopped: object = False) -> run.Swept:
     workers = nullcontext((AtOnce(), 1))
-    return run.sweep(plan, directory, "gcs sweep", "1", workers, stopped, quiet=True, fresh=False)
+    return run.sweep(plan, directory, "gcs sweep", workers, lambda: bool(stopped), quiet=True, fresh=False)
 
 
 class AfterOne:
@@ -72,7 +74,7 @@ def test_a_sweep_that_was_stopped_goes_on(
     whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, complete, _ = whole
-    monkeypatch.setattr(pool, "BATCH", 1)
+    monkeypatch.setattr(run, "BATCH", 1)
     first = swept(plan, tmp_path, AfterOne())
     assert not first.whole and 0 < first.flights < 6
     rest = swept(plan, tmp_path)
@@ -166,6 +168,6 @@ def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept],
         ):
             yield workers
 
-    done = run.sweep(plan, tmp_path, "gcs sweep", "1", cluster(), False, quiet=True, fresh=False)
+    done = run.sweep(plan, tmp_path, "gcs sweep", cluster(), lambda: False, quiet=True, fresh=False)
     assert done.whole and done.flown == 6
     assert without_clock(tmp_path) == without_clock(complete)

@@ -1,0 +1,1 @@
+"""Many flights: which must be flown, who flies them, and what a person sees meanwhile."""

@@ -1,0 +1,86 @@
+"""Which files decide what happens in a flight: everything that the modules that fly import, and its data.
+
+The set follows from the imports, read from the source without running it, so that a new module is part of it
+as soon as it is used. Imports inside functions count. A module that is loaded by a computed name is not seen:
+name it among the entry points.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+PACKAGES = ("autopilot", "gcs", "missions", "sitl")  # of this project; other libraries are not followed
+ROOT = Path(__file__).resolve().parents[2]
+
+_NO_DATA = (".py", ".pyc", ".html")  # code is found by its imports; pages are templates of reports
+
+
+def fingerprint(entries: Iterable[str], root: Path = ROOT) -> str:
+    """16 hexadecimal digits over the names and contents of all files in the closure of the modules `entries`.
+
+    `root` is the directory that holds the project's packages.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(closure(entries, root)):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0")
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+def closure(entries: Iterable[str], root: Path = ROOT) -> set[Path]:
+    """Source files of the modules `entries` and of all that they import, and data files of their packages."""
+    ahead = list(entries)
+    for entry in ahead:
+        if _source(entry, root) is None:
+            raise ValueError(f"{entry} is no module below {root}; must be a module of {', '.join(PACKAGES)}")
+    seen: set[str] = set()
+    files: set[Path] = set()
+    while ahead:
+        module = ahead.pop()
+        path = _source(module, root)
+        if module in seen or path is None:
+            continue
+        seen.add(module)
+        files.add(path)
+        if path.name == "__init__.py":
+            files.update(_data(path.parent))
+        parent = module.rpartition(".")[0]  # runs before the module does
+        ahead += [*([parent] if parent else []), *_imports(path, module)]
+    return files
+
+
+def _source(module: str, root: Path) -> Path | None:
+    """The file of a module of this project, or None if there is no such module."""
+    parts = module.split(".")
+    if parts[0] not in PACKAGES:
+        return None
+    base = root.joinpath(*parts)
+    candidates = (base / "__init__.py", base.with_name(base.name + ".py"))
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _data(package: Path) -> Iterator[Path]:
+    """What lies beside the code of a package, without its subdirectories."""
+    return (
+        path
+        for path in package.iterdir()
+        if path.is_file() and path.suffix not in _NO_DATA and not path.name.startswith(".")
+    )
+
+
+def _imports(path: Path, module: str) -> Iterator[str]:
+    """Every dotted name that the file imports; `from a import b` gives a and a.b, which may be a module."""
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_bytes(), str(path))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                above = package.split(".")
+                base = ".".join([*above[: len(above) - node.level + 1], *([base] if base else [])])
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)

@@ -1,0 +1,123 @@
+"""Flights as calls of a function: by a pool of processes on all cores, or by a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from typing import Any, Generic, TypeVar
+
+from gcs.batch.runner import Running
+from gcs.errors import GcsError
+
+F = TypeVar("F")
+R = TypeVar("R")
+
+Clock = Callable[[], float]  # seconds
+FlyOne = Callable[[F, Clock], R]  # must be picklable
+
+_AHEAD = 2  # groups waiting for each worker
+_POLL_S = 0.2
+
+
+def fly_group(fly: FlyOne[F, R], group: tuple[F, ...]) -> list[R]:
+    """Fly some flights, one after the other; what a worker runs."""
+    return [fly(flight, time.monotonic) for flight in group]
+
+
+class PoolCrew(Generic[F, R]):
+    """A crew of the `workers` of an executor, each of which calls `fly` for its flights."""
+
+    def __init__(self, executor: Executor, workers: int, fly: FlyOne[F, R]) -> None:
+        self._executor, self._workers, self._fly = executor, workers, fly
+        self._futures: set[Future[list[R]]] = set()
+
+    @property
+    def has_room(self) -> bool:
+        return len(self._futures) < self._workers * _AHEAD
+
+    @property
+    def is_idle(self) -> bool:
+        return not self._futures
+
+    def start(self, group: tuple[F, ...]) -> None:
+        with _killed_is_an_error():
+            self._futures.add(self._executor.submit(fly_group, self._fly, group))
+
+    def collect(self) -> Sequence[R]:
+        done, self._futures = wait(self._futures, _POLL_S, FIRST_COMPLETED)
+        with _killed_is_an_error():
+            return [result for future in done for result in future.result()]
+
+    def running(self) -> Running:
+        return ()
+
+    def recall(self) -> Sequence[R]:
+        """Wait for what is being flown, a second or two; a second Ctrl-C does not wait."""
+        for future in self._futures:
+            future.cancel()
+        ended, _ = wait([future for future in self._futures if not future.cancelled()])
+        self._futures = set()
+        return [result for future in ended if future.exception() is None for result in future.result()]
+
+
+@contextmanager
+def own_processes(jobs: int) -> Iterator[tuple[Executor, int]]:
+    """`jobs` processes of our own."""
+    executor = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_begin_worker)
+    try:
+        yield executor, jobs
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def dask_cluster(address: str) -> Iterator[tuple[Executor, int]]:
+    """The workers of a running Dask scheduler, which must have this version of Plumbline."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise GcsError("--scheduler needs Dask; install it with: pip install 'plumbline[dask]'") from None
+    try:
+        client = Client(address, timeout="10s", set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise GcsError(
+            f"--scheduler {address}: no Dask scheduler answers: {str(error) or 'timed out'}"
+        ) from None
+    try:
+        workers = sum(client.nthreads().values())
+        if workers == 0:
+            raise GcsError(f"--scheduler {address}: the Dask scheduler has no workers; start dask worker")
+        yield client.get_executor(pure=False), workers
+    finally:
+        client.close()
+
+
+@contextmanager
+def _killed_is_an_error() -> Iterator[None]:
+    try:
+        yield
+    except BrokenProcessPool:
+        raise GcsError(
+            "a worker process was killed; completed flights are stored, run the same command again to"
+            " continue"
+        ) from None
+
+
+def _begin_worker() -> None:
+    """Ctrl-C is handled by the parent; a worker whose parent has gone ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    parent.join()
+    os._exit(1)

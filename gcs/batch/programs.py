@@ -1,0 +1,110 @@
+"""Flights as programs: each a process of its own, kept on one core with everything that it starts."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from typing import Generic, Protocol, TypeVar
+
+from gcs.batch.runner import Running
+from gcs.errors import EXIT_DONE, EXIT_NOT_MET, GcsError
+from gcs.shell.processes import Child
+
+_POLL_S = 0.2
+
+
+class Titled(Protocol):
+    """A flight with a name for people."""
+
+    @property
+    def title(self) -> str: ...
+
+
+class Program(Protocol):
+    """A program that has been started; `gcs.shell.processes.Child`."""
+
+    exit_code: int | None
+
+    @property
+    def running(self) -> bool: ...
+    def last_line(self) -> str: ...
+    def obituary(self) -> str: ...
+    def terminate(self) -> None: ...
+    def finish(self) -> None: ...
+
+
+F = TypeVar("F", bound=Titled)
+
+
+def cores(most: int | None = None) -> tuple[int, ...]:
+    """The cores that this process may use, at most `most` of them."""
+    if hasattr(os, "sched_getaffinity"):
+        found = tuple(sorted(os.sched_getaffinity(0)))
+    else:
+        found = tuple(range(os.cpu_count() or 1))
+    return found[:most]
+
+
+def keep_on_core(child: Child, core: int) -> Child:
+    """Keep a process and all that it starts on one core, where the system has a call for it."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(child.pid, {core})
+    return child
+
+
+class ProgramCrew(Generic[F]):
+    """A crew that runs one program on each of `cores`; a result is a flight and whether it met its criteria.
+
+    `start` starts the program of a flight on a core. Its exit code must be 0 (met) or 3 (not met).
+    """
+
+    def __init__(
+        self,
+        cores: Sequence[int],
+        start: Callable[[F, int], Program],
+        pause: Callable[[], None] = lambda: time.sleep(_POLL_S),
+    ) -> None:
+        self._cores, self._start, self._pause = tuple(cores), start, pause
+        self._programs: dict[int, tuple[F, Program]] = {}  # by core
+        self._failure = ""
+
+    @property
+    def has_room(self) -> bool:
+        return len(self._programs) < len(self._cores)
+
+    @property
+    def is_idle(self) -> bool:
+        return not self._programs and not self._failure
+
+    def start(self, group: tuple[F, ...]) -> None:
+        (flight,) = group
+        core = next(core for core in self._cores if core not in self._programs)
+        self._programs[core] = (flight, self._start(flight, core))
+
+    def collect(self) -> Sequence[tuple[F, bool]]:
+        if self._failure:
+            raise GcsError(self._failure)
+        self._pause()
+        ended: list[tuple[F, bool]] = []
+        for core, (flight, program) in list(self._programs.items()):
+            if program.running:
+                continue
+            del self._programs[core]
+            if program.exit_code in (EXIT_DONE, EXIT_NOT_MET):
+                ended.append((flight, program.exit_code == EXIT_DONE))
+            else:  # the first is raised by the next call, so that those which ended well are stored
+                self._failure = self._failure or f"{flight.title}: {program.obituary()}"
+        return ended
+
+    def running(self) -> Running:
+        return tuple((flight.title, program.last_line()) for flight, program in self._programs.values())
+
+    def recall(self) -> Sequence[tuple[F, bool]]:
+        """End all programs, and what they have started; a flight that was cut short is no result."""
+        for _, program in self._programs.values():
+            program.terminate()
+        for _, program in self._programs.values():
+            program.finish()
+        self._programs = {}
+        return ()

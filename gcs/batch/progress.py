@@ -1,0 +1,77 @@
+"""Progress of a batch: how many flights are flown, how fast, how long it still takes, and which run."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from gcs.batch.runner import Running
+from gcs.shell.display import LiveBars, Row
+
+if TYPE_CHECKING:
+    from rich.progress import ProgressColumn
+
+
+class BatchDisplay(LiveBars):
+    """A bar for all flights, and a line for each that runs and says where it is."""
+
+    def __init__(self, stored: int, total: int, quiet: bool) -> None:
+        """`stored` flights of `total` are reused from an earlier run."""
+        super().__init__(quiet)
+        self._stored, self._total = stored, total
+        self._began_s = time.monotonic()
+        self.flown = 0  # in this run
+        self.completed = 0  # of them
+        self._told = -1  # flown at the last plain line
+
+    @property
+    def elapsed_s(self) -> float:
+        """Wall time since the display was made."""
+        return time.monotonic() - self._began_s
+
+    def add(self, flown: int, completed: int, running: Running = ()) -> None:
+        """So many more flights are flown, so many of them completed; `running` run now."""
+        self.flown += flown
+        self.completed += completed
+        last = flown > 0 and self._stored + self.flown == self._total
+        plain = (lambda: self._line(running)) if self.flown != self._told else None
+        self._show(lambda: self._rows(running), plain, at_once=last)
+
+    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+        from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
+
+        bar = BarColumn(bar_width=32)
+        return (bar, MofNCompleteColumn(), "{task.description}", TimeRemainingColumn())
+
+    def _rows(self, running: Running) -> dict[str, Row]:
+        rows: dict[str, Row] = {
+            "": {
+                "description": self._figures(),
+                "completed": self._stored + self.flown,
+                "total": self._total,
+            }
+        }
+        for title, line in running:
+            said = line.removeprefix("gcs:").strip()
+            rows[title] = {"description": f"{title}: {said or 'starting'}", "total": None}
+        return rows
+
+    def _figures(self) -> str:
+        if not self.flown:
+            return "flights"
+        pace = self.flown / max(self.elapsed_s, 1e-3)
+        return f"flights, {100.0 * self.completed / self.flown:.0f} % completed, {_pace(pace)}"
+
+    def _line(self, running: Running) -> str:
+        self._told = self.flown
+        left = self._total - self._stored - self.flown
+        minutes = left * self.elapsed_s / max(self.flown, 1) / 60.0
+        remaining = f", {minutes:.1f} min remaining" if left and self.flown else ""
+        titles = f"; running: {'; '.join(title for title, _ in running)}" if running else ""
+        return f"{self._stored + self.flown} of {self._total} {self._figures()}{remaining}{titles}"
+
+
+def _pace(flights_per_s: float) -> str:
+    if flights_per_s >= 1.0:
+        return f"{flights_per_s:.1f} flights/s"
+    return f"{60.0 * flights_per_s:.1f} flights/min"

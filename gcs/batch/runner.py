@@ -1,0 +1,104 @@
+"""The loop in which many flights are flown: start, collect, store, report progress, stop without loss.
+
+Who flies is a crew: `gcs.batch.pool` (processes of our own, or a Dask cluster) or `gcs.batch.programs` (a
+program for each flight). The loop runs in the calling thread, and results are stored by it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Generic, Protocol, TypeVar
+
+F = TypeVar("F")
+R = TypeVar("R")
+F_contra = TypeVar("F_contra", contravariant=True)
+R_co = TypeVar("R_co", covariant=True)
+
+Running = tuple[tuple[str, str], ...]  # of each flight that runs: its title, the last line that it wrote
+_MOST_KEPT = 1000  # results held in memory
+
+
+class Crew(Protocol[F_contra, R_co]):
+    """Who flies. Flights are handed over in groups."""
+
+    @property
+    def has_room(self) -> bool:
+        """Whether another group may be started."""
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing runs."""
+
+    def start(self, group: tuple[F_contra, ...]) -> None:
+        """Start a group of flights."""
+
+    def collect(self) -> Sequence[R_co]:
+        """Wait a moment; return the results of what has ended. GcsError if a flight could not be flown."""
+
+    def running(self) -> Running:
+        """What runs now, as far as it is known here."""
+
+    def recall(self) -> Sequence[R_co]:
+        """Start nothing more and end what runs; return the results that are whole."""
+
+
+class _Buffer(Generic[R]):
+    """Results on their way to the store, which is called at most every `keep_s` seconds."""
+
+    def __init__(self, store: Callable[[Sequence[R]], None], keep_s: float) -> None:
+        self._store, self._keep_s = store, keep_s
+        self._kept: list[R] = []
+        self._stored_s = time.monotonic()
+
+    def add(self, results: Sequence[R]) -> None:
+        """Keep results, and store all that is kept if it is time."""
+        self._kept += results
+        if len(self._kept) >= _MOST_KEPT or time.monotonic() - self._stored_s >= self._keep_s:
+            self.flush()
+
+    def flush(self) -> None:
+        """Store all that is kept."""
+        kept, self._kept, self._stored_s = self._kept, [], time.monotonic()
+        if kept:
+            self._store(kept)
+
+
+def fly_all(
+    groups: Iterable[tuple[F, ...]],
+    crew: Crew[F, R],
+    store: Callable[[Sequence[R]], None],
+    tell: Callable[[Sequence[R], Running], None],
+    stopped: Callable[[], bool],
+    keep_s: float = 0.0,
+) -> bool:
+    """Fly all groups of flights; False if it was stopped before the end.
+
+    `store` is given every result once, at most every `keep_s` seconds, also when the loop ends by a request
+    to stop or by an exception. `tell` is given the results since the last call and what runs now; it is
+    called several times a second.
+    """
+    waiting = iter(groups)
+    exhausted = False
+    buffer = _Buffer(store, keep_s)
+    try:
+        while not stopped():
+            while not exhausted and crew.has_room:
+                group = next(waiting, None)
+                if group is None:
+                    exhausted = True
+                else:
+                    crew.start(group)
+            tell((), crew.running())
+            if crew.is_idle:
+                return True
+            results = crew.collect()
+            buffer.add(results)
+            tell(results, crew.running())
+        return False
+    finally:
+        buffer.flush()  # before waiting for what still runs, which a second Ctrl-C abandons
+        results = crew.recall()
+        buffer.add(results)
+        buffer.flush()
+        tell(results, ())

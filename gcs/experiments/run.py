@@ -1,0 +1,46 @@
+"""The flights of the experiments: each a `gcs fly`, one on each core."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from gcs.batch.programs import keep_on_core
+from gcs.batch.runner import Crew, Running, fly_all
+from gcs.experiments import store
+from gcs.experiments.plan import SEED, SENSORS, Experiment
+from gcs.shell.processes import Child
+
+LOG_FILE = "gcs.log"
+Ended = tuple[Experiment, bool]  # and whether the flight was completed
+
+
+def start(experiment: Experiment, directory: Path, core: int) -> Child:
+    """Start the flight of an experiment into `directory`; what it says goes to gcs.log there."""
+    store.begin(directory)
+    arguments = ["fly", experiment.case, "--law", experiment.law, "--vehicle", experiment.vehicle]
+    arguments += ["--sensors", SENSORS, "--seed", str(SEED), "--lockstep", "--force", "--overwrite"]
+    child = Child("gcs", [*arguments, "--out", str(directory)], directory / LOG_FILE)
+    # it and its own children share one core while they are in lockstep: not the one of its neighbour
+    return keep_on_core(child, core)
+
+
+def missing(plan: Sequence[Experiment], directory: Path, fresh: bool) -> list[Experiment]:
+    """What must be flown into `directory`/NAME: all if `fresh`, else what is not stored there."""
+    return [e for e in plan if fresh or not store.is_flown(directory / e.name, store.experiment_origin(e))]
+
+
+def fly_missing(
+    waiting: Sequence[Experiment],
+    directory: Path,
+    crew: Crew[Experiment, Ended],
+    tell: Callable[[Sequence[Ended], Running], None],
+    stopped: Callable[[], bool],
+) -> bool:
+    """Fly what waits into `directory`/NAME; False if it was stopped before the end."""
+
+    def keep(ended: Sequence[Ended]) -> None:
+        for experiment, _ in ended:
+            store.finish(directory / experiment.name, store.experiment_origin(experiment))
+
+    return fly_all(((experiment,) for experiment in waiting), crew, keep, tell, stopped)

@@ -1,0 +1,89 @@
+"""Parameters of a running vehicle: read, written, and kept in files."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Sequence
+from pathlib import Path
+
+from autopilot.wire.parameter_table import ParameterError, parse_text
+from gcs.clients.operation import Target
+from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
+from gcs.errors import GcsError, RefusedError
+from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
+from gcs.shell.display import StepDisplay, say
+from gcs.shell.link import Address
+from gcs.shell.session import Session
+
+
+def list_parameters(pattern: str, address: Address) -> dict[str, float]:
+    """Values by name of those that match a shell pattern; GcsError if none does."""
+    with Session(address) as session:
+        values = _listed(session, session.find())
+    found = {n: v for n, v in values.items() if fnmatch.fnmatchcase(n, pattern.upper())}
+    if not found:
+        raise GcsError(f"none of the vehicle's {len(values)} parameters matches {pattern!r}")
+    return found
+
+
+def get_parameters(names: Sequence[str], address: Address) -> dict[str, float | None]:
+    """Values by name."""
+    found: dict[str, float | None] = {}
+    with Session(address) as session:
+        target = session.find()
+        for name in names:
+            operation = ParameterGet(target, name.upper())
+            session.run(operation, name)
+            found[name.upper()] = operation.value
+    return found
+
+
+def set_parameter(name: str, value: float, address: Address) -> str:
+    """Set one parameter and read it back; a line that says so."""
+    with Session(address) as session:
+        operation = ParameterSet(session.find(), name.upper(), value)
+        return session.run(operation, name).text
+
+
+def save_parameters(file: Path, address: Address) -> int:
+    """Write all parameters to a file, in the form that its ending says; their number."""
+    with Session(address) as session:
+        target = session.find()
+        values = _listed(session, target)
+    is_qgc = file.suffix.lower() == QGC_ENDING
+    text = qgc_of(values, target) if is_qgc else lines_of(values)
+    partial = file.with_name(file.name + ".part")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(file)
+    except OSError as error:
+        raise GcsError(f"{file}: cannot be written: {error.strerror}") from None
+    return len(values)
+
+
+def load_parameters(file: Path, address: Address) -> tuple[int, int]:
+    """Set all parameters of a file; how many were set, and how many it holds. Each refusal is told."""
+    try:
+        values = parse_text(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not a text file"
+        raise GcsError(f"{file}: cannot be read: {reason}") from None
+    except ParameterError as error:
+        raise GcsError(f"{file}: {error}") from None
+    refused = 0
+    with Session(address) as session, StepDisplay("parameters") as display:
+        target = session.find()
+        for done, (name, value) in enumerate(values.items()):
+            display.update(done, len(values))
+            try:
+                session.run(ParameterSet(target, name, value))
+            except RefusedError as error:
+                refused += 1
+                say(str(error))
+    return len(values) - refused, len(values)
+
+
+def _listed(session: Session, target: Target) -> dict[str, float]:
+    operation = ParameterList(target)
+    session.run(operation, "parameters")
+    return operation.values

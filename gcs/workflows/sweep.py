@@ -1,0 +1,89 @@
+"""`gcs sweep` from its arguments to table and report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gcs.batch.pool import dask_cluster, own_processes
+from gcs.batch.programs import cores
+from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
+from gcs.shell.stopping import StopRequest
+from gcs.sweep.plan import make_plan, read_varied
+from gcs.sweep.report import write_report
+from gcs.sweep.run import Swept, sweep
+from gcs.workflows.flight_options import setting_of
+
+STOPPING = "stopping; completed flights are stored, run the same command again to continue"
+
+
+@dataclass(frozen=True)
+class SweepOptions:
+    """Arguments and options of `gcs sweep`."""
+
+    mission: str
+    laws: Sequence[str]
+    sensors: str
+    vehicle: str
+    varied: Sequence[str]  # NAME=VALUES
+    settings: Sequence[str]  # NAME=VALUE
+    seeds: int
+    sample: int | None
+    jobs: int | None
+    scheduler: str | None
+    out: Path | None
+    fresh: bool
+    quiet: bool
+    command: str  # as it was typed
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What came of it."""
+
+    done: Swept
+    planned: int
+    directory: Path
+    page: Path
+
+    @property
+    def exit_code(self) -> int:
+        return EXIT_DONE if self.done.whole else EXIT_INTERRUPTED
+
+    @property
+    def record(self) -> dict[str, object]:
+        """As `gcs sweep --json` prints it."""
+        return {
+            "flights": self.done.flights,
+            "completed": self.done.completed,
+            "failed": self.done.flights - self.done.completed,
+            "planned": self.planned,
+            "flown": self.done.flown,
+            "wall_s": round(self.done.wall_s, 3),
+            "flights_per_s": round(self.done.flights_per_s, 2),
+            "out": str(self.directory),
+        }
+
+
+def run_sweep(options: SweepOptions) -> Sweep:
+    """Plan the sweep, fly what is missing of it, and write its report; PlanError if it cannot be flown."""
+    plan = make_plan(
+        options.mission,
+        options.vehicle,
+        options.sensors,
+        options.laws,
+        tuple(range(1, options.seeds + 1)),
+        [read_varied(text, options.sample is not None) for text in options.varied],
+        dict(setting_of(text) for text in options.settings),
+        options.sample or 0,
+    )
+    directory = options.out or Path("sweeps") / Path(options.mission).stem
+    scheduler = options.scheduler
+    workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
+    with StopRequest(STOPPING) as stop:
+        done = sweep(
+            plan, directory, options.command, workers, lambda: bool(stop), options.quiet, options.fresh
+        )
+        page = write_report(directory, plan)
+    return Sweep(done, plan.flights, directory, page)

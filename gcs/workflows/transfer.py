@@ -1,0 +1,92 @@
+"""Missions between files and a running vehicle, with fence and rally points where the file has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem, encode_mission
+from gcs.clients.missions import MissionDownload, MissionUpload
+from gcs.errors import GcsError
+from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
+from gcs.shell.display import say
+from gcs.shell.link import Address
+from gcs.shell.session import Session
+from gcs.workflows.check_mission import check_items, load_checked
+from gcs.workflows.running_flight import vehicle_home
+
+_MISSION = mavlink.MAV_MISSION_TYPE_MISSION
+_FENCE = mavlink.MAV_MISSION_TYPE_FENCE
+_RALLY = mavlink.MAV_MISSION_TYPE_RALLY
+
+
+Tell = Callable[[str], None]
+
+
+def upload(mission: str, vehicle: str, force: bool, skip: bool, address: Address, tell: Tell) -> None:
+    """Check a mission by name or path against `vehicle` and upload it; `tell` gets a line for each list."""
+    if is_foreign(Path(mission)):
+        _upload_foreign(Path(mission), vehicle, force, skip, address, tell)
+        return
+    loaded = load_checked(mission, vehicle, force)
+    with Session(address) as session:
+        target = session.find()
+        items = encode_mission(loaded, vehicle_home(session))
+        tell(session.run(MissionUpload(target, items), "upload").text)
+
+
+def _upload_foreign(path: Path, vehicle: str, force: bool, skip: bool, address: Address, tell: Tell) -> None:
+    plan = read_foreign(path)
+    with Session(address) as session:
+        target = session.find()
+        items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
+        if not force:
+            check_items(path.name, items, home, vehicle)
+        # the fence first: the vehicle judges the mission by it
+        for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
+            if area is not None:
+                text = session.run(MissionUpload(target, area, kind)).text
+                if area:
+                    tell(text)
+        tell(session.run(MissionUpload(target, items), "upload").text)
+
+
+def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
+    """The items to upload; what is not done is told, and what is left out is an error unless it may be."""
+    for line in (*judged.kept, *judged.left_out):
+        say(f"{path}: {line}")
+    if judged.left_out and not skip:
+        count = len(judged.left_out)
+        raise GcsError(
+            f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip goes on"
+        )
+    if not judged.items:
+        raise GcsError(f"{path}: nothing that can be flown; gcs clear takes the mission off the vehicle")
+    return judged.items
+
+
+def download(address: Address) -> list[WireItem]:
+    """The items of the vehicle's mission."""
+    with Session(address) as session:
+        session.find()
+        return _fetched(session, _MISSION)
+
+
+def download_to(file: Path, address: Address) -> Sequence[WireItem]:
+    """The vehicle's mission, written to a .plan, with fence and rally points, or a .waypoints file."""
+    with Session(address) as session:
+        session.find()
+        items = _fetched(session, _MISSION)
+        has_areas = file.suffix.lower() == PLAN_ENDING
+        fence = _fetched(session, _FENCE) if has_areas else []
+        rally = _fetched(session, _RALLY) if has_areas else []
+        home = vehicle_home(session)
+    write_foreign(file, items, home, fence, rally)
+    return items
+
+
+def _fetched(session: Session, kind: int) -> list[WireItem]:
+    operation = MissionDownload(session.target, kind)
+    session.run(operation, "download")
+    return operation.items
