@@ -87,7 +87,7 @@ class HilSimulator:
         self._file_truth = truth
         self._profile = profile
         self._seed = seed
-        self._parameters = ParameterServer(table)
+        self.parameters = ParameterServer(table)
         self._home = home
         self._lockstep = lockstep
         self._truth_every = truth_every
@@ -101,13 +101,13 @@ class HilSimulator:
 
     def _begin(self) -> None:
         """The world at time 0, with the parameters in force."""
-        table = self._parameters.table
+        table = self.parameters.table
         settings = settings_of(table)
         core = SimCore(apply_parameters(self._file_truth, table), self._profile, settings, self._seed)
         self.missed = 0  # ticks without an answer in time
         self.rejected = 0  # controls that were not numbers
         self.answered = False  # the present tick was
-        self._core = core
+        self.core = core
         self._stated = stated_of(self._profile, settings.noise_scale)
         self._command: Rotors = STOPPED
         self._gripper_open = False
@@ -149,17 +149,17 @@ class HilSimulator:
     @property
     def now_us(self) -> int:
         """Simulated time of the present tick."""
-        return self._core.now_us
+        return self.core.now_us
 
     @property
     def tick_us(self) -> int:
         """Time from tick to tick."""
-        return self._core.settings.tick_us
+        return self.core.settings.tick_us
 
     @property
     def diverged(self) -> bool:
         """The plant left the domain of its model and stands still."""
-        return self._core.state.diverged > 0.0
+        return self.core.state.diverged > 0.0
 
     def sensor_datagram(self) -> bytes:
         """What the sensors give at this tick, HIL_SENSOR last; the same bytes until `advance`."""
@@ -195,8 +195,8 @@ class HilSimulator:
                 aside.append(one.message)
                 continue
             answer = convert.read_hil_actuator_controls(one.message)
-            current = answer.time_us == self._core.now_us
-            if not current and (self._lockstep or not self._command_us < answer.time_us < self._core.now_us):
+            current = answer.time_us == self.core.now_us
+            if not current and (self._lockstep or not self._command_us < answer.time_us < self.core.now_us):
                 continue
             if current and self.answered:
                 continue
@@ -212,19 +212,19 @@ class HilSimulator:
             for message in aside:
                 if _asks_reboot(message):
                     self._reboot = True
-                if self._parameters.receive(message):
+                if self.parameters.receive(message):
                     self._retune()
         return self.answered
 
     def _retune(self) -> None:
         """A parameter has changed."""
-        table = self._parameters.table
+        table = self.parameters.table
         if table["SIM_GUST_NOW"] > 0.0:
             # the truth of this tick may be told already
-            self._parameters.tell("SIM_GUST_AT_S", (self._core.now_us + self.tick_us) / SECOND_US)
-            self._parameters.tell("SIM_GUST_NOW", 0.0)
+            self.parameters.tell("SIM_GUST_AT_S", (self.core.now_us + self.tick_us) / SECOND_US)
+            self.parameters.tell("SIM_GUST_NOW", 0.0)
         settings = settings_of(table)
-        self._core.retune(apply_parameters(self._file_truth, table), settings)
+        self.core.retune(apply_parameters(self._file_truth, table), settings)
         self._stated = stated_of(self._profile, settings.noise_scale)
 
     def advance(self) -> None:
@@ -235,18 +235,18 @@ class HilSimulator:
         if not self._lockstep:
             if not self.answered:
                 self.missed += 1
-            if self._core.now_us - self._command_us > COMMAND_TIMEOUT_US:
+            if self.core.now_us - self._command_us > COMMAND_TIMEOUT_US:
                 self._command = STOPPED
         self.answered = False
         self._sensors = self._sensor_frames(
-            self._core.tick(self._command, self._gripper_open, self._reel_rate)
+            self.core.tick(self._command, self._gripper_open, self._reel_rate)
         )
         self._truth_made = False
 
     def _sensor_frames(self, readings: Readings) -> bytes:
         frame = self._sensor_writer.frame
         stated = self._stated
-        frames = [frame(message) for message in self._parameters.take()]
+        frames = [frame(message) for message in self.parameters.take()]
         for time_us, pose in readings.mocap:
             message = convert.odometry_message(
                 time_us,
@@ -301,7 +301,7 @@ class HilSimulator:
             fields |= convert.PRESSURE | convert.TEMPERATURE
         altitude = self._home.altitude_m + self._height
         return convert.hil_sensor_message(
-            self._core.now_us,
+            self.core.now_us,
             self._inertial.accel_body,
             self._inertial.gyro_body,
             self._field,
@@ -312,7 +312,7 @@ class HilSimulator:
         )
 
     def _truth_frames(self) -> bytes | None:
-        core = self._core
+        core = self.core
         due = core.tick_count % self._truth_every == 0
         status_due = core.now_us % STATUS_PERIOD_US == 0
         wind_due = status_due or core.pulse != self._gust_told
@@ -367,9 +367,9 @@ class HilSimulator:
         return b"".join(frames)
 
     def _status(self) -> object:
-        pacing, state = self.pacing, self._core.state
+        pacing, state = self.pacing, self.core.state
         return mavlink.MAVLink_sim_status_message(
-            self._core.now_us,
+            self.core.now_us,
             pacing.speed_factor,
             pacing.rate_hz,
             pacing.late_p50_us,

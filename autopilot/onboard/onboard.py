@@ -215,7 +215,7 @@ class Onboard:
             self.endpoint.item_reached(seq, last)
         if self._log is not None:
             rate_hz = self.parameters["LOG_RATE_HZ"]
-            self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self._log_sample)
+            self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self.log_sample)
             self.endpoint.files.protected = self._log.path
 
     def _hear_simulator(self, message: Any) -> None:
@@ -249,7 +249,8 @@ class Onboard:
         except FileError:
             return set()
 
-    def _log_sample(self) -> Sample:
+    def log_sample(self) -> Sample:
+        """What the flight log records at this tick."""
         imu = self._last.imu if self._last else None
         return Sample(self._snapshot(), imu, self.core.estimator)
 

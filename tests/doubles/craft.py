@@ -24,7 +24,6 @@ from sitl.hil import HilSimulator
 from sitl.plant.records import PlantState
 from sitl.sim_core import SimCore
 from sitl.vehicles.truth import load_truth
-from tests.doubles.insides import core_of, state_of
 
 ACCEPTED = ACCEPTANCE.result
 GCS = "gcs"
@@ -67,15 +66,15 @@ class Craft:
 
     @property
     def world(self) -> SimCore:
-        return core_of(self.simulator)
+        return self.simulator.core
 
     @property
     def estimate(self) -> EstimatorState:
-        return state_of(self.onboard).estimator
+        return self.onboard.core.estimator
 
     @property
     def flight(self) -> Flight:
-        return state_of(self.onboard).flight
+        return self.onboard.core.flight
 
     @property
     def texts(self) -> list[str]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from autopilot.estimation.filter import Readings, estimate, estimator_tuning
+from autopilot.estimation.filter import estimator_tuning
 from autopilot.estimation.records import (
     TRACKED_SIZE,
     EstimatorState,
@@ -26,6 +26,7 @@ from autopilot.geometry.linear import Vec3
 from autopilot.geometry.so3 import Quat
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
+from tests.doubles.readings import Readings, estimate
 
 Array = NDArray[Any]
 TICK_S = 0.004

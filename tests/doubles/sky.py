@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from autopilot.control.laws.interface import build_law
+from autopilot.control.laws import build_law, chosen_law
 from autopilot.geometry.linear import ZERO, Vec3, add, norm, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.records import Verdict
@@ -24,7 +24,8 @@ from missions.model import Step
 
 ACCEPTED = ACCEPTANCE.result
 TABLE = autopilot_parameters(load_vehicle("bebop"))
-SETTINGS = settings_from(TABLE, build_law(TABLE).ramp_lag_s)
+LAW = chosen_law(TABLE)
+SETTINGS = settings_from(TABLE, LAW.ramp_lag_s(build_law(TABLE)), LAW.reels, LAW.follows_shaped)
 STEP_US = 20_000
 LOAD_RADIUS, GEAR = 0.02, 0.06
 

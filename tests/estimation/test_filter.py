@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from autopilot.estimation.filter import Readings, complaints, estimate
+from autopilot.estimation.filter import complaints
 from autopilot.estimation.history import carry_back, past3, past4, row_before
 from autopilot.estimation.measurements.load import correct_load
 from autopilot.estimation.measurements.pose import correct_pose
@@ -36,6 +36,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.linear import ZERO
 from tests.doubles.motion import CABLE_LENGTH, TICK_S, Array, Motion, Noise, Trace, bebop_tuning, track
+from tests.doubles.readings import Readings, estimate
 
 SETTLED_S = 3.0
 # Mean of error^2 / stated variance per axis. 1 is exact; one path of 17 s is a small sample of what is slow,

@@ -33,7 +33,6 @@ from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.state import Phase
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
-from tests.doubles.insides import history_of
 
 PLUMBLINE = 2.0
 SEEDS = range(1, 11)
@@ -77,7 +76,7 @@ def flown(sensors: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
         craft = Craft(*steps, sensors=sensors, seed=seed, CTL_LAW=PLUMBLINE)
         craft.begin()
         craft.wait(SETTLED_S - 1.0)
-        history = history_of(craft.onboard)
+        history = craft.onboard.core.rows.history
         history.consistency[:] = 0.0
         for values in nees.values():
             values.append([])

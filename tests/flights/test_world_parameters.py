@@ -13,7 +13,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.operation import GROUND
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from sitl.hil import HilSimulator
-from tests.doubles.insides import core_of
 
 LINK = "ground"
 
@@ -67,7 +66,7 @@ def test_a_change_reaches_the_world_and_is_not_stored(world: World) -> None:
     events = world.set("SIM_WIND_E", 5.0)
     assert events == []
     world.run(3)
-    assert core_of(world.simulator).wind == (5.0, 2.0, 0.0)
+    assert world.simulator.core.wind == (5.0, 2.0, 0.0)
     assert world.told("SIM_WIND_E") == 5.0
 
 
@@ -89,7 +88,7 @@ def test_a_load_can_grow_heavier_in_flight(world: World) -> None:
     world.set("SIM_ACT_DELAY_MS", 10.0)
     world.set("SIM_NOISE_SCALE", 2.0)
     world.run(5)
-    core = core_of(world.simulator)
+    core = world.simulator.core
     assert core.truth.load_mass == 0.2
     assert core.settings.actuator_delay_us == 10_000
     assert core.settings.noise_scale == 2.0

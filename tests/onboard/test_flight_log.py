@@ -21,7 +21,6 @@ from autopilot.wire.convert import Home
 from autopilot.wire.tlog import TlogWriter
 from gcs import closed_loop
 from missions.fileformat import load_mission
-from tests.doubles.insides import log_sample_of
 
 BOOT_US = closed_loop.LOCKSTEP_BOOT_UNIX_US
 
@@ -171,7 +170,7 @@ def test_texts_before_arming_begin_the_log_and_a_changed_parameter_is_in_it(
 
 def test_records_that_nobody_takes_are_dropped_and_the_gap_is_told(tmp_path: Path, flown: Flown) -> None:
     log = make_log()
-    sample = log_sample_of(flown.onboard)
+    sample = flown.onboard.log_sample()
     now_us = 0
     first: LogChunk | None = None
     while now_us < 200_000_000:
@@ -194,7 +193,7 @@ def test_records_that_nobody_takes_are_dropped_and_the_gap_is_told(tmp_path: Pat
 
 
 def test_a_diverged_flight_is_still_logged(flown: Flown) -> None:
-    sample = log_sample_of(flown.onboard)
+    sample = flown.onboard.log_sample()
     wild = sample._replace(snapshot=sample.snapshot._replace(x_load=(1e300, -1e300, 0.0), seq=70_000))
     log = make_log()
     log.step(0, True, 50.0, set, lambda: wild)

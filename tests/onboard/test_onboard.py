@@ -18,7 +18,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
-from tests.doubles.insides import setup_of, simulator_parameter, state_of
 from tests.doubles.motion import TICK_S
 
 DENIED = mavlink.MAV_RESULT_DENIED
@@ -61,9 +60,9 @@ def test_a_repeated_tick_gets_the_same_bytes_and_no_second_step() -> None:
     autopilot = onboard()
     autopilot.receive_sensors(sensors(0))
     first = autopilot.receive_sensors(sensors(4000))
-    state = state_of(autopilot)
+    state = autopilot.core
     assert autopilot.receive_sensors(sensors(4000, (5.0, 5.0, 5.0))) == first
-    assert state_of(autopilot) is state
+    assert autopilot.core is state
     assert autopilot.tick == 1
 
 
@@ -190,13 +189,13 @@ def test_a_parameter_set_in_flight_is_flown_with_at_once() -> None:
     craft = Craft(Takeoff(1.0), Delay(30.0), Land())
     craft.begin()
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
-    setup = setup_of(craft.onboard)
+    setup = craft.onboard.core.setup
     name, kind = b"QP_KX", mavlink.MAV_PARAM_TYPE_REAL32
     craft.send(mavlink.MAVLink_param_set_message(1, 1, name, 5.0, kind))
     craft.tick()
-    assert setup_of(craft.onboard) is not setup
-    assert setup_of(craft.onboard).law.other_modes.position_gains.k_x[0] == 5.0
-    assert setup_of(craft.onboard).control_every == setup.control_every
+    assert craft.onboard.core.setup is not setup
+    assert craft.onboard.core.setup.law.other_modes.position_gains.k_x[0] == 5.0
+    assert craft.onboard.core.setup.control_every == setup.control_every
     craft.wait(1.0)
     assert craft.flight.phase == Phase.MISSION
 
@@ -282,7 +281,7 @@ def test_no_more_latency_is_believed_than_may_be() -> None:
 def test_the_saved_world_is_set_again_in_the_simulator() -> None:
     craft = Craft()
     craft.onboard.restore_world({"SIM_WIND_E": 2.5, "SIM_LOAD_MASS": 0.1, "SIM_NO_SUCH": 1.0})
-    craft.run(lambda craft: simulator_parameter(craft.simulator, "SIM_WIND_E") == 2.5, 3.0)
+    craft.run(lambda craft: craft.simulator.parameters.table["SIM_WIND_E"] == 2.5, 3.0)
     craft.wait(1.0)
     assert craft.onboard.parameters["SIM_WIND_E"] == 2.5
     assert "SIM_NO_SUCH" not in craft.onboard.parameters
@@ -294,12 +293,12 @@ def test_reset_of_parameters_reaches_the_simulator_and_waits_for_the_ground() ->
     began = craft.onboard.parameters["SIM_WIND_E"]
     for name, value in ((b"SIM_WIND_E", 2.0), (b"MIS_SPEED", 2.0)):
         craft.send(mavlink.MAVLink_param_set_message(1, 1, name, value, mavlink.MAV_PARAM_TYPE_REAL32))
-    craft.run(lambda craft: simulator_parameter(craft.simulator, "SIM_WIND_E") == 2.0, 3.0)
+    craft.run(lambda craft: craft.simulator.parameters.table["SIM_WIND_E"] == 2.0, 3.0)
     assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
     assert craft.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, 2.0) == DENIED
     assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0) == ACCEPTED
     assert craft.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, 2.0) == ACCEPTED
-    craft.run(lambda craft: simulator_parameter(craft.simulator, "SIM_WIND_E") == began, 3.0)
+    craft.run(lambda craft: craft.simulator.parameters.table["SIM_WIND_E"] == began, 3.0)
     assert craft.onboard.parameters["MIS_SPEED"] == 1.5
 
 

@@ -13,7 +13,6 @@ from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import COMMAND_TIMEOUT_US, HilSimulator, PacingFigures, pressure_pa
-from tests.doubles.insides import core_of
 
 PROFILES = ["gps", "ideal", "lab", "rtk"]
 # float32 keeps 24 bits: at 4 m, half a unit in the last place is 2.4e-7 m
@@ -54,7 +53,7 @@ def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     simulator = HilSimulator.build(sensors="ideal")
     answerer((1.3, 1.3, 1.3, 1.3)).fly(simulator, 200)
     odometry, load, inertial = messages(simulator.sensor_datagram())
-    state = core_of(simulator).state
+    state = simulator.core.state
     pose = convert.read_odometry(odometry)
     assert pose.position == pytest.approx(state.x_quad, abs=FLOAT32_M)
     assert pose.velocity == pytest.approx(state.v_quad, abs=FLOAT32_M)
@@ -130,7 +129,7 @@ def test_truth_is_the_truth(answerer, messages) -> None:
     simulator = HilSimulator.build(vehicle="bebop", sensors="lab")
     answerer((1.45, 1.45, 1.45, 2.5)).fly(simulator, 100)
     vehicle, load, rotors, _, status = messages(simulator.truth_datagram())
-    state = core_of(simulator).state
+    state = simulator.core.state
     got = convert.read_load_state(load)
     assert got.source == mavlink.PLUMBLINE_SOURCE_TRUTH
     assert got.x_load == pytest.approx(state.x_load, abs=FLOAT32_M)
@@ -215,14 +214,14 @@ def test_controls_that_are_no_numbers_are_refused(bad: float, answerer) -> None:
     assert simulator.receive(pilot.answer(simulator.now_us, (0.7, bad, 0.7, 0.7)))
     simulator.advance()
     assert simulator.rejected == 1
-    assert core_of(simulator).command == pytest.approx((0.5,) * 4)
+    assert simulator.core.command == pytest.approx((0.5,) * 4)
 
 
 def test_disarmed_rotors_stand(answerer) -> None:
     simulator, pilot = HilSimulator.build(), answerer()
     assert simulator.receive(pilot.answer(0, FULL, armed=False))
     simulator.advance()
-    assert core_of(simulator).command == (0.0, 0.0, 0.0, 0.0)
+    assert simulator.core.command == (0.0, 0.0, 0.0, 0.0)
 
 
 def test_greeting_is_a_heartbeat_of_the_vehicle(answerer) -> None:
@@ -246,11 +245,11 @@ def test_real_time_counts_missed_commands_and_uses_late_ones(answerer) -> None:
     assert not simulator.receive(pilot.answer(late, (0.6,) * 4))
     simulator.advance()
     assert simulator.missed == 3
-    assert core_of(simulator).command == pytest.approx((0.6,) * 4)
+    assert simulator.core.command == pytest.approx((0.6,) * 4)
     assert not simulator.receive(pilot.answer(late - 4000, (0.9,) * 4))  # older than what is known
     assert not simulator.receive(pilot.answer(simulator.now_us + 4000, (0.9,) * 4))
     simulator.advance()
-    assert core_of(simulator).command == pytest.approx((0.6,) * 4)
+    assert simulator.core.command == pytest.approx((0.6,) * 4)
 
 
 def test_real_time_rotors_stop_when_commands_stay_away(answerer) -> None:
@@ -258,9 +257,9 @@ def test_real_time_rotors_stop_when_commands_stay_away(answerer) -> None:
     pilot.fly(simulator, 1)
     for _ in range(COMMAND_TIMEOUT_US // 4000):
         simulator.advance()
-        assert core_of(simulator).command == pytest.approx((0.5,) * 4)
+        assert simulator.core.command == pytest.approx((0.5,) * 4)
     simulator.advance()
-    assert core_of(simulator).command == (0.0, 0.0, 0.0, 0.0)
+    assert simulator.core.command == (0.0, 0.0, 0.0, 0.0)
 
 
 def told_winds(simulator: HilSimulator, answerer, messages, ticks: int) -> list[tuple]:
@@ -320,7 +319,7 @@ def test_a_cable_that_comes_taut_is_told_of(answerer, messages) -> None:
     simulator = HilSimulator.build(sensors="ideal")
     sent = answerer((1.45,) * 4).fly(simulator, 300)  # lifts vehicle and load
     (snap,) = [m for d in sent for m in messages(d) if m.get_type() == "CABLE_SNAP"]
-    truth = core_of(simulator).truth
+    truth = simulator.core.truth
     reduced_mass = truth.quad_mass * truth.load_mass / (truth.quad_mass + truth.load_mass)
     assert snap.speed > 0.5  # m/s, it climbs at about 2 m/s^2 over 0.7 m
     assert snap.impulse == pytest.approx(reduced_mass * snap.speed, rel=1e-6)

@@ -35,7 +35,6 @@ from gcs.sweep.flight import TRACE_COLUMNS, boarding, fly
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Takeoff, Term, Waypoint
 from sitl.hil import HilSimulator
-from tests.doubles.insides import core_of
 
 MOST_TICKS = 20_000
 THESIS, LQR, PLUMBLINE = 0.0, 1.0, 2.0
@@ -53,7 +52,7 @@ def flown(name: str, conditions: Conditions) -> None:
     real = np.full((MOST_TICKS, TRACE_COLUMNS), np.nan)
 
     def watch(_: Onboard, simulator: HilSimulator) -> bool:
-        core = core_of(simulator)
+        core = simulator.core
         p = core.state
         real[core.tick_count] = (*p.x_load, *p.x_quad, *p.quat_wxyz, *p.rotor_force)
         return True

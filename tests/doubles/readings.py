@@ -1,0 +1,67 @@
+"""Readings of one tick by name, for tests of the estimator: they fill the inbox that the estimator reads."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.control.records import Cable
+from autopilot.estimation import inbox as box
+from autopilot.estimation.filter import estimate as estimate_from_inbox
+from autopilot.estimation.records import (
+    DirectionReading,
+    EstimatorState,
+    EstimatorTuning,
+    GnssReading,
+    History,
+    ImuReading,
+    LoadReading,
+    PoseReading,
+)
+from autopilot.geometry.linear import Vec3
+
+
+class Readings(NamedTuple):
+    """What the sensors said since the last tick; each kind in the order in which it came."""
+
+    imu: ImuReading | None
+    poses: tuple[PoseReading, ...] = ()
+    loads: tuple[LoadReading, ...] = ()
+    fixes: tuple[GnssReading, ...] = ()
+    directions: tuple[DirectionReading, ...] = ()
+    height_m: float | None = None  # by the barometer, over home
+    field_body: Vec3 | None = None  # of the magnetometer
+
+
+def estimate(
+    state: EstimatorState,
+    history: History,
+    readings: Readings,
+    tuning: EstimatorTuning,
+    dt: float,
+    thrust: float = 0.0,
+) -> EstimatorState:
+    """The state after `dt` seconds and the readings, the cable as long as the tuning has it."""
+    inbox = box.new_inbox(64)
+    count = 0
+    if readings.imu is not None:
+        box.put_reading(inbox, count, box.IMU, 0, readings.imu)
+        count += 1
+    aged = (
+        (box.POSE, readings.poses),
+        (box.LOAD, readings.loads),
+        (box.FIX, readings.fixes),
+        (box.DIRECTION, readings.directions),
+    )
+    for kind, found in aged:
+        for reading in found:
+            box.put_reading(inbox, count, kind, 0, reading)
+            inbox[count, box.SHOWS] = -1e6 * (reading.age_s + tuning.imu_age)
+            count += 1
+    if readings.height_m is not None:
+        box.put_vector(inbox, count, box.HEIGHT, (readings.height_m,))
+        count += 1
+    if readings.field_body is not None:
+        box.put_vector(inbox, count, box.FIELD, readings.field_body)
+        count += 1
+    cable = Cable(tuning.cable_length)
+    return estimate_from_inbox(state, history, inbox, count, 0, tuning, cable, 0.0, dt, thrust)
