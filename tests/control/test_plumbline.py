@@ -22,7 +22,9 @@ from autopilot.control.actuators import predictor as prediction
 from autopilot.control.actuators import rotor_model as actuation
 from autopilot.control.actuators.mixer import mix
 from autopilot.control.actuators.rotor_model import actuation_constants
-from autopilot.control.laws.interface import PlumblineLaw, build_law
+from autopilot.control.laws import build_law
+from autopilot.control.laws import plumbline as law_file
+from autopilot.control.laws.plumbline import PlumblineLaw
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment
 from autopilot.control.records import Jet, Reference, State, Vehicle
