@@ -44,7 +44,11 @@ def _imported(path: Path) -> frozenset[Path]:
     for module, names in _IMPORT.findall(_source(path)):
         base = _ROOT.joinpath(*module.decode().split("."))
         for candidate in (base, *(base / name.decode() for name in _NAME.findall(names))):
-            found.update(p for p in (candidate.with_suffix(".py"), candidate / "__init__.py") if p.is_file())
+            packages = (parent for parent in (candidate, *candidate.parents) if parent.is_relative_to(_ROOT))
+            sources = (candidate.with_suffix(".py"), *(package / "__init__.py" for package in packages))
+            found.update(source for source in sources if source.is_file())
+    if b"iter_modules(__path__)" in _source(path):  # a package that finds its modules by itself
+        found.update(path.parent.glob("*.py"))
     return frozenset(found)
 
 
