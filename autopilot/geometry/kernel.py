@@ -38,13 +38,26 @@ def _source(path: Path) -> bytes:
 
 
 @cache
+def _packages(path: Path) -> tuple[Path, ...]:
+    """The files that make `path`, or what it lies in, packages of this project."""
+    inside = [parent for parent in (path, *path.parents) if parent.is_relative_to(_ROOT)]
+    return tuple(file for file in (parent / "__init__.py" for parent in inside) if file.is_file())
+
+
+@cache
 def _imported(path: Path) -> frozenset[Path]:
     """Files of this project that the file imports itself."""
     found: set[Path] = set()
     for module, names in _IMPORT.findall(_source(path)):
         base = _ROOT.joinpath(*module.decode().split("."))
-        for candidate in (base, *(base / name.decode() for name in _NAME.findall(names))):
-            found.update(p for p in (candidate.with_suffix(".py"), candidate / "__init__.py") if p.is_file())
+        found.update(_packages(base))
+        if base.is_dir():
+            parts = (base / name.decode() for name in _NAME.findall(names))
+            found.update(p for q in parts for p in (q.with_suffix(".py"), q / "__init__.py") if p.is_file())
+        else:
+            found.add(base.with_suffix(".py"))
+    if b"iter_modules(__path__)" in _source(path):  # a package that finds its modules by itself
+        found.update(path.parent.glob("*.py"))
     return frozenset(found)
 
 

@@ -10,8 +10,9 @@ import tomllib
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from autopilot.vehicle.law_files import law_files
 from autopilot.wire.parameter_table import ParameterTable
 
 if TYPE_CHECKING:
@@ -19,9 +20,21 @@ if TYPE_CHECKING:
     from autopilot.wire.parameter_file import ParameterFile
 
 FILE = "parameters.toml"
-_DOCUMENT = tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8"))
 
-LAWS: tuple[str, ...] = tuple(_DOCUMENT["CTL_LAW"]["values"].values())  # CTL_LAW is an index into this
+
+def _document() -> dict[str, Any]:
+    """The file, with the names of the laws and the parameters that they bring along."""
+    document = tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8"))
+    document["CTL_LAW"]["values"] = {str(law.number): law.name for law in law_files()}
+    for law in law_files():
+        own = dict(law.parameters)
+        document["groups"].update(own.pop("groups", {}))
+        document.update(own)
+    return document
+
+
+_DOCUMENT = _document()
+LAWS = tuple(law.name for law in law_files())  # CTL_LAW is an index into this
 DEFAULT_LAW = LAWS[_DOCUMENT["CTL_LAW"]["default"]]
 SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
 

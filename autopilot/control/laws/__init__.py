@@ -8,16 +8,19 @@ from typing import Any
 
 from autopilot.control.believed import believed_vehicle
 from autopilot.control.laws.interface import Law, register
+from autopilot.vehicle.law_files import law_files
 from autopilot.wire.parameter_table import ParameterTable
 
 
 def _found() -> dict[int, Law]:
     modules = (import_module(f"{__name__}.{entry.name}") for entry in iter_modules(__path__))
     laws = [register(module.LAW) for module in modules if hasattr(module, "LAW")]
-    found = {law.number: law for law in sorted(laws, key=lambda law: law.number)}
-    if len(found) < len(laws):
-        numbers = ", ".join(f"{law.name} {law.number}" for law in laws)
-        raise ValueError(f"two laws have the same number of CTL_LAW: {numbers}")
+    named = {law.number: law.name for law in law_files()}
+    found = {law.number: law for law in laws}
+    if {number: law.name for number, law in found.items()} != named:
+        told = ", ".join(f"{law.name} {law.number}" for law in laws)
+        read = ", ".join(f"{name} {number}" for number, name in named.items())
+        raise ValueError(f'laws are {told}, their files say {read}; write LAW = Law(name="...", number=...,')
     return found
 
 

@@ -1,7 +1,8 @@
 """What a control law is: a record of constants, a record of memory, and five kernels over them.
 
-A law is one file of this folder that ends with `LAW = Law(...)`; `autopilot.control.laws` finds it. The
-kernels are the flight modes of 3-2 and the position law of the vehicle alone:
+A law is one file of this folder that says `LAW = Law(name="...", number=..., ...)`; it is found by that. Its
+own parameters, if it has any, are a text `PARAMETERS` in the format of `parameters.toml`. The kernels are the
+flight modes of 3-2 and the position law of the vehicle alone:
 
 | kernel | follows | arguments behind (constants, memory, state) |
 |---|---|---|
@@ -14,7 +15,7 @@ kernels are the flight modes of 3-2 and the position law of the vehicle alone:
 All but `start` return (memory, Command). World ENU, body FLU, SI. `reference` is that of `preview_s` from
 now;
 `actuation` and `observed` are what is believed of rotors and disturbances at this tick, `cable` is its
-present length, rate and acceleration.
+length, rate and acceleration now.
 """
 
 from __future__ import annotations
@@ -23,11 +24,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import overload
 
 from autopilot.control.records import Vehicle
 from autopilot.geometry.packed import packed, unpack, width
-from autopilot.wire.parameter_table import Parameter, ParameterTable
+from autopilot.wire.parameter_table import ParameterTable
 
 
 class Kernels(NamedTuple):
@@ -56,7 +58,6 @@ class Law:
     ramp_lag_s: Callable[[Any], float] = lambda constants: 0.0
     reels: bool = True  # it can fly another length of the cable than the one it was built for
     follows_shaped: bool = False  # it follows a path so exactly that shaping the path beforehand pays
-    parameters: tuple[Parameter, ...] = ()  # of its own, beside those of the table
 
 
 _BY_RECORD: dict[Any, Law] = {}  # by the types of constants and of rows
@@ -77,9 +78,7 @@ def law_of(record: Any) -> Law:
 def new_rows(constants: Any) -> Any:
     """Rows of a law with these constants and a memory of zeros."""
     law = law_of(constants)
-    from numpy import zeros
-
-    return law.rows(packed(constants), zeros(width(law.memory)))
+    return law.rows(packed(constants), np.zeros(width(law.memory)))
 
 
 # ---- in kernels: which law it is, the compiler sees by the type of its record
