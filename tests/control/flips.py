@@ -46,7 +46,7 @@ def flips(tree: ast.Module) -> Iterator[tuple[str, ast.FunctionDef]]:
 def fails(proof: Any, laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> bool:
     try:
         proof(laws, model, vehicle)
-    except (AssertionError, ArithmeticError, ValueError):
+    except (AssertionError, ArithmeticError, ValueError, IndexError):
         return True
     return False
 
