@@ -25,6 +25,7 @@ from autopilot.core.warmup import rehearse
 from autopilot.core.winch import as_reeled, commanded_rate
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
@@ -45,7 +46,7 @@ from autopilot.services.records import (
     Verdict,
     WorldSaved,
 )
-from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
+from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
 from autopilot.services.snapshot import Snapshot
 from autopilot.supervisor.flight import ON_GROUND, MissionPlan, Phase, carries, settings_from
 from autopilot.supervisor.requests import decide, with_plan
@@ -57,7 +58,7 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.mission_items import WireItem, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
-from missions.model import Step, Waypoint
+from missions.model import ReturnHome, Step, Waypoint
 
 GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
@@ -74,10 +75,11 @@ class Work(NamedTuple):
     steps: tuple[Step, ...]
     sequence: tuple[int, ...]
     limits: Limits
+    home: Vec3 = ZERO  # where a return leads
 
     def done(self) -> Prepared:
         """What comes of it; takes from a millisecond to some seconds."""
-        return prepare(self.steps, self.sequence, self.limits)
+        return prepare(self.steps, self.sequence, self.limits, self.home)
 
 
 def build_setup(table: ParameterTable, control_every: int) -> Setup:
@@ -96,11 +98,12 @@ def build_setup(table: ParameterTable, control_every: int) -> Setup:
     )
 
 
-def plan_of(mission: StoredMission, home: Home, limits: Limits | None) -> MissionPlan:
-    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet."""
-    steps = located_steps(mission.items, home)
+def plan_of(mission: StoredMission, home: Home, limits: Limits | None, return_to: Vec3 = ZERO) -> MissionPlan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet. A
+    return leads to `return_to`."""
+    steps = located_steps(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
-    prepared = PENDING if limits is None else prepare(flown, sequence, limits)
+    prepared = PENDING if limits is None else prepare(flown, sequence, limits, return_to)
     return MissionPlan(flown, sequence, len(mission.items), prepared)
 
 
@@ -365,7 +368,22 @@ class Onboard:
         view = view_of(estimator, seen, settings, self.now_us, carrying=carries(flight))
         flight, verdict = decide(flight, request, view, settings)
         self._state = state._replace(flight=flight)
+        if isinstance(request, SetHome) and flight.home != state.flight.home:
+            self._follow_home()
         return verdict
+
+    def _follow_home(self) -> None:
+        """Read and prepare the mission anew where it returns to another home; one under way keeps its paths,
+        as it does when a parameter is changed."""
+        flight = self._state.flight
+        if flight.on_mission or not any(isinstance(step, ReturnHome) for step in flight.plan.steps):
+            return
+        plan = plan_of(self.endpoint.mission, self._options.home, None, flight.home)
+        current, item = flight.step, flight.plan.sequence[flight.step]
+        if len(plan.steps) != len(flight.plan.steps):  # to land at a place of its own may be two steps by now
+            current = plan.sequence.index(item)
+        self._state = self._state._replace(flight=replace(flight, plan=plan, step=current))
+        self._prepare()
 
     def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Another fence, other rally points."""
@@ -378,7 +396,7 @@ class Onboard:
         self._state = self._state._replace(flight=flight)
 
     def _take_plan(self, mission: StoredMission) -> None:
-        plan = plan_of(mission, self._options.home, None)
+        plan = plan_of(mission, self._options.home, None, self._state.flight.home)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
         self._prepare()
         kept = unflown(mission.items)
@@ -390,7 +408,7 @@ class Onboard:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
         plan, limits = self._state.flight.plan, self._setup.settings.limits
         self._prepared_for = limits
-        self.work = Work(plan.steps, plan.sequence, limits)
+        self.work = Work(plan.steps, plan.sequence, limits, self._state.flight.home)
         self._have_prepared(PENDING)
         short = self._state.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
         if self._options.clock_waits or short:

@@ -26,7 +26,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from autopilot.geometry.frames import enu_from_ned
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.trajectory.timeline import ANYWHERE, state_after
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import decimal_from_float32, float32
@@ -218,9 +219,12 @@ def decode_items(items: Sequence[WireItem], home: Home) -> tuple[Step, ...]:
     return tuple(located.step for located in located_steps(items, home))
 
 
-def located_steps(items: Sequence[WireItem], home: Home) -> tuple[LocatedStep, ...]:
-    """As `decode_items`, each step with the items that MISSION_CURRENT and MISSION_ITEM_REACHED name."""
-    reader = _Reader(home)
+def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO) -> tuple[LocatedStep, ...]:
+    """As `decode_items`, each step with the items that MISSION_CURRENT and MISSION_ITEM_REACHED name.
+
+    Places are relative to `home`; a return leads to `return_to` (m, ENU), which DO_SET_HOME moves.
+    """
+    reader = _Reader(home, return_to)
     jumps: dict[int, int] = {}
     flown = seq = 0
     while seq < len(items):
@@ -249,16 +253,16 @@ def unflown(items: Sequence[WireItem]) -> tuple[int, ...]:
 
 
 class _Reader:
-    """Goes through the items in order: terms gather until their run; where the load is left is remembered."""
+    """Goes through the items in order: terms gather until their run; the state of the load is followed."""
 
-    def __init__(self, home: Home) -> None:
+    def __init__(self, home: Home, return_to: Vec3) -> None:
         self.steps: list[LocatedStep] = []
         self._home = home
+        self._return_to = return_to
         self._terms: list[Term] = []
         self._first_term = 0
         self._speed = TURN_SPEED_M_S
-        self._released = False
-        self._left_at: Vec3 | None = None  # where the load hangs after the steps so far, if that is known
+        self._state = ANYWHERE  # after the steps so far
 
     def read(self, seq: int, item: WireItem) -> None:
         command = item.command
@@ -285,15 +289,14 @@ class _Reader:
             text = f"the load signal begun at item {self._first_term} has no run (31012) behind it"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
 
-    def _add(self, seq: int, step: Step) -> None:
-        self.steps.append(LocatedStep(seq, seq, step))
+    def _add(self, seq: int, step: Step, first: int | None = None) -> None:
+        self.steps.append(LocatedStep(seq if first is None else first, seq, step))
+        self._state = state_after(step, self._state, self._return_to)
 
     def _step(self, seq: int, item: WireItem) -> None:
         command = item.command
         if command == mavlink.MAV_CMD_NAV_TAKEOFF:
-            height = self._height(seq, item)
-            self._left_at = (0.0, 0.0, height)
-            self._add(seq, Takeoff(height))
+            self._add(seq, Takeoff(self._height(seq, item)))
         elif command == mavlink.MAV_CMD_NAV_LOITER_TURNS:
             self._turns(seq, item)
         elif command in _PLACES:
@@ -304,9 +307,7 @@ class _Reader:
                 elif command != mavlink.MAV_CMD_NAV_LOITER_TO_ALT:
                     hold = _check(seq, 1, "hold", item.param1, "s", 0.0, LONGEST_S)
                 east, north = self._place(seq, item)
-                height = self._height(seq, item)
-                self._left_at = (east, north, height)
-                self._add(seq, Waypoint(east, north, height, hold))
+                self._add(seq, Waypoint(east, north, self._height(seq, item), hold))
         elif command == mavlink.MAV_CMD_CONDITION_GATE:
             self._gate(seq, item)
         elif command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
@@ -323,8 +324,6 @@ class _Reader:
         elif command in (mavlink.MAV_CMD_NAV_DELAY, mavlink.MAV_CMD_CONDITION_DELAY):
             self._add(seq, Delay(_check(seq, 1, "delay", item.param1, "s", 0.0, LONGEST_S)))
         elif command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-            if self._left_at is not None:
-                self._left_at = (0.0, 0.0, self._left_at[2])
             self._add(seq, ReturnHome())
         elif command == mavlink.MAV_CMD_NAV_LAND:
             self._land(seq, item)
@@ -336,10 +335,8 @@ class _Reader:
         _choice(seq, 1, "gripper", item.param1, (0, 1))
         action = _choice(seq, 2, "gripper action", item.param2, (0, 1, 2))
         if action == mavlink.GRIPPER_ACTION_RELEASE:
-            self._released = True
-            self._left_at = None
             self._add(seq, Release())
-        elif action == mavlink.GRIPPER_ACTION_GRAB and self._released:
+        elif action == mavlink.GRIPPER_ACTION_GRAB and self._state.released:
             text = "the load, released before, can be taken on the ground only and not by a mission"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM2)
 
@@ -349,19 +346,19 @@ class _Reader:
         _choice(seq, 2, "winch action", item.param2, (mavlink.WINCH_RELATIVE_LENGTH_CONTROL,))
         length = _check(seq, 3, "length", item.param3, "m", -LONGEST_CABLE_M, LONGEST_CABLE_M)
         rate = _check(seq, 4, "rate", abs(item.param4), "m/s", 0.0, FASTEST_REEL_M_S)
-        if self._left_at is None:
+        step = Winch(length, rate or None)
+        left_at = state_after(step, self._state).position
+        if left_at is None:
             text = "nothing before it says how high the load hangs"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
-        east, north, height = self._left_at
-        if height - length < LEAST_REELED_M:
-            text = f"it would leave the load at {height - length:.2f} m; least {LEAST_REELED_M} m"
+        if left_at[2] < LEAST_REELED_M:
+            text = f"it would leave the load at {left_at[2]:.2f} m; least {LEAST_REELED_M} m"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID_PARAM3)
-        self._left_at = (east, north, height - length)
-        self._add(seq, Winch(length, rate or None))
+        self._add(seq, step)
 
     def _expect_load(self, seq: int) -> None:
         """Signals and attitude runs swing a load."""
-        if self._released:
+        if self._state.released:
             text = "needs the load, which an item before it has released"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
 
@@ -370,9 +367,7 @@ class _Reader:
         turns = _check(seq, 1, "turns", item.param1, "", 0.0, MOST_TURNS)
         radius = _check(seq, 3, "radius", item.param3, "m", -MOST_RADIUS_M, MOST_RADIUS_M)
         east, north = self._place(seq, item)
-        height = self._height(seq, item)
-        self._left_at = (east, north, height)
-        self._add(seq, Waypoint(east, north, height))
+        self._add(seq, Waypoint(east, north, self._height(seq, item)))
         if radius == 0.0 or turns == 0.0:
             return
         self._expect_load(seq)
@@ -389,33 +384,33 @@ class _Reader:
 
     def _gate(self, seq: int, item: WireItem) -> None:
         """Where a ground station has a survey begin and end: flown to like a waypoint."""
-        if item.param2 == 0.0 and self._left_at is None:
+        left_at = self._state.position
+        if item.param2 == 0.0 and left_at is None:
             text = "a gate without a height, and nothing before it has one"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
-        height = self._left_at[2] if item.param2 == 0.0 and self._left_at else self._height(seq, item)
-        self._left_at = (*self._place(seq, item), height)
-        self._add(seq, Waypoint(*self._left_at))
+        height = left_at[2] if item.param2 == 0.0 and left_at else self._height(seq, item)
+        self._add(seq, Waypoint(*self._place(seq, item), height))
 
     def _change_altitude(self, seq: int, item: WireItem) -> None:
         frame = _choice(seq, 2, "frame", item.param2, _GLOBAL_FRAMES)
         height = item.param1 - (self._home.altitude_m if frame in _ABSOLUTE_FRAMES else 0.0)
         height = _check(seq, 1, "height above home", height, "m", 0.01, FARTHEST_M)
-        if self._left_at is None:
+        left_at = self._state.position
+        if left_at is None:
             text = "nothing before it says where the load hangs"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
-        self._left_at = (self._left_at[0], self._left_at[1], height)
-        self._add(seq, Waypoint(*self._left_at))
+        self._add(seq, Waypoint(left_at[0], left_at[1], height))
 
     def _land(self, seq: int, item: WireItem) -> None:
         placed = item.frame in _PLACE_FRAMES and (item.x, item.y) != (0, 0)
-        if placed and self._released and self._left_at is None:
+        left_at = self._state.position
+        if placed and self._state.released and left_at is None:
             text = "nothing between it and the release says how high the vehicle flies; put a waypoint there"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
-        if placed and self._left_at is not None:
+        if placed and left_at is not None:
             east, north = self._place(seq, item)
-            height = self._left_at[2]
-            if math.dist((east, north, height), self._left_at) > _HOME_ROW_M:
-                self._add(seq, Waypoint(east, north, height))
+            if math.dist((east, north), left_at[:2]) > _HOME_ROW_M:
+                self._add(seq, Waypoint(east, north, left_at[2]))
         self._add(seq, Land())
 
     def _is_home_row(self, seq: int, item: WireItem) -> bool:
@@ -505,9 +500,8 @@ class _Reader:
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
         self._expect_load(seq)
         duration = _check(seq, 5, "duration", item.x / 1e3, "s", 1e-3, LONGEST_S)
-        self.steps.append(LocatedStep(self._first_term, seq, Signals(duration, tuple(self._terms))))
+        self._add(seq, Signals(duration, tuple(self._terms)), first=self._first_term)
         self._terms = []
-        self._left_at = None
 
     def _attitude_run(self, seq: int, item: WireItem) -> None:
         _expect_mission_frame(seq, item)
@@ -526,7 +520,6 @@ class _Reader:
             _check(seq, 3, "tilt east", item.param3, "rad", -upright, upright),
             _check(seq, 5, "duration", item.x / 1e3, "s", SHORTEST_EDGE_S, LONGEST_S),
         )
-        self._left_at = None
         self._add(seq, run)
 
 

@@ -1,8 +1,8 @@
 """Which room may import which, and who may touch the world.
 
-Missions and geometry stand alone; trajectory and wire on both; the vehicle on the wire; services, laws,
-estimator and guidance on those; the supervisor on guidance and services; the core of the flight on everything
-below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths; only
+Missions and geometry stand alone; trajectory on both, the wire on these; the vehicle on the wire; services,
+laws, estimator and guidance on those; the supervisor on guidance and services; the core of the flight on
+everything below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths; only
 `gcs/closed_loop.py` and `gcs/sweep` join the cores. Sockets, clocks, threads and logging belong to the shells
 alone.
 """
@@ -25,7 +25,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "missions": (),
     "autopilot.geometry": (),
     "autopilot.trajectory": ("autopilot.geometry", "missions"),
-    "autopilot.wire": ("autopilot.geometry", "missions"),
+    "autopilot.wire": ("autopilot.geometry", "autopilot.trajectory", "missions"),
     "autopilot.vehicle": ("autopilot.geometry", "missions", "autopilot.wire"),
     "autopilot.services": LEAVES,
     "autopilot.control": LEAVES,
