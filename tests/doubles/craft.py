@@ -1,0 +1,124 @@
+"""An autopilot in a simulated world, joined in one process, with the truth at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from autopilot.geometry.linear import norm, sub
+from autopilot.guidance.legs import Hold
+from autopilot.onboard.onboard import Onboard
+from autopilot.services.mission_store import StoredMission
+from autopilot.supervisor.flight import Flight, Phase
+from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import encode_steps, located_steps
+from gcs.closed_loop import Conditions, build_onboard, build_simulator
+from missions.model import Step
+from sitl.hil import HilSimulator
+from sitl.plant.records import PlantState
+from sitl.vehicles.files import load_truth
+
+ACCEPTED = ACCEPTANCE.result
+GCS = "gcs"
+TRUTH = load_truth("bebop")
+LOAD_WEIGHT_N = TRUTH.load_mass * TRUTH.gravity
+
+
+class Craft:
+    """Onboard and simulator joined tick by tick, without a ground station but for the commands given here.
+
+    `truth` reads the simulator's state; nothing of it reaches the autopilot but by sensors.
+    """
+
+    def __init__(self, *steps: Step, sensors: str = "lab", seed: int = 1, **settings_: float) -> None:
+        conditions = Conditions(sensors=sensors, seed=seed, settings=settings_)
+        items = encode_steps(steps, Home()) if steps else ()
+        mission = StoredMission(items, located_steps(items, Home()))
+        self.onboard: Onboard = build_onboard(conditions, Home(), mission)
+        self.simulator: HilSimulator = build_simulator(conditions, Home())
+        self.onboard.add_link(GCS)
+        self._writer = FrameWriter(255, 190)
+        self.heard: list[Any] = []
+        self.answers: list[bytes] = []
+        self.worst_error = 0.0  # of the load, from where it is to be held, m
+
+    @property
+    def truth(self) -> PlantState:
+        return self.simulator._core.state
+
+    @property
+    def flight(self) -> Flight:
+        return self.onboard._state.flight
+
+    @property
+    def texts(self) -> list[str]:
+        return [m.text for m in self.heard if m.get_type() == "STATUSTEXT"]
+
+    def results(self, command: int) -> list[int]:
+        """Results of the COMMAND_ACKs to a command."""
+        return [m.result for m in self.heard if m.get_type() == "COMMAND_ACK" and m.command == command]
+
+    def send(self, message: Any) -> None:
+        self.onboard.receive_ground(self._writer.frame(message), GCS)
+
+    def command(self, command: int, *p: float) -> int:
+        """Send a COMMAND_LONG; its result."""
+        params = (*p, *([0.0] * (7 - len(p))))
+        self.send(mavlink.MAVLink_command_long_message(1, 1, command, 0, *params))
+        self.tick()
+        return self.results(command)[-1]
+
+    def tick(self) -> None:
+        answer = self.onboard.receive_sensors(self.simulator.sensor_datagram())
+        for _, datagram in self.onboard.ground_datagrams():
+            self.heard += [r.message for r in decode(datagram)[0] if r.message.get_msgId() in _HEARD]
+        assert answer is not None
+        self.answers.append(answer)
+        if self.flight.legs and isinstance(self.flight.legs[0], Hold):
+            error = norm(sub(self.truth.x_load, self.flight.legs[0].position))
+            self.worst_error = max(self.worst_error, error)
+        self.simulator.receive(answer)
+        self.simulator.advance()
+
+    def run(self, until: Callable[[Craft], bool], limit_s: float = 60.0) -> None:
+        end = self.onboard.now_us + round(limit_s * 1e6)
+        while not until(self):
+            assert self.onboard.now_us < end, (self.flight.phase, self.texts)
+            self.tick()
+
+    def wait(self, seconds: float) -> None:
+        end = self.onboard.now_us + round(seconds * 1e6)
+        self.run(lambda craft: craft.onboard.now_us >= end, seconds + 1.0)
+
+    def begin(self) -> None:
+        """Settle, choose the mission, arm."""
+        self.wait(1.0)
+        assert self.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
+        assert self.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+
+
+_HEARD = {
+    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+    mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
+    mavlink.MAVLINK_MSG_ID_MISSION_ACK,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+    mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
+}
+
+
+def least_tension(craft: Craft, until: Callable[[Craft], bool]) -> float:
+    """Fly on; the least tension on the way, as a share of the load's weight."""
+    least = 9.9
+    while not until(craft):
+        craft.tick()
+        assert craft.flight.phase != Phase.FAILSAFE, craft.texts
+        least = min(least, craft.truth.tension / LOAD_WEIGHT_N)
+    return least
+
+
+def at_phase(phase: Phase) -> Callable[[Craft], bool]:
+    return lambda craft: craft.flight.phase == phase

@@ -1,0 +1,331 @@
+"""Synthetic flights, made of the dialect's own messages: arrays in, records of a .tlog out."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.telemetry import telemetry_of
+from gcs.analysis.tracks import Telemetry
+
+BOOT_US = 1_767_225_600_000_000
+TICK_S = 0.008
+CABLE_M = 0.7
+LOAD_KG = 0.075
+QUAD_KG = 0.42
+GRAVITY = 9.81
+ROTOR_MAX_N = 1.96
+INERTIA = np.array((2.2e-3, 2.2e-3, 4.3e-3))
+ARM_M = 0.126
+
+PHASES = (  # name, duration in s; MISSION is put in
+    (mavlink.PLUMBLINE_PHASE_ARMED, 0.5),
+    (mavlink.PLUMBLINE_PHASE_TAUTEN, 1.5),
+    (mavlink.PLUMBLINE_PHASE_LIFT, 3.0),
+    (mavlink.PLUMBLINE_PHASE_HOLD, 1.0),
+    (mavlink.PLUMBLINE_PHASE_MISSION, None),
+    (mavlink.PLUMBLINE_PHASE_HOLD, 1.0),
+    (mavlink.PLUMBLINE_PHASE_LOWER, 2.0),
+    (mavlink.PLUMBLINE_PHASE_SET_DOWN, 1.0),
+    (mavlink.PLUMBLINE_PHASE_DISARMED, 0.2),
+)
+BEFORE_S = sum(duration for _, duration in PHASES[:4])
+
+
+def _ned(v: np.ndarray) -> np.ndarray:
+    return np.stack((v[..., 1], v[..., 0], -v[..., 2]), axis=-1)
+
+
+@dataclass
+class Flight:
+    """Columns (n, ...) in ENU; whoever wants a fault writes into them before asking for the records."""
+
+    time_s: np.ndarray
+    phase: np.ndarray
+    desired: np.ndarray
+    desired_v: np.ndarray
+    desired_a: np.ndarray
+    actual: np.ndarray
+    actual_v: np.ndarray
+    estimated: np.ndarray
+    q_cable: np.ndarray
+    tension: np.ndarray
+    slack_events: np.ndarray
+    taut: np.ndarray
+    force: np.ndarray
+    command: np.ndarray
+    saturated: np.ndarray
+    quat: np.ndarray  # FLU -> ENU
+    psi_r: np.ndarray
+    psi_q: np.ndarray
+    control_mode: np.ndarray
+    texts: list[tuple[float, int, str]] = field(default_factory=list)
+    winds: list[tuple[float, tuple]] = field(default_factory=list)  # from when on which gust pulse, ENU
+    snaps: list[tuple[float, float, float]] = field(default_factory=list)  # when, speed, impulse
+    drop: Callable[[int, str], bool] = lambda i, kind: False
+
+    @property
+    def mission(self) -> np.ndarray:
+        return self.phase == mavlink.PLUMBLINE_PHASE_MISSION
+
+    def records(self) -> Iterator[tuple[int, bytes]]:
+        truth, common, dialect = FrameWriter(1, 26), FrameWriter(1, 1), FrameWriter(1, 25)
+        ground, load = FrameWriter(255, 190), FrameWriter(2, 35)
+        texts = sorted(self.texts)
+        for t, gust in self.winds:
+            message = mavlink.MAVLink_wind_state_message(round(t * 1e6), [0.0] * 3, _ned(np.array(gust)))
+            yield BOOT_US + round(t * 1e6), truth.frame(message)
+        for t, speed, impulse in self.snaps:
+            message = mavlink.MAVLink_cable_snap_message(round(t * 1e6), speed, impulse)
+            yield BOOT_US + round(t * 1e6), truth.frame(message)
+        half = np.sqrt(0.5)
+        for i, t in enumerate(self.time_s):
+            us = round(t * 1e6)
+            unix_us = BOOT_US + us
+            w, x, y, z = self.quat[i]
+            quat = (half * (w + z), half * (x + y), half * (x - y), half * (w - z))
+
+            def say(writer: FrameWriter, kind: str, *values, i=i, unix_us=unix_us):
+                if self.drop(i, kind):
+                    return
+                message = getattr(mavlink, f"MAVLink_{kind}_message")(*values)
+                yield unix_us, writer.frame(message)
+
+            def load_state(position, source, i=i, us=us):
+                return (
+                    us,
+                    *_ned(position[i]),
+                    *_ned(self.actual_v[i]),
+                    *_ned(self.q_cable[i]),
+                    0.0,
+                    0.0,
+                    0.0,
+                    CABLE_M,
+                    self.tension[i],
+                    int(self.slack_events[i]),
+                    int(self.taut[i]),
+                    source,
+                )
+
+            yield from say(
+                truth, "hil_state_quaternion", us, quat, 0.0, 0.0, 0.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0
+            )
+            yield from say(truth, "load_state", *load_state(self.actual, 0))
+            yield from say(truth, "rotor_state", us, self.force[i], 0.0, ROTOR_MAX_N, 0, 0)
+            if i % 25 == 0:
+                yield from say(truth, "sim_status", us, 0.0, 0.0, 0, 0, 0, 0, 0, 0)
+            yield from say(dialect, "load_state", *load_state(self.estimated, 2))
+            yield from say(
+                dialect,
+                "load_setpoint",
+                us,
+                *_ned(self.desired[i]),
+                *_ned(self.desired_v[i]),
+                *_ned(self.desired_a[i]),
+                0.0,
+                0.0,
+                1.0,
+                0.0,
+                float("nan"),
+                2,
+                int(self.phase[i]),
+                int(self.control_mode[i]),
+            )
+            error = list(_ned(self.actual[i] - self.desired[i]))
+            nil = [0.0] * 3
+            yield from say(
+                dialect,
+                "cascade_errors",
+                us,
+                error,
+                nil,
+                nil,
+                nil,
+                nil,
+                nil,
+                self.psi_r[i],
+                self.psi_q[i],
+                float(self.command[i].sum()),
+                nil,
+                int(self.control_mode[i]),
+            )
+            yield from say(
+                dialect,
+                "rotor_state",
+                us,
+                list(self.command[i]),
+                0.0,
+                ROTOR_MAX_N,
+                int(self.saturated[i]),
+                2,
+            )
+            if i % 5 == 0:
+                yield from say(common, "attitude_quaternion", us // 1000, *quat, 0.0, 0.0, 0.0)
+            if i % 125 == 0:
+                yield from say(common, "heartbeat", 2, 12, 128, 0, 4, 3)
+                yield from say(ground, "heartbeat", 6, 8, 0, 0, 4, 3)
+                yield from say(load, "attitude_quaternion", us // 1000, 1.0, 0.0, 0.0, 0.0, 9.0, 9.0, 9.0)
+                yield from say(common, "mission_current", 2)
+            while texts and texts[0][0] <= t:
+                _, severity, text = texts.pop(0)
+                data = text.encode()
+                for seq, first in enumerate(range(0, len(data), 50)):
+                    chunk_id = len(texts) + 1 if len(data) > 50 else 0
+                    yield from say(common, "statustext", severity, data[first : first + 50], chunk_id, seq)
+
+    def tlog(self) -> bytes:
+        return b"".join(struct.pack(">Q", us) + frame for us, frame in self.records())
+
+    def write(self, path: Path) -> Path:
+        path.write_bytes(self.tlog())
+        return path
+
+    def telemetry(self) -> Telemetry:
+        return telemetry_of((us, decode(frame)[0][0]) for us, frame in self.records())
+
+
+Path3 = Callable[[np.ndarray], np.ndarray]  # times (n,) since the mission began -> (n, 3) ENU from the anchor
+
+
+def flight(duration_s: float, path: Path3, error: Path3 | None = None, altitude_m: float = 1.5) -> Flight:
+    """A whole flight around a path, everything quiet but what the path and the error ask for."""
+    n = round((BEFORE_S + duration_s + sum(d for _, d in PHASES[5:])) / TICK_S) + 1
+    time_s = np.arange(n) * TICK_S
+    phase = np.zeros(n, dtype=int)
+    begin = 0.0
+    starts = {}
+    for name, length in PHASES:
+        phase[time_s >= begin - 1e-9] = name
+        starts.setdefault(name, begin)
+        begin += duration_s if length is None else length
+    lift, lower = starts[mavlink.PLUMBLINE_PHASE_LIFT], starts[mavlink.PLUMBLINE_PHASE_LOWER]
+
+    def smooth(s: np.ndarray) -> np.ndarray:
+        s = np.clip(s, 0.0, 1.0)
+        return 0.5 * (1.0 - np.cos(np.pi * s))
+
+    def desired(t: np.ndarray) -> np.ndarray:
+        p = path(np.clip(t - BEFORE_S, 0.0, duration_s)).copy()
+        p[:, 2] += altitude_m * (smooth((t - lift) / 3.0) - smooth((t - lower) / 2.0))
+        return p
+
+    def actual(t: np.ndarray) -> np.ndarray:
+        return desired(t) + (error(t - BEFORE_S) if error else 0.0)
+
+    def rates(f: Path3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        h = 1e-4
+        low, middle, high = f(time_s - h), f(time_s), f(time_s + h)
+        return middle, (high - low) / (2.0 * h), (high - 2.0 * middle + low) / (h * h)
+
+    d, dv, da = rates(desired)
+    a, av, _ = rates(actual)
+    held = np.isin(phase, (3, 4, 5, 6, 7))
+    return Flight(
+        time_s=time_s,
+        phase=phase,
+        desired=d,
+        desired_v=dv,
+        desired_a=da,
+        actual=a,
+        actual_v=av,
+        estimated=a.copy(),
+        q_cable=np.tile((0.0, 0.0, -1.0), (n, 1)),
+        tension=np.where(held, LOAD_KG * GRAVITY, 0.0),
+        slack_events=np.zeros(n, dtype=int),
+        taut=held.astype(int),
+        force=np.full((n, 4), 1.2),
+        command=np.full((n, 4), 1.2),
+        saturated=np.zeros(n, dtype=int),
+        quat=np.tile((1.0, 0.0, 0.0, 0.0), (n, 1)),
+        psi_r=np.zeros(n),
+        psi_q=np.zeros(n),
+        control_mode=np.where(phase == mavlink.PLUMBLINE_PHASE_DISARMED, 0, 3),
+    )
+
+
+def still(t: np.ndarray) -> np.ndarray:
+    """A path that stays where it is."""
+    return np.zeros((len(t), 3))
+
+
+def half_sine_step(height_m: float, rise_s: float) -> Path3:
+    """A step along y from rest to rest."""
+
+    def path(t: np.ndarray) -> np.ndarray:
+        p = np.zeros((len(t), 3))
+        p[:, 1] = 0.5 * height_m * (1.0 - np.cos(np.pi * np.clip(t / rise_s, 0.0, 1.0)))
+        return p
+
+    return path
+
+
+def case_b(seed: int = 1, duration_s: float = 50.0) -> Flight:
+    """A sine of 1 m and 3 s along y that grows and shrinks, with cable, attitude and rotors to match."""
+    edge = 0.45 * duration_s
+
+    def path(t: np.ndarray) -> np.ndarray:
+        rise = 0.5 * (1.0 - np.cos(np.pi * np.clip(t / edge, 0.0, 1.0)))
+        fall = 0.5 * (1.0 - np.cos(np.pi * np.clip((duration_s - t) / edge, 0.0, 1.0)))
+        p = np.zeros((len(t), 3))
+        p[:, 1] = rise * fall * np.sin(2.0 * np.pi * t / 3.0)
+        return p
+
+    rng = np.random.default_rng(seed)
+    waves = [(rng.uniform(0.3, 3.0), rng.uniform(0.0, 6.28), rng.normal(0.0, 1.5e-3, 3)) for _ in range(8)]
+
+    def error(t: np.ndarray) -> np.ndarray:
+        lag = path(np.clip(t - 0.006, 0.0, duration_s)) - path(np.clip(t, 0.0, duration_s))
+        lag[:, 2] = -40.0 * lag[:, 1] ** 2
+        return lag + sum(a * np.sin(w * t[:, None] + p) for w, p, a in waves)
+
+    made = flight(duration_s, path, error)
+    _fly_it(made, rng)
+    made.texts += [
+        (0.4, 6, "Armed"),
+        (0.5, 6, "Take-off: load to 1.5 m"),
+        (BEFORE_S, 6, "Mission item 2: load signals, 50.0 s, amplitude 1.00 m along y, period 3.00 s"),
+        (BEFORE_S + 0.5 * duration_s, 4, "Rotor 2 at its limit <b>&amp;"),
+        (BEFORE_S + duration_s, 6, "Mission complete"),
+        (BEFORE_S + duration_s + 4.0, 6, "Disarmed"),
+    ]
+    return made
+
+
+def _fly_it(made: Flight, rng: np.random.Generator) -> None:
+    """Cable, attitude, tension and rotor forces from the acceleration of the path, by differences."""
+    n = len(made.time_s)
+    g = np.array((0.0, 0.0, GRAVITY))
+    pull = LOAD_KG * (made.desired_a + g)
+    held = made.taut == 1
+    made.tension[held] = np.linalg.norm(pull, axis=1)[held]
+    made.q_cable = -pull / np.linalg.norm(pull, axis=1)[:, None]
+    accel = np.gradient(np.gradient(made.desired - CABLE_M * made.q_cable, TICK_S, axis=0), TICK_S, axis=0)
+    thrust = QUAD_KG * (accel + g) + made.tension[:, None] * -made.q_cable
+    roll = -np.arctan2(thrust[:, 1], thrust[:, 2]) + rng.normal(0.0, 2e-3, n)
+    pitch = np.arctan2(thrust[:, 0], thrust[:, 2]) + rng.normal(0.0, 2e-3, n)
+    made.quat = np.stack((np.cos(roll / 2), np.sin(roll / 2), np.sin(pitch / 2), np.zeros(n)), axis=1)
+    made.quat /= np.linalg.norm(made.quat, axis=1)[:, None]
+    smooth_roll = -np.arctan2(thrust[:, 1], thrust[:, 2])
+    moment = INERTIA[0] * np.gradient(np.gradient(smooth_roll, TICK_S), TICK_S)
+    total = np.linalg.norm(thrust, axis=1)
+    command = np.stack([total / 4] * 4, axis=1) + rng.normal(0.0, 0.09, (n, 4))
+    command[:, 1] -= np.clip(moment, -0.1, 0.1) / (2 * ARM_M)
+    command[:, 3] += np.clip(moment, -0.1, 0.1) / (2 * ARM_M)
+    flying = np.isin(made.phase, (2, 3, 4, 5, 6, 7, 8))
+    command[~flying] = 0.0
+    asked = command.copy()
+    made.command = np.clip(command, 0.0, ROTOR_MAX_N)
+    made.saturated = ((asked != made.command) * (1, 2, 4, 8)).sum(axis=1)
+    lagged = made.command.copy()
+    for i in range(1, n):
+        lagged[i] = lagged[i - 1] + (made.command[i] - lagged[i - 1]) * (1.0 - np.exp(-TICK_S / 0.02))
+    made.force = lagged
+    made.psi_q = 2e-4 * made.desired_a[:, 1] ** 2 + np.abs(rng.normal(0.0, 2e-4, n))
+    made.psi_r = 8e-4 * made.desired_a[:, 1] ** 2 + np.abs(rng.normal(0.0, 4e-4, n))
+    made.estimated = made.actual + rng.normal(0.0, 4e-4, (n, 3))

@@ -1,0 +1,123 @@
+"""The supervisor in a world that does as it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from autopilot.control.laws.interface import build_law
+from autopilot.geometry.linear import ZERO, Vec3, add, norm, sub
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
+from autopilot.services.records import Verdict
+from autopilot.services.requests import Arm, Takeoff
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.flight import Flight, MissionPlan, Phase, Settings, View, settings_from
+from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
+from autopilot.supervisor.requests import decide, with_plan
+from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.convert import Home
+from autopilot.wire.mission_items import encode_steps, located_steps
+from missions.model import Step
+
+ACCEPTED = ACCEPTANCE.result
+TABLE = autopilot_parameters(load_belief("bebop"))
+SETTINGS = settings_from(TABLE, build_law(TABLE).ramp_lag_s)
+STEP_US = 20_000
+LOAD_RADIUS, GEAR = 0.02, 0.06
+
+
+def view(now_us: int = 0, **changes: Any) -> View:
+    """A vehicle that stands beside its load, all well."""
+    seen = View(now_us, (0.1, 0.0, GEAR), ZERO, (0.0, 0.0, LOAD_RADIUS), ZERO, False, 0.0, ())
+    return seen._replace(**changes)
+
+
+def hanging(now_us: int = 0, x: Vec3 = (0.0, 0.0, 2.0), v: Vec3 = ZERO, **changes: Any) -> View:
+    """A load that hangs still under its vehicle, or moves along with it."""
+    over = (x[0], x[1], x[2] + SETTINGS.cable_length_m)
+    return View(now_us, over, v, x, v, True, 0.0, ())._replace(**changes)
+
+
+class Sky:
+    """Load and vehicle are where the present leg wants them; the ground and the cable are as they are."""
+
+    def __init__(self, *steps: Step, settings: Settings = SETTINGS) -> None:
+        items = encode_steps(steps, Home()) if steps else ()
+        located = located_steps(items, Home())
+        plan = MissionPlan(tuple(s.step for s in located), tuple(s.last for s in located), len(items))
+        self.flight = with_plan(Flight(), plan)
+        self.settings = settings
+        self.now_us = 0
+        self.view = view()
+        self.texts: list[str] = []
+        self.reached: list[int] = []
+        self.phases: list[Phase] = []
+        self.setpoints: list[tuple[float, int, Any]] = []  # time, control mode, jet
+
+    def ask(self, request: Any) -> Verdict:
+        self.flight, verdict = decide(self.flight, request, self.view, self.settings)
+        return verdict
+
+    def tick(self) -> None:
+        self.now_us += STEP_US
+        self.view = self._obey()
+        self.flight, report = advance(self.flight, self.view, self.settings)
+        self.texts += [text for _, text in report.texts]
+        self.reached += report.reached
+        if not self.phases or self.phases[-1] != self.flight.phase:
+            self.phases.append(self.flight.phase)
+        if self.flight.legs:
+            leg = self.flight.legs[0]
+            jet = leg.jet((self.now_us - self.flight.leg_start_us) * 1e-6)
+            self.setpoints.append((self.now_us * 1e-6, leg.control_mode, jet))
+
+    def run(self, until: Callable[[Sky], bool], limit_s: float = 300.0) -> None:
+        end = self.now_us + round(limit_s * 1e6)
+        while not until(self):
+            assert self.now_us < end, (self.flight.phase, self.flight.step, self.texts)
+            self.tick()
+
+    def wait(self, seconds: float) -> None:
+        end = self.now_us + round(seconds * 1e6)
+        self.run(lambda sky: sky.now_us >= end)
+
+    def airborne(self) -> Sky:
+        """Taken off by command to 2 m, holding."""
+        assert self.ask(Arm(True, False)).result == ACCEPTED
+        assert self.ask(Takeoff(2.0)).result == ACCEPTED
+        self.run(lambda sky: sky.flight.phase == Phase.HOLD)
+        self.wait(2.0)
+        return self
+
+    def _obey(self) -> View:
+        last, flight = self.view, self.flight
+        if not flight.legs:
+            return last._replace(now_us=self.now_us, v_quad=ZERO, v_load=ZERO)
+        leg = flight.legs[0]
+        jet = leg.jet((self.now_us - flight.leg_start_us) * 1e-6)
+        if leg.control_mode == LOAD_POSITION:
+            x, v = jet[0], jet[1]
+            if x[2] < LOAD_RADIUS:
+                x, v = (x[0], x[1], LOAD_RADIUS), ZERO
+            # the cable leans as the load's acceleration wants it to
+            a, L = jet[2], self.settings.cable_length_m
+            pull = (a[0], a[1], a[2] + self.settings.gravity_m_s2)
+            n = norm(pull)
+            over = (x[0] + L * pull[0] / n, x[1] + L * pull[1] / n, x[2] + L * pull[2] / n)
+            return View(self.now_us, over, v, x, v, True, 0.0, ())
+        if leg.control_mode == QUAD_POSITION:
+            x, v = jet[0], jet[1]
+            if x[2] < GEAR:
+                x, v = (x[0], x[1], GEAR), ZERO
+            taut = norm(sub(x, last.x_load)) >= self.settings.cable_length_m
+            return View(self.now_us, x, v, last.x_load, ZERO, taut, 0.0, ())
+        # an attitude is asked for: the pair drifts north at the speed it has
+        drift = (0.0, 0.3 * STEP_US * 1e-6, 0.0)
+        return last._replace(
+            now_us=self.now_us,
+            x_quad=add(last.x_quad, drift),
+            x_load=add(last.x_load, drift),
+            v_load=(0.0, 0.3, 0.0),
+            v_quad=(0.0, 0.3, 0.0),
+        )

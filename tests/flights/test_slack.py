@@ -1,0 +1,131 @@
+"""Slack cables: gently taut at take-off, caught in the air, and the stops that used to bring them about."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from autopilot.geometry.linear import ZERO, norm
+from autopilot.guidance.legs import CATCH_S, Catch, Hold
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.flight import Flight, Phase
+from autopilot.wire.dialect import plumbline as mavlink
+from missions.model import Delay, Land, Signals, Sine, Takeoff, Term
+from tests.doubles.craft import Craft, at_phase
+from tests.doubles.sky import SETTINGS, hanging
+
+PLUMBLINE = {"CTL_LAW": 2.0}
+HIGH = (Takeoff(5.0), Delay(60.0), Land())
+
+
+def snaps(craft: Craft, until, limit_s: float = 60.0) -> list[float]:
+    """Closing speeds (m/s) of every snap until something is the case."""
+    found = []
+    end = craft.onboard.now_us + round(limit_s * 1e6)
+    while not until(craft):
+        craft.tick()
+        assert craft.onboard.now_us < end, craft.texts
+        if craft.simulator._core.snap_speed > 1e-3:
+            found.append(craft.simulator._core.snap_speed)
+    return found
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("limit", [0.05, 0.25])
+def test_the_cable_comes_taut_no_faster_than_the_parameter_says(limit: float, seed: int) -> None:
+    craft = Craft(Takeoff(2.0), Delay(1.0), Land(), seed=seed, MIS_SNAP_SPEED=limit, **PLUMBLINE)
+    craft.begin()
+    found = snaps(craft, lambda c: c.flight.phase == Phase.MISSION)
+    # measured 0.051 and 0.151 m/s (the creep of MIS_TAUT_SPEED): the vehicle's climb varies by its noise
+    assert 0.0 < max(found) < min(limit, SETTINGS.taut_speed_m_s) + 0.02
+    assert snaps(craft, at_phase(Phase.DISARMED)) == [], "nor does landing snap"
+
+
+def kicked(sensors: str, speed: float) -> tuple[Craft, float]:
+    """A load that hangs at 5 m is struck upwards; the craft when it is held again, and the hardest snap."""
+    craft = Craft(*HIGH, sensors=sensors, **PLUMBLINE)
+    craft.begin()
+    craft.run(at_phase(Phase.MISSION))
+    craft.wait(2.0)
+    core = craft.simulator._core
+    up = core.state.v_load[2] + speed
+    core.state = core.state._replace(v_load=(0.0, 0.0, up), taut=0.0)
+    end = craft.onboard.now_us + 6_000_000
+    hardest = max(snaps(craft, lambda c: c.onboard.now_us >= end))
+    return craft, hardest
+
+
+# measured with the catch: 1.01, 1.33 and 1.88 m/s; without it 2.9 and 2.3 m/s, and the last flight is lost
+CAUGHT = [("ideal", 2.0, 1.3), ("lab", 2.0, 1.7), ("lab", 3.0, 2.3)]
+
+
+@pytest.mark.parametrize(("sensors", "speed", "most"), CAUGHT)
+def test_a_load_that_flies_free_is_caught(sensors: str, speed: float, most: float) -> None:
+    craft, hardest = kicked(sensors, speed)
+    assert "Load caught" in craft.texts
+    assert not any("again" in text or "ground" in text for text in craft.texts)
+    assert hardest < most
+    assert craft.flight.phase == Phase.MISSION
+    craft.run(lambda c: c.flight.phase == Phase.MISSION and norm(c.truth.v_load) < 0.02, 20.0)
+    assert craft.truth.x_load[2] > 2.0  # measured 3.0 m
+
+
+def test_falling_with_the_load_closes_at_the_speed_asked_or_as_the_gap_needs() -> None:
+    catch = Catch(ZERO, 0.7, 0.2)
+    below = (0.0, 0.0, -0.69)
+    _, v, a, *_ = catch.meeting(ZERO, (1.0, 0.0, 3.0), below, (0.0, 0.0, -2.0), 9.81)
+    assert v == pytest.approx((1.0, 0.0, -2.0 + 0.2))
+    assert a == (0.0, 0.0, -9.81)
+    near = (0.0, 0.0, -0.4)
+    _, v, *_ = catch.meeting(ZERO, ZERO, near, (0.0, 0.0, -2.0), 9.81)
+    assert v[2] == pytest.approx(-2.0 + 0.3 / CATCH_S)
+
+
+EIGHT = Signals(
+    12.0,
+    (
+        Term("y", 1.0, 0.0, 3.0, 6.0, 3.0, (Sine(3.0),)),
+        Term("z", 0.15, 0.0, 3.0, 6.0, 3.0, (Sine(1.5),)),
+    ),
+)
+
+
+@pytest.mark.parametrize("after_s", [5.0, 5.4, 5.8])
+def test_a_hold_in_full_flight_stops_along_the_path(after_s: float) -> None:
+    craft = Craft(Takeoff(2.0), EIGHT, Land(), **PLUMBLINE)
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    craft.wait(after_s)
+    fast = norm(craft.truth.v_load)
+    assert craft.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0.0) == 0
+    worst, jet = 0.0, None
+    while len(craft.flight.legs) > 1 or norm(jet[1]) > 0.0:
+        craft.tick()
+        assert craft.flight.phase == Phase.HOLD, craft.texts
+        jet = craft.flight.legs[0].jet((craft.onboard.now_us - craft.flight.leg_start_us) * 1e-6)
+        worst = max(worst, math.dist(jet[0], craft.truth.x_load))
+    assert fast > 0.5
+    # measured 19 mm over the same stops in Case C; as it was, 6.7 m/s was asked for, and the flight was lost
+    assert worst < 0.04
+
+
+def test_a_load_on_the_ground_is_no_slack_to_catch() -> None:
+    craft = Craft(Takeoff(2.0), Delay(1.0), Land(), **PLUMBLINE)
+    craft.begin()
+    craft.run(at_phase(Phase.DISARMED), 60.0)
+    assert not any("slack" in text.lower() for text in craft.texts)
+
+
+def test_noise_alone_starts_no_catch() -> None:
+    """No pull for a moment, and the length that it had: what a gust or a jolt of thrust feigns."""
+    flight = Flight(phase=Phase.HOLD, legs=(Hold((0.0, 0.0, 2.0)),), taut_length_m=0.7)
+    for k in range(50):
+        seen = hanging(k * 4000)._replace(pull_n=-1.0)
+        flight, _ = advance(flight, seen, SETTINGS)
+    assert isinstance(flight.legs[0], Hold)
+    flight = replace(flight, taut_length_m=0.75)  # now there is a gap as well
+    for k in range(50, 60):
+        flight, _ = advance(flight, hanging(k * 4000)._replace(pull_n=-1.0), SETTINGS)
+    assert isinstance(flight.legs[0], Catch)

@@ -1,0 +1,91 @@
+"""Tracks from frames."""
+
+import io
+import struct
+
+import numpy as np
+import pytest
+
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.tlog import read_tlog
+from gcs.analysis.telemetry import load_telemetry, telemetry_of
+from tests.doubles import recorded_flights as flights
+from tests.gcs import tolerances
+
+BOOT_US = 1_767_225_600_000_000
+
+
+@pytest.fixture(scope="module")
+def made():
+    def path(t):
+        return np.stack((0.1 * t, -0.2 * t, 0.3 * np.sin(t)), axis=1)
+
+    flight = flights.flight(4.0, path, lambda t: np.full((len(t), 3), (0.01, 0.02, 0.03)))
+    flight.quat[:] = (np.cos(0.1), np.sin(0.1), 0.0, 0.0)  # rolled by 0.2 rad
+    flight.psi_r[:] = np.linspace(0.0, 1.0, len(flight.psi_r))
+    flight.texts += [(1.0, 6, "short"), (2.0, 4, "long " * 25)]
+    return flight
+
+
+@pytest.fixture(scope="module")
+def telemetry(made, tmp_path_factory):
+    return load_telemetry(made.write(tmp_path_factory.mktemp("log") / "flight.tlog"))
+
+
+def test_what_was_sent_comes_back_in_enu_and_flu(made, telemetry):
+    t = made.time_s
+    for track in (telemetry.load_truth, telemetry.load_estimated, telemetry.setpoint, telemetry.cascade):
+        assert np.abs(track.time_s - t).max() <= tolerances.STAMP_S
+    close = {"rtol": 0.0, "atol": tolerances.WIRE_M}
+    np.testing.assert_allclose(telemetry.load_truth.position_m, made.actual, **close)
+    np.testing.assert_allclose(telemetry.load_truth.velocity_m_s, made.actual_v, **close)
+    np.testing.assert_allclose(telemetry.load_truth.q_cable, made.q_cable, **close)
+    np.testing.assert_allclose(telemetry.setpoint.position_m, made.desired, **close)
+    np.testing.assert_allclose(telemetry.cascade.e_x, made.actual - made.desired, **close)
+    np.testing.assert_allclose(telemetry.cascade.psi_R, made.psi_r, **close)
+    np.testing.assert_allclose(telemetry.attitude_truth.quat_wxyz, made.quat, **close)
+    np.testing.assert_allclose(telemetry.rotors_truth.force_n, made.force, **close)
+    assert (telemetry.setpoint.phase == made.phase).all()
+
+
+def test_other_systems_are_left_out(telemetry):
+    # the load, a system of its own, says that it turns with 9 rad/s, and the ground station has a heart too
+    assert np.abs(telemetry.attitude_estimated.omega_body).max() == 0.0
+    assert (telemetry.heartbeat.custom_mode == 0).all()
+    assert (telemetry.heartbeat.base_mode == 128).all()
+
+
+def test_what_bears_no_stamp_is_put_on_the_vehicles_clock(made, telemetry):
+    assert [text.text for text in telemetry.texts] == ["short", "long " * 25]
+    assert [text.severity for text in telemetry.texts] == [6, 4]
+    assert [text.time_s for text in telemetry.texts] == pytest.approx([1.0, 2.0], abs=tolerances.STAMP_S)
+    assert telemetry.mission_current.time_s[:2] == pytest.approx([0.0, 1.0], abs=tolerances.STAMP_S)
+
+
+def test_late_doubled_and_reordered_records_give_the_same_tracks(made, telemetry):
+    rng = np.random.default_rng(1)
+    records = [(us, decode(frame)[0][0]) for us, frame in made.records()]
+    records += records[::7]
+    shuffled = [records[i] for i in rng.permutation(len(records))]
+    again = telemetry_of(shuffled)
+    np.testing.assert_array_equal(again.load_truth.time_s, telemetry.load_truth.time_s)
+    np.testing.assert_array_equal(again.setpoint.position_m, telemetry.setpoint.position_m)
+    np.testing.assert_array_equal(again.rotors_commanded.force_n, telemetry.rotors_commanded.force_n)
+
+
+@pytest.mark.parametrize("cut", [0, 1, 7, 8, 20, 1000, 100_003])
+def test_a_log_may_end_anywhere(made, cut):
+    found = telemetry_of(read_tlog(io.BytesIO(made.tlog()[:cut])))
+    whole = made.time_s
+    assert len(found.load_truth.time_s) <= len(whole)
+    np.testing.assert_allclose(found.load_truth.time_s, whole[: len(found.load_truth.time_s)])
+
+
+def test_a_log_without_plumblines_own_messages_gives_empty_tracks():
+    frame = FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 4, 3))
+    found = telemetry_of(read_tlog(io.BytesIO(struct.pack(">Q", BOOT_US + 5) + frame)))
+    assert found.span_s is None
+    assert found.load_truth.position_m.shape == (0, 3)
+    assert found.rotors_commanded.force_n.shape == (0, 4)
+    assert found.heartbeat.time_s.tolist() == [0.0]

@@ -1,0 +1,34 @@
+"""Synthetic flights of the report tests, dressed as experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from gcs.analysis.record import FlightMeta
+from gcs.experiments.flown import Flown, flown_of
+from gcs.experiments.plan import Experiment
+from tests.doubles import recorded_flights
+
+
+@pytest.fixture(scope="session")
+def step_flight() -> Callable[..., Flown]:
+    """A step of 0.25 m along y with a swing that dies out behind it, or runs away."""
+
+    def fly(experiment: Experiment, runs_away: bool = False) -> Flown:
+        def error(t: np.ndarray) -> np.ndarray:
+            after = np.clip(t - 0.4, 0.0, None)
+            e = np.zeros((len(t), 3))
+            growth = 1.5 if runs_away else -1.5
+            e[:, 1] = 0.05 * np.sin(6.0 * after) * np.exp(growth * after) * (after > 0.0)
+            return e
+
+        made = recorded_flights.flight(7.0, recorded_flights.half_sine_step(0.25, 0.78), error)
+        meta = FlightMeta(
+            mission=experiment.case, law=experiment.law, vehicle=experiment.vehicle, outcome="completed"
+        )
+        return flown_of(made.telemetry(), experiment, meta)
+
+    return fly

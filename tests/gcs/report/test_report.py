@@ -1,0 +1,314 @@
+"""The files of a report."""
+
+import io
+import json
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from pyarrow import parquet
+from rich.console import Console
+
+from gcs.analysis.record import KEYS, FlightMeta, jsonable
+from gcs.analysis.telemetry import load_telemetry
+from gcs.report import style
+from gcs.report.build import ReportError, build_report, load_meta
+from gcs.report.plots import PICTURES
+from gcs.report.table import record_table
+from gcs.report.track import snapshots
+from tests.doubles import recorded_flights as flights
+
+META = FlightMeta(
+    mission="case-b",
+    title="Case <B> & more",
+    law="thesis",
+    sensors="lab",
+    vehicle="bebop",
+    seed=7,
+    wall_s=2.0,
+    command="gcs fly case-b --seed 7 --set SIM_WIND_E=2",
+    settings={"SIM_WIND_E": 2.0},
+    version="0.1.0",
+)
+FILES = {"meta.json", "summary.json", "flight.parquet", "report.html", *(p.file for p in PICTURES)}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """(directory, record, progress) of a short Case B."""
+    out = tmp_path_factory.mktemp("report")
+    told = []
+    tlog = flights.case_b(duration_s=12.0).write(out / "flight.tlog")
+    record = build_report(tlog, out, META, lambda *step: told.append(step))
+    return out, record, told
+
+
+def strict(text):
+    """JSON as the standard has it: no NaN, no Infinity."""
+
+    def refuse(constant):
+        raise AssertionError(constant)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_all_files_are_there(built):
+    out, _, _ = built
+    assert {path.name for path in out.iterdir()} == FILES | {"flight.tlog"}
+
+
+def test_the_record_has_every_key_in_order(built):
+    out, record, _ = built
+    assert list(record) == [*(key.name for key in KEYS), "report_dir"]
+    assert strict((out / "summary.json").read_text()) == record
+    assert record["outcome"] == "completed"
+    assert record["report_dir"] == str(out)
+    assert record["mission"] == "case-b"
+    assert record["seed"] == 7
+    assert record["real_time_factor"] == pytest.approx(record["recorded_s"] / 2.0)
+
+
+def test_progress_counts_up_to_the_end(built):
+    _, _, told = built
+    done, totals, texts = zip(*told, strict=True)
+    assert list(done) == list(range(totals[0] + 1))
+    assert set(totals) == {len(PICTURES) + 3}
+    assert texts[-1] == "done"
+
+
+def test_the_same_log_gives_the_same_report(built, tmp_path):
+    out, record, _ = built
+    # meta.json lies beside the log: it is read when nothing is passed
+    again = build_report(out / "flight.tlog", tmp_path)
+    assert again == {**record, "report_dir": str(tmp_path)}
+    for name in FILES - {"summary.json", "flight.parquet"}:
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
+    assert parquet.read_table(tmp_path / "flight.parquet").equals(
+        parquet.read_table(out / "flight.parquet"), check_metadata=True
+    )
+
+
+@pytest.mark.parametrize("file", [picture.file for picture in PICTURES])
+def test_pictures_show_something(built, file):
+    out, _, _ = built
+    with Image.open(out / file) as image:
+        pixels = np.asarray(image.convert("RGB"), dtype=np.float64)
+        assert "Software" not in image.info
+    height, width, _ = pixels.shape
+    assert width >= 1000
+    assert height >= 400
+    assert pixels.std() > 10.0
+    # something in each quarter, so nothing was drawn out of the picture
+    for rows in (slice(0, height // 2), slice(height // 2, None)):
+        for columns in (slice(0, width // 2), slice(width // 2, None)):
+            assert pixels[rows, columns].std() > 3.0
+
+
+class Page(HTMLParser):
+    """References, texts and unclosed elements of a page."""
+
+    VOID = frozenset(("meta", "img", "br", "link", "input", "hr"))
+
+    def __init__(self):
+        super().__init__()
+        self.references, self.open, self.text = [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.references += [v for k, v in attributes if k in ("src", "href", "srcset", "data", "action")]
+        assert tag not in ("script", "link", "iframe", "object")
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def page(built):
+    parser = Page()
+    parser.feed((built[0] / "report.html").read_text())
+    return parser
+
+
+def test_the_page_asks_for_nothing_from_elsewhere(built, page):
+    source = (built[0] / "report.html").read_text()
+    assert page.open == []
+    assert len(page.references) == len(PICTURES)
+    assert all(reference.startswith("data:image/png;base64,") for reference in page.references)
+    without_data = re.sub(r"data:image/png;base64,[A-Za-z0-9+/=]+", "", source)
+    assert "url(" not in without_data
+    assert "@import" not in without_data
+    assert "://" not in without_data
+
+
+def test_the_page_says_what_matters_and_escapes_what_it_was_given(page):
+    text = " ".join(page.text)
+    for part in (META.title, META.command, "completed", "SIM_WIND_E", "Rotor 2 at its limit <b>&amp;"):
+        assert part in text
+    for key in KEYS:
+        assert key.label in text
+
+
+def test_parquet_has_units_phases_and_the_record(built):
+    out, record, _ = built
+    table = parquet.read_table(out / "flight.parquet")
+    columns = set(table.column_names)
+    telemetry = load_telemetry(out / "flight.tlog")
+    assert table.num_rows == len(telemetry.load_truth.time_s)
+    assert {"time_s", "phase", "load_true_x_m", "load_desired_z_m", "rotor_command_4_n", "psi_R"} <= columns
+    error = table["load_error_y_m"].to_numpy()
+    np.testing.assert_array_equal(
+        error, table["load_true_y_m"].to_numpy() - table["load_asked_y_m"].to_numpy()
+    )
+    inside = table["in_mission"].to_numpy(zero_copy_only=False)
+    norm = np.linalg.norm([table[f"load_error_{axis}_m"].to_numpy()[inside] for axis in "xyz"], axis=0)
+    assert norm.max() == pytest.approx(record["load_error_max_m"])
+    assert set(table["phase"].to_pylist()) >= {"hold", "mission", "lower"}
+    about = strict(table.schema.metadata[b"plumbline"])
+    assert about["record"]["load_error_max_m"] == record["load_error_max_m"]
+    assert about["settings"] == META.settings
+
+
+def test_the_table_shows_what_is_known(built):
+    _, record, _ = built
+    console = Console(width=100, record=True, file=io.StringIO())
+    console.print(record_table({**record, "mission": "[red]odd[/red]"}))
+    text = console.export_text()
+    assert "completed" in text
+    assert "Step response" not in text
+    assert "[red]odd[/red]" in text
+    assert f"{1e3 * record['load_error_max_m']:.1f} mm" in text
+
+
+# --- logs that are not whole ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("content", [b"", b"no telemetry at all, but a text" * 9])
+def test_a_log_without_a_flight_gives_a_report(tmp_path, content):
+    (tmp_path / "flight.tlog").write_bytes(content)
+    record = build_report(tmp_path / "flight.tlog", tmp_path)
+    assert record["outcome"] == "no telemetry"
+    assert record["load_error_max_m"] is None
+    assert {path.name for path in tmp_path.iterdir()} == FILES | {"flight.tlog"}
+    assert strict((tmp_path / "summary.json").read_text()) == record
+
+
+def test_a_flight_that_is_lost_gives_a_report(tmp_path):
+    flight = flights.case_b(duration_s=6.0)
+    lost = np.flatnonzero(flight.mission)[300:]
+    for column in (flight.actual, flight.quat, flight.q_cable, flight.tension, flight.force, flight.psi_r):
+        column[lost] = np.nan
+    flight.actual[lost[0]] = (np.inf, -np.inf, 1e30)
+    flight.actual_v[lost] = np.inf
+    flight.desired[lost[9]] = np.nan
+    flight.phase[lost[5] :] = 9
+    flight.tension[lost[0]] = np.inf
+    path = flight.write(tmp_path / "flight.tlog")
+    path.write_bytes(path.read_bytes()[:-11])  # and the last record is torn
+    record = build_report(path, tmp_path, FlightMeta(outcome="diverged", reason="no finite state"))
+    assert record["outcome"] == "diverged"
+    text = (tmp_path / "summary.json").read_text()
+    assert strict(text) == record
+    assert all(math.isfinite(v) for v in record.values() if isinstance(v, float))
+    assert record["load_error_rms_m"] is not None
+    assert "no finite state" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize("silent", ["load_setpoint", "load_state", "hil_state_quaternion", "rotor_state"])
+def test_a_message_that_never_came_gives_a_report(tmp_path, silent):
+    flight = flights.flight(1.0, flights.still)
+    flight.drop = lambda i, kind: kind == silent
+    record = build_report(flight.write(tmp_path / "flight.tlog"), tmp_path)
+    missing = {
+        "load_setpoint": "load_error_max_m",
+        "load_state": "load_error_max_m",
+        "hil_state_quaternion": "tilt_max_deg",
+        "rotor_state": "saturated_fraction",
+    }
+    assert record[missing[silent]] is None
+    assert (tmp_path / "report.html").is_file()
+
+
+# --- what is beside the log ----------------------------------------------------------------------
+
+
+def test_meta_goes_to_a_file_and_back(tmp_path):
+    path = tmp_path / "meta.json"
+    path.write_text(json.dumps({**META.to_json(), "of_a_later_version": 1}))
+    assert load_meta(path) == META
+    assert load_meta(tmp_path / "none.json") == FlightMeta()
+
+
+@pytest.mark.parametrize("content", ['{"mission": ', "[1, 2]", '"text"'])
+def test_a_broken_meta_file_is_one_clear_line(tmp_path, content):
+    path = tmp_path / "meta.json"
+    path.write_text(content)
+    with pytest.raises(ReportError, match=r"meta\.json: .*must be") as caught:
+        load_meta(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_log_that_is_not_there_is_one_clear_line(tmp_path):
+    with pytest.raises(ReportError, match=r"none\.tlog: no such file"):
+        build_report(tmp_path / "none.tlog", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_json_knows_no_nan():
+    found = jsonable(
+        {"a": math.nan, "b": [math.inf, 1.0], "c": {"d": -math.inf, "e": "x"}, "f": 1, "g": True}
+    )
+    assert found == {"a": None, "b": [None, 1.0], "c": {"d": None, "e": "x"}, "f": 1, "g": True}
+
+
+def test_the_manual_names_every_file_key_and_column(built):
+    out, record, _ = built
+    manual = (Path(__file__).parents[3] / "docs" / "report.md").read_text()
+    for name in (*FILES, "flight.tlog", *record):
+        assert f"`{name}`" in manual, name
+    for name in parquet.read_schema(out / "flight.parquet").names:
+        # columns of one family are listed as load_true_*_m
+        family = re.sub(r"^(.*)_(x|y|z|[1-4]|w|roll|pitch|yaw|phi|theta)(?=_|$)", r"\1_*", name)
+        assert f"`{name}`" in manual or f"`{family}`" in manual, name
+
+
+# --- drawing -------------------------------------------------------------------------------------
+
+
+def test_thinned_lines_keep_every_peak():
+    t = np.arange(100_000) * 0.01
+    v = np.zeros(100_000)
+    v[[3, 50_001, 99_000]] = (5.0, -7.0, 9.0)
+    v[70_000:70_100] = np.nan
+    thin_t, thin_v = style.thinned(t, v)
+    assert len(thin_t) < 5000
+    assert (np.diff(thin_t) >= 0.0).all()
+    for value, at in ((5.0, 0.03), (-7.0, 500.01), (9.0, 990.0)):
+        assert thin_t[thin_v == value] == pytest.approx(at)
+
+
+def test_phase_spans_meet():
+    t = np.arange(6) * 1.0
+    spans = style.phase_spans(t, np.array((4, 4, 5, 5, 5, 7)))
+    assert spans == [(0.0, 2.0, 4), (2.0, 5.0, 5), (5.0, 5.0, 7)]
+    assert style.phase_spans(t[:0], np.zeros(0, dtype=int)) == []
+
+
+def test_flags_become_spans_that_can_be_seen():
+    t = np.arange(6) * 1.0
+    assert style.true_spans(t, np.array((0, 1, 1, 0, 0, 1)) == 1, 0.5) == [(1.0, 2.0), (5.0, 0.5)]
+    assert style.true_spans(t[:0], np.zeros(0, dtype=bool), 0.5) == []
+
+
+def test_snapshots_stand_apart():
+    path = np.stack((np.linspace(0.0, 1.0, 101), np.zeros(101), np.zeros(101)), axis=1)
+    assert sorted(snapshots(path, 0.2)) == [0, 25, 50, 75, 100]
+    assert snapshots(path[:1], 0.2) == [0]
+    assert snapshots(path[:0], 0.2) == []

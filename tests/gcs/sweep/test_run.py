@@ -1,0 +1,171 @@
+"""A sweep from plan to table and report: whole, stopped, killed, gone on with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+
+from gcs.cli import gcs
+from gcs.sweep import pool, run
+from gcs.sweep.plan import SweepPlan, load_plan
+from gcs.sweep.report import write_report
+from gcs.sweep.results import cells, flights_of, reach
+from gcs.sweep.store import Store, columns
+from tests.gcs.sweep.conftest import AtOnce
+
+
+def swept(plan: SweepPlan, directory: Path, stopped: object = False) -> run.Swept:
+    workers = nullcontext((AtOnce(), 1))
+    return run.sweep(plan, directory, "gcs sweep", "1", workers, stopped, quiet=True, fresh=False)
+
+
+class AfterOne:
+    """False until something was flown."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def __bool__(self) -> bool:
+        self.asked += 1
+        return self.asked > 1
+
+
+def without_clock(path: Path) -> list[dict[str, Any]]:
+    table = pq.read_table(path / "flights.parquet")
+    # repr: NaN is not equal to itself
+    return [{k: repr(v) for k, v in row.items() if k != "wall_s"} for row in table.to_pylist()]
+
+
+@pytest.fixture(scope="module")
+def whole(short: str, tmp_path_factory: pytest.TempPathFactory) -> tuple[SweepPlan, Path, run.Swept]:
+    from gcs.sweep.plan import Varied
+
+    delays = Varied("SIM_ACT_DELAY_MS", (0.0, 4.0, 60.0), True)
+    plan = SweepPlan(short, "bebop", "lab", ("thesis",), (1, 2), (delays,), ())
+    directory = tmp_path_factory.mktemp("whole")
+    return plan, directory, swept(plan, directory)
+
+
+def test_table_has_a_row_for_each_flight(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+    plan, directory, done = whole
+    assert (done.flights, done.flown, done.completed, done.whole) == (6, 6, 4, True)
+    table = pq.read_table(directory / "flights.parquet")
+    assert tuple(table.column_names) == columns(plan)
+    assert table.column("index").to_pylist() == list(range(6))
+    assert table.column("SIM_ACT_DELAY_MS").to_pylist() == [0.0, 0.0, 4.0, 4.0, 60.0, 60.0]
+    assert table.column("outcome").to_pylist() == ["completed"] * 4 + ["diverged"] * 2
+    assert all(table.column("reason").to_pylist()[4:]) and all(table.column("lost_phase").to_pylist()[4:])
+    errors = table.column("load_error_max_m").to_pylist()[:4]
+    assert all(0.001 < error < 0.3 for error in errors)
+    assert not (directory / "parts").exists()
+    assert load_plan(directory) == plan
+
+
+def test_a_sweep_that_was_stopped_goes_on(
+    whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, complete, _ = whole
+    monkeypatch.setattr(pool, "BATCH", 1)
+    first = swept(plan, tmp_path, AfterOne())
+    assert not first.whole and 0 < first.flights < 6
+    rest = swept(plan, tmp_path)
+    assert rest.whole and rest.flown == 6 - first.flights
+    assert without_clock(tmp_path) == without_clock(complete)
+    assert swept(plan, tmp_path).flown == 0
+
+
+def test_a_sweep_that_was_killed_goes_on(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
+    plan, complete, _ = whole
+    rows = pq.read_table(complete / "flights.parquet").to_pylist()
+    store = Store(tmp_path, plan)
+    store.add(rows[:2])
+    store.merge()
+    # killed after merging, before the parts were taken away; and while a part was being written
+    store.add(rows[1:3])
+    (tmp_path / "parts" / "000000005-1.99.unfinished").write_bytes(b"PAR1")
+    assert store.done() == {0, 1, 2}
+    done = swept(plan, tmp_path)
+    assert (done.flights, done.flown) == (6, 3)
+    assert without_clock(tmp_path) == without_clock(complete)
+
+
+def test_report_holds_map_curve_and_margin(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+    plan, directory, _ = whole
+    page = write_report(directory, plan).read_text(encoding="utf-8")
+    assert (directory / "curve-sim_act_delay_ms.png").stat().st_size > 5000
+    assert "SIM_ACT_DELAY_MS" in page and "0 … 4" in page and "data:image/png" in page
+
+
+def test_shares_and_reach(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+    plan, directory, _ = whole
+    (flights,) = flights_of(Store(directory, plan).read(), plan)
+    found = cells(flights, plan, ("SIM_ACT_DELAY_MS",))
+    assert found.success.tolist() == [1.0, 1.0, 0.0]
+    assert found.flown.tolist() == [2.0, 2.0, 2.0]
+    assert found.error_worst_m[0] >= found.error_median_m[0] > 0.0
+    assert found.error_worst_m[2] != found.error_worst_m[2]
+    reached = reach(flights, plan, "SIM_ACT_DELAY_MS", 0.0)
+    assert (reached.all_from, reached.all_to) == (reached.some_from, reached.some_to) == (0.0, 4.0)
+
+
+def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
+    arguments = [
+        "sweep",
+        short,
+        "--law",
+        "thesis",
+        "--seeds",
+        "2",
+        "--jobs",
+        "1",
+        "--out",
+        str(tmp_path),
+        "--json",
+    ]
+    result = CliRunner().invoke(gcs, [*arguments, "--json"], prog_name="gcs")
+    assert result.exit_code == 0, result.output
+    record = json.loads(result.stdout)
+    assert (record["flights"], record["completed"], record["failed"]) == (2, 2, 0)
+    assert record["out"] == str(tmp_path) and record["flights_per_s"] > 0.0
+    assert (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--vary", "SIM_WIND=1,2"], "SIM_WIND: no such parameter"),
+        (["--vary", "SIM_WIND_E=0:999:3"], "SIM_WIND_E"),
+        (["--jobs", "2", "--scheduler", "tcp://nowhere:1"], "--jobs"),
+        (["--sample", "5"], "--vary"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_code_2(short: str, arguments: list[str], says: str) -> None:
+    result = CliRunner().invoke(gcs, ["sweep", short, *arguments], prog_name="gcs")
+    assert result.exit_code == 2
+    assert says in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    plan, complete, _ = whole
+
+    @contextmanager
+    def cluster() -> Iterator[Any]:
+        with (
+            distributed.LocalCluster(
+                n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+            ) as local,
+            pool.dask_cluster(local.scheduler_address) as workers,
+        ):
+            yield workers
+
+    done = run.sweep(plan, tmp_path, "gcs sweep", "1", cluster(), False, quiet=True, fresh=False)
+    assert done.whole and done.flown == 6
+    assert without_clock(tmp_path) == without_clock(complete)

@@ -1,0 +1,354 @@
+"""The autopilot as a machine of datagrams: ticks, repeats, rubbish, rates, parameters, uploads."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from autopilot.onboard.onboard import Onboard
+from autopilot.services.mission_store import StoredMission
+from autopilot.supervisor.flight import Phase
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert import Home, hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
+from autopilot.wire.convert.geodesy import geodetic_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.mission_items import WireItem, located_steps
+from gcs.closed_loop import Conditions, build_onboard
+from missions.model import Delay, Land, ReturnHome, Takeoff, Waypoint
+from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
+from tests.doubles.motion import TICK_S
+
+DENIED = mavlink.MAV_RESULT_DENIED
+TICK_US = round(TICK_S * 1e6)
+WRITER = FrameWriter(1, 26)
+
+
+def onboard(**settings_: float) -> Onboard:
+    autopilot = build_onboard(Conditions(settings=settings_), Home())
+    autopilot.add_link(GCS)
+    return autopilot
+
+
+def sensors(time_us: int, accel: tuple[float, float, float] = (0.0, 0.0, 9.81)) -> bytes:
+    """A datagram of HIL_SENSOR alone."""
+    message = hil_sensor_message(time_us, accel, (0.0, 0.0, 0.0), (0.2, 0.0, -0.4), 101_325.0, 0.0, 20.0, 63)
+    return WRITER.frame(message)
+
+
+def controls(answer: bytes | None) -> Any:
+    assert answer is not None
+    return read_hil_actuator_controls(decode(answer)[0][0].message)
+
+
+def test_the_helper_says_what_a_simulator_says() -> None:
+    assert read_hil_sensor(decode(sensors(4000))[0][0].message).accel_body == pytest.approx(
+        (0.0, 0.0, 9.81), abs=1e-5
+    )
+
+
+def test_a_new_tick_is_answered_with_its_own_time() -> None:
+    autopilot = onboard()
+    for time_us in (0, 4000, 8000):
+        assert controls(autopilot.receive_sensors(sensors(time_us))).time_us == time_us
+        assert autopilot.now_us == time_us
+    assert autopilot.tick == 2
+
+
+def test_a_repeated_tick_gets_the_same_bytes_and_no_second_step() -> None:
+    autopilot = onboard()
+    autopilot.receive_sensors(sensors(0))
+    first = autopilot.receive_sensors(sensors(4000))
+    state = autopilot._state
+    assert autopilot.receive_sensors(sensors(4000, (5.0, 5.0, 5.0))) == first
+    assert autopilot._state is state
+    assert autopilot.tick == 1
+
+
+def test_a_tick_of_the_past_is_ignored_and_counted() -> None:
+    autopilot = onboard()
+    for time_us in (0, 4000, 8000):
+        autopilot.receive_sensors(sensors(time_us))
+    assert autopilot.receive_sensors(sensors(4000)) is None
+    assert (autopilot.out_of_time, autopilot.now_us, autopilot.tick) == (1, 8000, 2)
+    autopilot.receive_sensors(sensors(12_000))
+    assert autopilot.out_of_time == 0
+
+
+def test_a_tick_from_far_ahead_does_not_carry_the_clock_away() -> None:
+    autopilot = onboard()
+    autopilot.receive_sensors(sensors(0))
+    assert autopilot.receive_sensors(sensors(2**60)) is None
+    assert autopilot.out_of_time == 1
+    assert controls(autopilot.receive_sensors(sensors(4000))).time_us == 4000
+
+
+@settings(max_examples=60)
+@given(rubbish=st.binary(max_size=300))
+def test_any_bytes_at_all_are_survived_on_both_links(rubbish: bytes) -> None:
+    autopilot = onboard()
+    autopilot.receive_sensors(sensors(0))
+    assert autopilot.receive_sensors(rubbish) is None
+    autopilot.receive_ground(rubbish, GCS)
+    assert controls(autopilot.receive_sensors(sensors(4000))).time_us == 4000
+    autopilot.ground_datagrams()
+
+
+@settings(max_examples=60)
+@given(at=st.integers(0, 400), to=st.integers(0, 255), cut=st.integers(0, 400))
+def test_damaged_datagrams_are_survived(at: int, to: int, cut: int) -> None:
+    whole = bytearray(Craft().simulator.sensor_datagram())
+    whole[at % len(whole)] = to
+    autopilot = onboard()
+    autopilot.receive_sensors(bytes(whole[: len(whole) - cut % len(whole)]))
+    assert autopilot.receive_sensors(sensors(4000)) is not None
+
+
+def test_other_messages_are_no_tick() -> None:
+    autopilot = onboard()
+    heartbeat = WRITER.frame(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3))
+    assert autopilot.receive_sensors(heartbeat) is None
+    assert autopilot.tick == -1
+
+
+# ---- rates
+
+
+def test_a_control_rate_that_does_not_fit_is_said_with_both_rates_and_nothing_arms() -> None:
+    craft = Craft(CTL_RATE_HZ=400.0)
+    craft.wait(0.5)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == DENIED
+    assert any("400 Hz" in text for text in craft.texts), craft.texts
+    assert any("250 Hz" in text for text in craft.texts), craft.texts
+    assert controls(craft.answers[-1]).forces == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_tick_lost_at_the_start_does_not_change_what_the_sensor_rate_is() -> None:
+    autopilot = onboard()
+    for k in (0, 3, 4, 5):
+        autopilot.receive_sensors(sensors(k * TICK_US))
+    assert autopilot.fault == ""
+
+
+def test_half_the_control_rate_flies() -> None:
+    craft = Craft(Takeoff(1.0), Delay(1.0), Land(), CTL_RATE_HZ=125.0)
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.LOWER)
+    assert "Flight given up" not in " ".join(craft.texts)
+    forces = [controls(answer).forces for answer in craft.answers[-400:]]
+    changes = [a != b for a, b in pairwise(forces)]
+    assert sum(changes) in (199, 200), "a new command on every second tick"
+    assert craft.worst_error < 0.02
+
+
+def test_lost_ticks_and_a_sample_that_is_no_number_do_not_end_a_flight() -> None:
+    """In real time the world goes on without an answer."""
+    craft = Craft(Takeoff(1.0), Delay(3.0), Land())
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    for k in range(500):
+        if k % 50 in (10, 11):
+            craft.simulator.advance()  # this tick's datagram is lost
+        elif k % 50 == 30:
+            real = craft.simulator.sensor_datagram()
+            bad = read_hil_sensor(decode(real)[0][-1].message)
+            nan = (math.nan, math.nan, math.nan)
+            message = hil_sensor_message(
+                bad.time_us, nan, bad.gyro_body, (0.2, 0.0, -0.4), 101_325.0, 0.0, 20.0, 63
+            )
+            answer = craft.onboard.receive_sensors(WRITER.frame(message))
+            assert all(map(math.isfinite, controls(answer).forces))
+            craft.simulator.receive(answer or b"")
+            craft.simulator.advance()
+        else:
+            craft.tick()
+    assert craft.flight.phase == Phase.MISSION, craft.texts
+    assert craft.worst_error < 0.02
+
+
+def test_sensors_that_fall_silent_end_the_flight_with_a_reason() -> None:
+    craft = Craft(Takeoff(1.0), Delay(30.0), Land())
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    now = craft.onboard.now_us
+    for k in range(1, 200):
+        answer = craft.onboard.receive_sensors(sensors(now + k * TICK_US))
+        craft.onboard.ground_datagrams()
+        if craft.flight.phase == Phase.FAILSAFE:
+            break
+    assert craft.flight.phase == Phase.FAILSAFE
+    assert k * TICK_S == pytest.approx(0.5, abs=0.05), "FS_SENSOR_S"
+    assert not controls(answer).armed
+
+
+# ---- parameters and missions
+
+
+def test_a_parameter_set_in_flight_is_flown_with_at_once() -> None:
+    craft = Craft(Takeoff(1.0), Delay(30.0), Land())
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    setup = craft.onboard._setup
+    name, kind = b"QP_KX", mavlink.MAV_PARAM_TYPE_REAL32
+    craft.send(mavlink.MAVLink_param_set_message(1, 1, name, 5.0, kind))
+    craft.tick()
+    assert craft.onboard._setup is not setup
+    assert craft.onboard._setup.law.other_modes.position_gains.k_x[0] == 5.0
+    assert craft.onboard._setup.control_every == setup.control_every
+    craft.wait(1.0)
+    assert craft.flight.phase == Phase.MISSION
+
+
+def test_a_mission_is_not_uploaded_over_the_one_being_flown() -> None:
+    craft = Craft(Takeoff(1.0), Delay(30.0), Land())
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == Phase.MISSION)
+    plan = craft.flight.plan
+    craft.send(mavlink.MAVLink_mission_count_message(1, 1, 2, 0))
+    craft.tick()
+    acks = [m.type for m in craft.heard if m.get_type() == "MISSION_ACK"]
+    assert acks
+    assert acks[-1] != mavlink.MAV_MISSION_ACCEPTED
+    assert craft.flight.plan is plan
+
+
+def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it() -> None:
+    """A height change behind a return stays over the home to which the return leads."""
+    home = Home()
+    up, back, low = (
+        WireItem(6, 22, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 4.0),
+        WireItem(2, 20, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0),
+        WireItem(2, 186, 0, 1, 2.0, 3.0, 0.0, 0.0, 0, 0, 0.0),
+    )
+    items = (up, back, low)
+    stored = StoredMission(items, located_steps(items, home))
+    autopilot = build_onboard(Conditions(), home, stored)
+    autopilot.add_link(GCS)
+    autopilot.receive_sensors(sensors(0))
+    plan = autopilot._state.flight.plan
+    assert plan.steps[-1] == Waypoint(0.0, 0.0, 2.0)
+    east, north = 3.0, 1.0
+    latitude, longitude, _ = geodetic_from_enu((east, north, 0.0), home)
+    place = mavlink.MAVLink_command_int_message(
+        1, 1, 6, 179, 0, 0, 0.0, 0.0, 0.0, 0.0, latitude, longitude, 0.0
+    )
+    autopilot.receive_ground(FrameWriter(255, 190).frame(place), GCS)
+    flight = autopilot._state.flight
+    assert flight.home[:2] == pytest.approx((east, north), abs=0.01)
+    assert flight.plan.steps == (Takeoff(4.0), ReturnHome(), Waypoint(flight.home[0], flight.home[1], 2.0))
+    assert len(flight.plan.prepared.made) == 3
+    assert not flight.plan.prepared.pending
+
+
+def test_the_same_sensors_give_the_same_answers_and_the_same_telemetry() -> None:
+    def run(seed: int) -> tuple[list[bytes], list[Any]]:
+        craft = Craft(Takeoff(1.0), Waypoint(0.5, 0.0, 1.0), Land(), seed=seed)
+        craft.begin()
+        craft.wait(3.0)
+        return craft.answers, [m.to_dict() for m in craft.heard]
+
+    assert run(1) == run(1)
+    assert run(1)[0] != run(2)[0]
+
+
+def test_arming_waits_for_the_estimate_and_says_so() -> None:
+    autopilot = onboard()
+    writer = FrameWriter(255, 190)
+    autopilot.receive_sensors(sensors(0))
+    arm = mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    autopilot.receive_ground(writer.frame(arm), GCS)
+    messages = [r.message for _, d in autopilot.ground_datagrams() for r in decode(d)[0]]
+    assert [m.result for m in messages if m.get_type() == "COMMAND_ACK"] == [DENIED]
+    texts = [m.text for m in messages if m.get_type() == "STATUSTEXT"]
+    assert texts == ["Arming denied: no vehicle pose from a tracker"]
+    assert ACCEPTED == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_a_reboot_is_handed_to_the_simulator_and_both_begin_anew() -> None:
+    craft = Craft(Takeoff(1.0), Land())
+    craft.begin()
+    craft.wait(1.0)
+    reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    assert craft.command(reboot, 1.0) == mavlink.MAV_RESULT_DENIED, "armed"
+    craft.run(at_phase(Phase.DISARMED))
+    assert craft.command(reboot, 1.0) == ACCEPTED
+    craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
+    for _ in range(3):  # the answer that asks, and the ticks of the new world
+        answer = craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
+        if answer is not None:
+            craft.simulator.receive(answer)
+        craft.simulator.advance()
+    assert craft.simulator.now_us < 20_000
+    for _ in range(4):
+        craft.onboard.receive_sensors(craft.simulator.sensor_datagram())
+    assert craft.onboard.out_of_time >= 3, "by which the shell knows that it is to begin anew too"
+
+
+def test_a_vehicle_whose_sensors_are_silent_still_says_that_it_is_there() -> None:
+    craft = Craft(Takeoff(1.0), Land())
+    craft.begin()
+    (received,), _ = decode(craft.onboard.stranded_heartbeat(GCS))
+    assert received.message.system_status == mavlink.MAV_STATE_EMERGENCY
+    assert received.message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+@pytest.mark.parametrize(("given", "believed"), [({}, 30.0), ({"VEH_IMU_DELAY": 20.0}, 20.0)])
+def test_latency_of_the_sensors_is_believed_unless_a_belief_is_given(
+    given: dict[str, float], believed: float
+) -> None:
+    onboard = build_onboard(Conditions(settings={"SIM_SENS_LAT_MS": 30.0, **given}), Home())
+    assert onboard.parameters["VEH_IMU_DELAY"] == believed
+
+
+def test_no_more_latency_is_believed_than_may_be() -> None:
+    onboard = build_onboard(Conditions(settings={"SIM_SENS_LAT_MS": 300.0}), Home())
+    assert onboard.parameters["VEH_IMU_DELAY"] == onboard.parameters.describe("VEH_IMU_DELAY").high
+
+
+def test_the_saved_world_is_set_again_in_the_simulator() -> None:
+    craft = Craft()
+    craft.onboard.restore_world({"SIM_WIND_E": 2.5, "SIM_LOAD_MASS": 0.1, "SIM_NO_SUCH": 1.0})
+    craft.run(lambda craft: craft.simulator._parameters.table["SIM_WIND_E"] == 2.5, 3.0)
+    craft.wait(1.0)
+    assert craft.onboard.parameters["SIM_WIND_E"] == 2.5
+    assert "SIM_NO_SUCH" not in craft.onboard.parameters
+
+
+def test_reset_of_parameters_reaches_the_simulator_and_waits_for_the_ground() -> None:
+    craft = Craft()
+    craft.wait(1.0)
+    began = craft.onboard.parameters["SIM_WIND_E"]
+    for name, value in ((b"SIM_WIND_E", 2.0), (b"MIS_SPEED", 2.0)):
+        craft.send(mavlink.MAVLink_param_set_message(1, 1, name, value, mavlink.MAV_PARAM_TYPE_REAL32))
+    craft.run(lambda craft: craft.simulator._parameters.table["SIM_WIND_E"] == 2.0, 3.0)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, 2.0) == DENIED
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, 2.0) == ACCEPTED
+    craft.run(lambda craft: craft.simulator._parameters.table["SIM_WIND_E"] == began, 3.0)
+    assert craft.onboard.parameters["MIS_SPEED"] == 1.5
+
+
+def test_an_ardupilot_client_flies_without_any_stream() -> None:
+    """Mode GUIDED, arm, take off, one place, land: as DroneKit's first example."""
+    craft = Craft(MAV_IDENTITY=1.0)
+    craft.wait(1.0)
+    assert craft.command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 4.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 1.0) == ACCEPTED
+    craft.run(at_phase(Phase.HOLD))
+    craft.send(
+        mavlink.MAVLink_set_position_target_local_ned_message(
+            0, 1, 1, 1, 0xDF8, 1.0, 0.5, -1.5, 0, 0, 0, 0, 0, 0, 0, 0
+        )
+    )
+    craft.wait(6.0)
+    assert craft.flight.phase == Phase.GUIDED
+    # measured 1 mm
+    assert math.dist(craft.truth.x_load, (0.5, 1.0, 1.5)) < 0.015
+    assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
+    craft.run(at_phase(Phase.DISARMED))

@@ -1,0 +1,421 @@
+"""The supervisor's table entry by entry, and whole flights in a world that does as it is told."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise, product
+from typing import Any
+
+import pytest
+
+from autopilot.geometry.linear import norm, sub
+from autopilot.guidance.legs import LOAD_POSITION, Brake, Calm, Creep, Hold, Run, Swing
+from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
+from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
+from autopilot.services.requests import Takeoff as TakeoffRequest
+from autopilot.supervisor.advance import TRANSITIONS, advance, enter, happen
+from autopilot.supervisor.flight import CARRYING, IN_AIR, ON_GROUND, Event, Flight, MissionPlan, Phase
+from missions import model
+from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
+
+# the table, said once more in words: from, what happens, to
+TABLE = """
+disarmed  arm                    armed
+armed     disarm                 disarmed
+armed     take off               tauten
+armed     give up                disarmed
+tauten    cable taut             lift
+tauten    land                   set_down
+lift      legs done              hold
+lift      hold                   hold
+lift      land                   lower
+lift      load on the ground     set_down
+hold      hold                   hold
+hold      fly the mission        mission
+hold      return                 return
+hold      follow setpoints       guided
+hold      land                   lower
+hold      load on the ground     set_down
+mission   legs done              hold
+mission   hold                   hold
+mission   fly the mission        mission
+mission   return                 return
+mission   follow setpoints       guided
+mission   land                   lower
+mission   load on the ground     set_down
+return    legs done              lower
+return    hold                   hold
+return    fly the mission        mission
+return    land                   lower
+return    follow setpoints       guided
+return    load on the ground     set_down
+guided    follow setpoints       guided
+guided    hold                   hold
+guided    fly the mission        mission
+guided    return                 return
+guided    land                   lower
+guided    load on the ground     set_down
+lift      follow setpoints       guided
+lower     load on the ground     set_down
+lower     hold                   hold
+lower     fly the mission        mission
+lower     return                 return
+lower     follow setpoints       guided
+lower     vehicle on the ground  disarmed
+set_down  vehicle on the ground  disarmed
+failsafe  disarm                 disarmed
+"""
+# in the air, whatever the phase, one can give up, and stop the rotors by force
+IN_ANY_PHASE_IN_AIR = {Event.FAIL: Phase.FAILSAFE, Event.DISARM: Phase.DISARMED}
+STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), model.Land())
+# m: setpoints on both sides of a join; a tick of 20 ms at 1.5 m/s is 30 mm
+CONTINUOUS = 1e-9
+JUMP_PER_TICK = 0.05
+
+
+def table() -> dict[tuple[Phase, Event], Phase]:
+    rows = [line.split("  ", 1) for line in TABLE.strip().splitlines()]
+    written = {}
+    for name, rest in rows:
+        event, after = rest.strip().rsplit("  ", 1)
+        written[(Phase[name.upper()], Event(event.strip()))] = Phase[after.strip().upper()]
+    for phase in IN_AIR:
+        written.update({(phase, what): to for what, to in IN_ANY_PHASE_IN_AIR.items()})
+    return written
+
+
+@pytest.mark.parametrize(("phase", "event"), list(product(Phase, Event)))
+def test_each_entry_of_the_table_and_each_that_is_not_there(phase: Phase, event: Event) -> None:
+    expected = table().get((phase, event))
+    assert TRANSITIONS.get((phase, event)) == expected
+    flight = Flight(phase=phase, plan=MissionPlan(STEPS, (0, 1, 2), 3), takeoff_altitude_m=2.0, speed_m_s=1.0)
+    after = happen(flight, event, hanging(5_000_000), SETTINGS)
+    if expected is None:
+        assert after is None
+    else:
+        assert after is not None
+        assert (after.phase, after.phase_start_us) == (expected, 5_000_000)
+        assert bool(after.legs) == (expected in IN_AIR), (
+            "there is something to fly in the air, and only there"
+        )
+
+
+def test_every_phase_can_be_left_and_reached() -> None:
+    assert {phase for phase, _ in TRANSITIONS} == set(Phase)
+    assert set(TRANSITIONS.values()) == set(Phase)
+
+
+# ---- whole missions
+
+SIGNALS = Signals(4.0, (Term("x", 0.5, 0.5, 0.5, 1.0, 0.5, (Sine(1.0),)),))
+RUN = AttitudeRun("vehicle", 0.1, 0.0, 1.5)
+EVERY_STEP = (
+    Takeoff(2.0),
+    Delay(1.0),
+    Speed(0.8),
+    Waypoint(1.0, 2.0, 2.5, hold_s=0.5),
+    SIGNALS,
+    RUN,
+    AttitudeRun("vehicle", -0.1, 0.0, 1.5),
+    Delay(0.5),
+    AttitudeRun("load", 0.1, 0.0, 1.0),
+    model.ReturnHome(),
+    model.Land(),
+)
+TAKES_TIME = [i for i, step in enumerate(EVERY_STEP) if not isinstance(step, Speed | model.Land)]
+
+
+def start(*steps: model.Step) -> Sky:
+    sky = Sky(*steps)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    return sky
+
+
+def test_a_mission_of_every_step_runs_from_the_ground_to_the_ground() -> None:
+    sky = start(*EVERY_STEP)
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    P = Phase
+    assert sky.phases == [P.TAUTEN, P.LIFT, P.MISSION, P.LOWER, P.SET_DOWN, P.DISARMED]
+    assert sky.flight.mission_done
+    assert (sky.flight.step, sky.flight.on_mission) == (0, False)
+    assert sky.view.x_load[2] < 0.03
+    assert sky.view.x_quad[2] < 0.07
+    assert norm(sub(sky.view.x_quad, sky.view.x_load)) > 0.2, "the vehicle stands beside its load"
+
+
+def test_reached_numbers_are_those_of_the_items_a_step_ends_with() -> None:
+    """Signals with one term of one factor are three items on the wire; a waypoint may be two."""
+    sky = start(*EVERY_STEP)
+    sequence = sky.flight.plan.sequence
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.reached == list(sequence)
+    assert sequence[-1] == sky.flight.plan.items - 1
+    assert sequence[4] - sequence[3] == 3, "term, factor, run"
+
+
+def test_a_mission_without_landing_holds_in_the_end() -> None:
+    sky = start(Takeoff(2.0), Delay(0.5))
+    sky.run(lambda s: s.flight.phase == Phase.HOLD)
+    assert sky.flight.mission_done
+    assert "Mission complete, holding" in sky.texts
+    assert sky.reached == [0, 1]
+
+
+def test_a_mission_that_ends_with_a_return_lands() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.ReturnHome())
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.flight.mission_done
+    assert "Mission complete, landing" in sky.texts
+    assert sky.reached == [0, 1, 2]
+    assert norm(sub(sky.view.x_load, (0.0, 0.0, 0.02))) < 0.03
+
+
+def test_a_mission_that_does_not_begin_with_a_takeoff_is_lifted_all_the_same() -> None:
+    sky = start(Waypoint(1.0, 0.0, 2.0), model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.reached == [0, 1]
+
+
+@pytest.mark.parametrize("step", TAKES_TIME)
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_a_pause_in_any_step_stops_and_continuing_finishes_the_mission(step: int, share: float) -> None:
+    sky = start(*EVERY_STEP)
+    sky.run(lambda s: s.flight.on_mission and s.flight.step == step and s.flight.phase != Phase.TAUTEN)
+    leg = sky.flight.legs[0]
+    sky.wait(min(share * leg.duration_s, 2.0))
+    assert sky.ask(Pause()).result == ACCEPTED
+    sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
+    assert sky.flight.phase == Phase.HOLD
+    resting = sky.view.x_load
+    sky.wait(1.0)
+    assert sky.view.x_load == pytest.approx(resting, abs=1e-6)
+    assert sky.flight.step == step
+    assert sky.ask(Continue()).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.reached == list(sky.flight.plan.sequence)
+
+
+def test_signals_begin_again_from_their_anchor_after_a_pause() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), SIGNALS, model.Land())
+    sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], Run))
+    run = sky.flight.legs[0]
+    assert isinstance(run, Run)
+    sky.wait(1.3)
+    sky.ask(Pause())
+    sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
+    assert norm(sub(sky.view.x_load, run.anchor)) > 0.01, "paused somewhere else"
+    sky.ask(Continue())
+    sky.run(lambda s: isinstance(s.flight.legs[0], Run))
+    again = sky.flight.legs[0]
+    assert isinstance(again, Run)
+    assert again.anchor == pytest.approx(run.anchor, abs=1e-9)
+    assert sky.view.x_load == pytest.approx(run.anchor, abs=1e-3)
+
+
+def test_two_attitude_runs_follow_each_other_without_a_stop_and_the_last_is_calmed() -> None:
+    sky = start(*EVERY_STEP)
+    kinds: list[type] = []
+    while sky.flight.phase != Phase.LOWER:
+        sky.tick()
+        if sky.flight.legs and (not kinds or kinds[-1] is not type(sky.flight.legs[0])):
+            kinds.append(type(sky.flight.legs[0]))
+    first = kinds.index(Swing)
+    assert kinds[first : first + 4] == [Swing, Calm, Brake, Hold]
+    assert kinds.count(Swing) == 2, "the pair is one motion"
+
+
+@pytest.mark.parametrize("request_", [Land(), ReturnHome(), Pause()])
+@pytest.mark.parametrize("at_s", [0.3, 1.0, 2.0])
+def test_interrupting_a_transfer_leaves_no_jump_in_the_setpoint(request_: object, at_s: float) -> None:
+    sky = Sky(Takeoff(2.0), Waypoint(3.0, 0.0, 2.0), model.Land())
+    sky.ask(StartMission(None))
+    sky.ask(Arm(True, False))
+    sky.run(lambda s: s.flight.phase == Phase.MISSION)
+    sky.wait(at_s)
+    before = sky.flight.legs[0].jet((sky.now_us - sky.flight.leg_start_us) * 1e-6)
+    assert norm(before[1]) > 0.0
+    assert sky.ask(request_).result == ACCEPTED
+    after = sky.flight.legs[0].jet(0.0)
+    for order in range(3):
+        assert after[order] == pytest.approx(before[order], abs=CONTINUOUS), order
+    sky.setpoints.clear()
+    sky.wait(8.0)
+    load = [jet for _, mode, jet in sky.setpoints if mode == LOAD_POSITION]
+    assert max(norm(sub(b[0], a[0])) for a, b in pairwise(load)) < JUMP_PER_TICK
+
+
+@pytest.mark.parametrize("request_", [Land(), ReturnHome()])
+@pytest.mark.parametrize("step", range(len(EVERY_STEP) - 1))
+def test_landing_and_returning_end_on_the_ground_from_any_step(request_: object, step: int) -> None:
+    sky = start(*EVERY_STEP)
+    sky.run(lambda s: s.flight.on_mission and s.flight.step >= step and s.flight.phase != Phase.TAUTEN)
+    sky.wait(0.4)
+    if sky.flight.phase == Phase.LIFT and isinstance(request_, ReturnHome):
+        assert sky.ask(request_).result != ACCEPTED, "there is no way back before the lift is done"
+        return
+    assert sky.ask(request_).result == ACCEPTED
+    assert not sky.flight.on_mission
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert "Landed, disarmed" in sky.texts
+    if isinstance(request_, ReturnHome):
+        assert math.hypot(*sky.view.x_load[:2]) < 0.01
+    assert not sky.flight.mission_done
+
+
+def test_holding_low_over_the_ground_rises_clear_of_it() -> None:
+    sky = Sky().airborne()
+    sky.ask(Land())
+    sky.run(lambda s: isinstance(s.flight.legs[0], Creep))
+    assert sky.ask(Pause()).result == ACCEPTED
+    sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
+    assert sky.view.x_load[2] == pytest.approx(0.3)
+
+
+# ---- jumping about in a mission
+
+
+def test_setting_the_current_item_in_flight_goes_there_at_once() -> None:
+    sky = start(Takeoff(2.0), Waypoint(9.0, 0.0, 2.0), Speed(0.5), Waypoint(0.0, 1.0, 2.0), model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.MISSION)
+    sky.wait(1.0)
+    speed_item, land_item = sky.flight.plan.sequence[2], sky.flight.plan.sequence[4]
+    assert sky.ask(SetCurrent(speed_item)).result == ACCEPTED
+    assert sky.flight.speed_m_s == 0.5, "a speed that is jumped to is a speed set"
+    sky.run(lambda s: s.flight.step == 3)
+    sky.wait(3.0)
+    assert sky.ask(SetCurrent(land_item)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.reached[-1] == land_item
+
+
+def test_a_landing_that_is_called_off_by_another_item_is_called_off() -> None:
+    sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.LOWER)
+    assert sky.ask(SetCurrent(1)).result == ACCEPTED
+    assert sky.flight.phase == Phase.MISSION
+    sky.run(lambda s: s.flight.phase == Phase.SET_DOWN)
+    assert sky.ask(SetCurrent(1)).result != ACCEPTED, "a load that lies is not lifted again in passing"
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert sky.reached == [0, 1, 1, 2]
+
+
+# ---- touchdown
+
+
+def lowering(phase: Phase) -> Flight:
+    """A flight in the last leg of its landing."""
+    flight = enter(Flight(phase=Phase.HOLD, speed_m_s=1.0), Phase.LOWER, hanging(), SETTINGS)
+    if phase == Phase.SET_DOWN:
+        flight = enter(flight, phase, hanging(x=(0.0, 0.0, 0.02)), SETTINGS)
+    return Flight(phase=phase, legs=flight.legs[-1:], leg_start_us=0)
+
+
+def test_the_load_is_down_when_it_no_longer_follows_and_not_before() -> None:
+    flight = lowering(Phase.LOWER)
+    creep = flight.legs[0]
+    for k in range(1, 200):
+        now = k * STEP_US
+        target = creep.jet(now * 1e-6)[0]
+        height = max(target[2], 0.02)
+        flight, _ = advance(flight, hanging(now, (target[0], target[1], height)), SETTINGS)
+        if flight.phase == Phase.SET_DOWN:
+            break
+        assert not target[2] < 0.02 - 0.05 - 0.2 * 0.3, "long down"
+    assert flight.phase == Phase.SET_DOWN
+    assert target[2] < 0.02 - 0.05
+
+
+def test_a_gust_that_holds_the_vehicle_up_is_no_landing() -> None:
+    flight = lowering(Phase.SET_DOWN)
+    creep = flight.legs[0]
+    start_height = creep.jet(0.0)[0][2]
+    for k in range(1, 400):
+        now = k * STEP_US
+        bobbing = (creep.jet(0.0)[0][0], 0.0, start_height)
+        speed = 0.2 if k % 8 < 4 else -0.2
+        flight, _ = advance(flight, view(now, x_quad=bobbing, v_quad=(0.0, 0.0, speed)), SETTINGS)
+    assert flight.phase == Phase.SET_DOWN
+    for k in range(400, 420):
+        flight, report = advance(flight, view(k * STEP_US, x_quad=bobbing), SETTINGS)
+        if flight.phase == Phase.DISARMED:
+            break
+    assert flight.phase == Phase.DISARMED, "it stands still for 0.2 s: landed"
+    assert report.texts[0][1] == "Landed, disarmed"
+
+
+# ---- what ends a flight
+
+HERE = (1.0, 0.0, 2.0)
+NAN3 = (math.nan, 0.0, 0.0)
+TROUBLES: dict[str, tuple[dict[str, Any], str]] = {
+    "tilt": ({"tilt_rad": math.radians(121.0)}, "tilt 121 deg exceeds FS_TILT_DEG 120"),
+    "tilt is no number": ({"tilt_rad": math.nan}, "the estimate is no number"),
+    "sensors": ({"complaints": ("no load position from a tracker",)}, "no load position from a tracker"),
+    "x_quad is no number": ({"x_quad": NAN3}, "the estimate is no number"),
+    "v_quad is no number": ({"v_quad": NAN3}, "the estimate is no number"),
+    "x_load is no number": ({"x_load": NAN3}, "the estimate is no number"),
+    "v_load is infinite": ({"v_load": (math.inf, 0.0, 0.0)}, "the estimate is no number"),
+}
+
+
+def under_way(phase: Phase) -> Flight:
+    """A flight at the beginning of a phase, over (1, 0, 2)."""
+    plan = MissionPlan(STEPS, (0, 1, 2), 3)
+    held = Flight(
+        phase=Phase.HOLD,
+        plan=plan,
+        step=1,
+        takeoff_altitude_m=4.0,
+        speed_m_s=1.0,
+        offboard=Stream(PositionSetpoint(HERE), 0),
+    )
+    return enter(held, phase, hanging(x=HERE), SETTINGS)
+
+
+@pytest.mark.parametrize("trouble", TROUBLES)
+@pytest.mark.parametrize("phase", sorted(IN_AIR))
+def test_trouble_in_the_air_ends_in_failsafe_and_says_why(phase: Phase, trouble: str) -> None:
+    changes, why = TROUBLES[trouble]
+    flight = under_way(phase)
+    assert advance(flight, hanging(STEP_US, HERE), SETTINGS)[0].phase == phase, "well before"
+    after, report = advance(flight, hanging(STEP_US, HERE)._replace(**changes), SETTINGS)
+    assert after.phase == Phase.FAILSAFE
+    assert not after.legs
+    assert report.texts[0][1] == f"Flight given up: {why}"
+    later, _ = advance(after, hanging(4_000_000, HERE), SETTINGS)
+    assert later.phase == Phase.DISARMED
+
+
+@pytest.mark.parametrize("phase", sorted(CARRYING))
+def test_a_load_that_is_too_far_off_ends_the_flight(phase: Phase) -> None:
+    flight = under_way(phase)
+    off = hanging(STEP_US, x=(HERE[0] + SETTINGS.load_error_limit_m + 0.1, 0.0, 2.0))
+    after, report = advance(flight, off, SETTINGS)
+    assert after.phase == Phase.FAILSAFE
+    assert "exceeds FS_LOAD_ERR 5.0 m" in report.texts[0][1]
+
+
+@pytest.mark.parametrize("phase", sorted(ON_GROUND))
+def test_trouble_on_the_ground_ends_nothing(phase: Phase) -> None:
+    after, report = advance(Flight(phase=phase), view(STEP_US, complaints=("no pose",)), SETTINGS)
+    assert (after.phase, report.texts) == (phase, ())
+
+
+def test_an_armed_vehicle_that_is_asked_for_nothing_disarms() -> None:
+    sky = Sky()
+    sky.ask(Arm(True, False))
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED, limit_s=10.1)
+    assert sky.now_us > 10_000_000
+
+
+def test_a_cable_that_never_comes_taut_ends_the_climb() -> None:
+    sky = Sky()
+    sky.ask(Arm(True, False))
+    assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
+    never = Sky._obey
+    sky._obey = lambda: never(sky)._replace(taut=False)
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
+    assert any("never taut" in text for text in sky.texts)
+    assert max(jet[0][2] for _, _, jet in sky.setpoints) < 0.02 + 1.35 * SETTINGS.cable_length_m

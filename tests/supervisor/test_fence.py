@@ -1,0 +1,149 @@
+"""The fence in flight: what is refused before, what is done at it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from autopilot.geometry.linear import norm, sub
+from autopilot.services.requests import (
+    Arm,
+    FollowSetpoint,
+    Orbit,
+    ReplaceMission,
+    Reposition,
+    ReturnHome,
+    RunPrearmChecks,
+    SetMode,
+    StartMission,
+)
+from autopilot.supervisor.flight import Phase, Settings
+from autopilot.supervisor.requests import decide
+from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.fence import Disc, Fence, Polygon
+from autopilot.wire.mission_items import LocatedStep
+from missions.model import Takeoff, Waypoint
+from tests.doubles.sky import ACCEPTED, SETTINGS, Sky
+
+SQUARE = Polygon(True, ((-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)))
+FENCE = Fence((SQUARE, Disc(False, (0.0, 3.0), 1.0)))
+DENIED = m.MAV_RESULT_DENIED
+NOTHING = (float("nan"),) * 3
+EAST = FollowSetpoint(NOTHING, (2.0, 0.0, 0.0), NOTHING, False)
+
+
+def fenced(*steps: Any, **changes: Any) -> Sky:
+    settings: Settings = replace(SETTINGS, **changes)
+    sky = Sky(*steps, settings=settings)
+    sky.flight = replace(sky.flight, fence=FENCE)
+    return sky
+
+
+def eastward(sky: Sky, seconds: float) -> float:
+    """Lead the load east by a stream; how far it came."""
+    for _ in range(5):
+        sky.ask(EAST)
+        sky.tick()
+    assert sky.ask(SetMode(6, 0)).result == ACCEPTED
+    farthest = 0.0
+    for _ in range(round(seconds / 0.02)):
+        sky.ask(EAST)
+        sky.tick()
+        farthest = max(farthest, sky.view.x_load[0])
+    return farthest
+
+
+def test_the_load_is_held_within_the_fence() -> None:
+    sky = fenced().airborne()
+    farthest = eastward(sky, 12.0)
+    assert sky.flight.phase == Phase.HOLD
+    assert sky.texts[-1] == "Fence: outside the fence"
+    # stopped before it, though not much: measured 4.89 m
+    assert 3.5 < farthest < 5.0
+    assert sky.flight.breaches == 1
+
+
+@pytest.mark.parametrize(
+    ("action", "phase", "told"),
+    [
+        (0, Phase.GUIDED, False),
+        (1, Phase.GUIDED, True),
+        (2, Phase.HOLD, True),
+        (3, Phase.RETURN, True),
+        (4, Phase.FAILSAFE, True),
+        (5, Phase.LOWER, True),
+    ],
+)
+def test_each_action(action: int, phase: Phase, told: bool) -> None:
+    sky = fenced(fence_action=action).airborne()
+    seen = set()
+    for _ in range(5):
+        sky.ask(EAST)
+        sky.tick()
+    sky.ask(SetMode(6, 0))
+    for _ in range(300):
+        sky.ask(EAST)
+        sky.tick()
+        seen.add(sky.flight.phase)
+    assert phase in seen
+    assert seen <= {Phase.GUIDED, phase, Phase.DISARMED}
+    assert any("ence" in text for text in sky.texts) == told
+
+
+def test_distance_and_height() -> None:
+    sky = fenced(fence_radius_m=3.0).airborne()
+    assert eastward(sky, 10.0) < 3.0
+    assert sky.texts[-1] == "Fence: more than GF_MAX_HOR_DIST 3 m from home"
+    high = fenced(fence_height_m=4.0).airborne()
+    assert high.ask(Reposition(None, None, 3.5, True)).result == DENIED  # the vehicle would be at 4.2 m
+    assert high.ask(Reposition(None, None, 3.2, True)).result == ACCEPTED
+
+
+def test_places_beyond_it_are_refused() -> None:
+    sky = fenced().airborne()
+    for request in (
+        Reposition(6.0, 0.0, 2.0, True),
+        Reposition(0.0, 3.0, 2.0, True),
+        Orbit(2.5, 1.0, 3.0, 0.0, 2.0),
+    ):
+        before = sky.flight
+        verdict = sky.ask(request)
+        assert verdict.result == DENIED and "fence" in (verdict.text or "")
+        assert sky.flight == before
+
+
+def test_a_mission_that_leaves_it_is_refused_with_the_item() -> None:
+    steps = (Takeoff(2.0), Waypoint(2.0, 0.0, 2.0), Waypoint(6.0, 0.0, 2.0))
+    located = tuple(LocatedStep(i, i, step) for i, step in enumerate(steps))
+    sky = fenced(*steps)
+    verdict = sky.ask(ReplaceMission(3, located))
+    assert (verdict.result, verdict.text) == (DENIED, "Mission denied: item 2 leads outside the fence")
+    sky.ask(Arm(True, False))
+    verdict = sky.ask(StartMission(None))
+    assert (verdict.result, verdict.text) == (DENIED, "Mission denied: item 2 leads outside the fence")
+    # the way between two good places leads through the exclusion zone
+    through = (Takeoff(2.0), Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0))
+    verdict = sky.ask(ReplaceMission(3, tuple(LocatedStep(i, i, step) for i, step in enumerate(through))))
+    assert verdict.text == "Mission denied: item 2 leads in an exclusion zone of the fence"
+    free = fenced(*steps, fence_action=0)
+    assert free.ask(ReplaceMission(3, located)).result == ACCEPTED
+
+
+def test_no_arming_outside() -> None:
+    sky = fenced()
+    sky.flight = replace(sky.flight, fence=Fence((Disc(True, (50.0, 0.0), 10.0),)))
+    assert sky.ask(Arm(True, False)).text == "Arming denied: outside the fence"
+    _, verdict = decide(sky.flight, RunPrearmChecks(), sky.view, sky.settings)
+    assert verdict.text == "outside the fence"
+
+
+def test_a_return_leads_to_the_nearest_rally_point() -> None:
+    sky = Sky().airborne()
+    sky.flight = replace(sky.flight, rally=((4.0, 0.0, 0.0), (20.0, 0.0, 0.0)))
+    sky.ask(Reposition(3.0, 0.0, 2.0, True))
+    sky.wait(8.0)
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    sky.run(lambda sky: sky.flight.phase == Phase.LOWER)
+    assert norm(sub(sky.view.x_load, (4.0, 0.0, 2.0))) < 0.01

@@ -1,0 +1,240 @@
+"""What the supervisor answers: a verdict to every request in every phase; what it refuses changes nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import product
+from typing import Any, get_args
+
+import pytest
+
+from autopilot.guidance.legs import Hold, Transfer
+from autopilot.services import identity, requests
+from autopilot.supervisor.advance import advance, enter
+from autopilot.supervisor.flight import IN_AIR, ON_GROUND, Flight, MissionPlan, Phase, Selected
+from autopilot.supervisor.requests import ACCEPTED as YES
+from autopilot.supervisor.requests import arming_complaints, decide
+from autopilot.wire.dialect import plumbline as mavlink
+from missions import model
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
+
+DENIED = mavlink.MAV_RESULT_DENIED
+LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+R = requests
+
+PLAN = MissionPlan(
+    (
+        model.Takeoff(2.0),
+        model.Speed(1.0),
+        model.Waypoint(1.0, 0.0, 2.0),
+        model.AttitudeRun("vehicle", 0.1, 0.0, 1.0),
+        model.Land(),
+    ),
+    (0, 1, 2, 3, 4),
+    5,
+)
+REQUESTS: list[Any] = [
+    R.Arm(True, False),
+    R.Arm(True, True),
+    R.Arm(False, False),
+    R.Arm(False, True),
+    R.Takeoff(None),
+    R.Takeoff(3.0),
+    R.Takeoff(0.1),
+    R.Takeoff(math.nan),
+    R.Land(),
+    R.ReturnHome(),
+    *(R.SetMode(main, sub) for main, sub in product((identity.AUTO, 1, 99), range(8))),
+    *(R.StartMission(first) for first in (None, 0, 2, 4, 5, -1)),
+    R.Pause(),
+    R.Continue(),
+    *(R.SetCurrent(seq) for seq in (-1, 0, 1, 2, 3, 4, 5)),
+    R.ReplaceMission(0),
+    R.ReplaceMission(7),
+    R.Reposition(1.0, 2.0, 3.0, True),
+    R.Reposition(None, None, 3.0, True),
+    R.Reposition(None, None, None, True),
+    R.Reposition(1.0, 2.0, 3.0, False),
+    R.Reposition(math.nan, 0.0, 2.0, True),
+    R.Reposition(0.0, 0.0, -2.0, True),
+    *(R.SetMode(main, 0) for main in (identity.OFFBOARD, identity.POSCTL)),
+    R.FollowSetpoint((1.0, 2.0, 3.0), (math.nan,) * 3, (math.nan,) * 3, False),
+    R.FollowSetpoint((math.nan,) * 3, (1.0, 0.0, 0.0), (math.nan,) * 3, True),
+    R.FollowSetpoint((1e9, 0.0, 0.0), (math.nan,) * 3, (math.nan,) * 3, False),
+    R.FollowAttitude((0.0, 0.0, 1.0), 0.5),
+    R.FollowAttitude((0.0, 0.0, 1.0), None),
+    R.SetMode(identity.OFFBOARD, 0),
+    R.FollowStick((0.0, 0.0, 0.0)),
+    R.SetMode(identity.POSCTL, 0),
+    R.Orbit(2.0, 1.0, 0.0, 0.0, 3.0),
+    R.Orbit(-2.0, None, None, None, None),
+    R.Orbit(0.0, 1.0, None, None, None),
+    R.ChangeAltitude(3.0),
+    R.ChangeAltitude(math.nan),
+    R.SetHome((0.0, 0.0, 50.0)),
+    R.ChangeSpeed(2.0),
+    R.ChangeSpeed(math.nan),
+    R.ChangeSpeed(-1.0),
+    R.SetHome(None),
+    R.SetHome((0.0, 0.0, 0.0)),
+    R.Winch(0.5),
+    R.Winch(-math.inf, 0.1),
+    R.Winch(math.nan),
+    R.Winch(0.0),
+    R.Release(),
+    R.Grab(),
+    R.Terminate(),
+    R.RunPrearmChecks(),
+    R.Reboot(False),
+    R.ChangeSigningKey(),
+    R.StoreParameters(True),
+    R.ResetParameters(),
+    R.RequestMessage(1, 0.0),
+    R.SetMessageInterval(1, 1),
+    R.GetMessageInterval(1),
+    R.RequestCapabilities(),
+    R.ChangeSigningKey(),
+]
+
+
+def flight_in(phase: Phase, on_mission: bool, plan: MissionPlan) -> Flight:
+    """A flight in the first leg of a phase; on the mission's waypoint if it is on a mission."""
+    step = 2 if plan.steps else 0
+    selected = Selected.MISSION if on_mission else Selected.NOTHING
+    held = Flight(Phase.HOLD, plan=plan, step=step, takeoff_altitude_m=4.0, speed_m_s=1.0, selected=selected)
+    if phase in ON_GROUND or phase == Phase.FAILSAFE:
+        return replace(held, phase=phase)
+    if phase == Phase.MISSION and not plan.steps:
+        return replace(held, phase=phase, legs=(Hold((0.5, 0.0, 2.0)),))
+    return replace(enter(held, phase, hanging(x=(0.5, 0.0, 2.0)), SETTINGS), on_mission=on_mission)
+
+
+def seen_in(phase: Phase) -> Any:
+    return view(STEP_US) if phase in ON_GROUND else hanging(STEP_US, (0.5, 0.0, 2.0))
+
+
+def test_every_request_is_asked() -> None:
+    assert {type(request) for request in REQUESTS} == set(get_args(requests.Request))
+
+
+@pytest.mark.parametrize("plan", [PLAN, MissionPlan()], ids=["mission", "no mission"])
+@pytest.mark.parametrize("on_mission", [False, True])
+@pytest.mark.parametrize("released", [False, True])
+@pytest.mark.parametrize("phase", Phase)
+def test_every_request_in_every_phase_gets_a_verdict_and_a_refusal_changes_nothing(
+    phase: Phase, released: bool, on_mission: bool, plan: MissionPlan
+) -> None:
+    for request in REQUESTS:
+        before = flight_in(phase, on_mission and bool(plan.steps), plan)
+        seen = seen_in(phase)
+        if released:
+            before, _ = decide(before, R.Release(), seen, SETTINGS)
+        after, verdict = decide(before, request, seen, SETTINGS)
+        if verdict.result != ACCEPTED:
+            assert after == before, request
+            unsupported = verdict.result == mavlink.MAV_RESULT_UNSUPPORTED
+            assert unsupported or verdict.text, f"{request}: a refusal says why"
+        assert (after.phase in IN_AIR) == bool(after.legs) or after.phase == Phase.MISSION, request
+        for k in range(2, 30):  # whatever was decided can be flown on
+            after, _ = advance(after, seen._replace(now_us=k * 100_000), SETTINGS)
+
+
+# ---- arming
+
+COMPLAINTS: dict[str, tuple[dict[str, Any], str]] = {
+    "sensors": ({"complaints": ("no vehicle pose from a tracker",)}, "no vehicle pose from a tracker"),
+    "tilt": ({"tilt_rad": math.radians(25.0)}, "tilted by 25 deg"),
+    "tilt is no number": ({"tilt_rad": math.nan}, "tilted by nan deg"),
+    "motion": ({"v_quad": (0.5, 0.0, 0.0)}, "moving at 0.5 m/s"),
+    "motion is no number": ({"v_quad": (math.nan, 0.0, 0.0)}, "moving at nan m/s"),
+}
+
+
+@pytest.mark.parametrize("trouble", COMPLAINTS)
+def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> None:
+    changes, why = COMPLAINTS[trouble]
+    seen = view(**changes)
+    assert arming_complaints(Flight(), seen, SETTINGS) == (why,)
+    after, verdict = decide(Flight(), R.Arm(True, False), seen, SETTINGS)
+    assert (after.phase, verdict.result, verdict.text) == (Phase.DISARMED, DENIED, f"Arming denied: {why}")
+    _, told = decide(Flight(), R.RunPrearmChecks(), seen, SETTINGS)
+    assert (told.result, told.text) == (ACCEPTED, why)
+    forced, verdict = decide(Flight(), R.Arm(True, True), seen, SETTINGS)
+    assert (forced.phase, verdict) == (Phase.ARMED, YES)
+
+
+def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:
+    assert arming_complaints(Flight(), view(), SETTINGS) == ()
+    assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1].text == "Ready to arm"
+
+
+@pytest.mark.parametrize("phase", sorted(IN_AIR))
+def test_in_the_air_rotors_stop_by_force_only(phase: Phase) -> None:
+    flight = flight_in(phase, False, PLAN)
+    after, verdict = decide(flight, R.Arm(False, False), seen_in(phase), SETTINGS)
+    assert (after, verdict.result) == (flight, DENIED)
+    after, verdict = decide(flight, R.Arm(False, True), seen_in(phase), SETTINGS)
+    assert (after.phase, after.legs, verdict.result) == (Phase.DISARMED, (), ACCEPTED)
+
+
+# ---- what arming begins, and in which order one may ask
+
+
+@pytest.mark.parametrize("ask_first", [True, False])
+@pytest.mark.parametrize(
+    "what", [R.Takeoff(None), R.SetMode(identity.AUTO, identity.AUTO_TAKEOFF), R.StartMission(None)]
+)
+def test_arming_and_choosing_what_to_fly_come_in_either_order(what: Any, ask_first: bool) -> None:
+    sky = Sky(model.Takeoff(2.0), model.Land())
+    for request in (what, R.Arm(True, False)) if ask_first else (R.Arm(True, False), what):
+        assert sky.ask(request).result == ACCEPTED
+    assert sky.flight.phase == Phase.TAUTEN
+    assert sky.flight.on_mission == isinstance(what, R.StartMission)
+    assert sky.flight.takeoff_altitude_m == 2.0
+
+
+def test_a_mission_that_is_gone_is_not_begun_by_arming() -> None:
+    chosen, _ = decide(Flight(plan=PLAN), R.StartMission(None), view(), SETTINGS)
+    gone = replace(chosen, plan=MissionPlan())
+    after, verdict = decide(gone, R.Arm(True, False), view(), SETTINGS)
+    assert (after, verdict.result, verdict.text) == (gone, DENIED, "Mission denied: there is none")
+
+
+def test_a_mission_being_flown_is_not_replaced_but_a_paused_one_is() -> None:
+    flying = flight_in(Phase.MISSION, True, PLAN)
+    verdict = decide(flying, R.ReplaceMission(3), hanging(), SETTINGS)[1]
+    assert (verdict.result, "pause it first" in (verdict.text or "")) == (DENIED, True)
+    paused, _ = decide(flying, R.Pause(), hanging(), SETTINGS)
+    assert decide(paused, R.ReplaceMission(3), hanging(), SETTINGS)[1] == YES
+
+
+# ---- reposition
+
+
+def test_a_reposition_keeps_what_is_not_given_and_holds_there() -> None:
+    sky = Sky().airborne()
+    assert sky.ask(R.Reposition(1.5, None, None, True)).result == ACCEPTED
+    assert isinstance(sky.flight.legs[0], Transfer)
+    sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
+    assert sky.view.x_load == pytest.approx((1.5, 0.0, 2.0))
+
+
+def test_a_reposition_out_of_motion_goes_on_from_that_motion() -> None:
+    sky = Sky().airborne()
+    sky.ask(R.Reposition(5.0, 0.0, 2.0, True))
+    sky.wait(3.5)
+    speed = sky.view.v_load[0]
+    assert speed > 0.5
+    sky.ask(R.Reposition(0.0, 3.0, 2.0, True))
+    assert sky.flight.legs[0].jet(0.0)[1][0] == pytest.approx(speed, abs=0.02)
+    sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
+    assert sky.view.x_load == pytest.approx((0.0, 3.0, 2.0))
+
+
+@pytest.mark.parametrize("phase", sorted(set(Phase) - {Phase.HOLD}))
+def test_a_reposition_that_may_not_change_the_mode_needs_a_hold(phase: Phase) -> None:
+    verdict = decide(flight_in(phase, False, PLAN), R.Reposition(1.0, 1.0, 2.0, False), hanging(), SETTINGS)[
+        1
+    ]
+    assert verdict.result == LATER
