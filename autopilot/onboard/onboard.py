@@ -48,8 +48,9 @@ from autopilot.services.records import (
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
 from autopilot.services.snapshot import Snapshot
-from autopilot.supervisor.flight import ON_GROUND, MissionPlan, Phase, carries, settings_from
 from autopilot.supervisor.requests import decide, with_plan
+from autopilot.supervisor.settings import settings_from
+from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase, carries
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
@@ -174,7 +175,7 @@ class Onboard:
             self._state.mixed.forces,
             self.armed,
             self._options.lockstep,
-            self._state.flight.released,
+            self._state.flight.cable.released,
             commanded_rate(self._state.flight, tick.now_us, self._shortest_us * 1e-6),
         )
         aside = self._world.messages(self.now_us)
@@ -220,7 +221,7 @@ class Onboard:
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
-            last = self._state.flight.mission_done and seq == report.reached[-1]
+            last = self._state.flight.mission.done and seq == report.reached[-1]
             self.endpoint.item_reached(seq, last)
         if self._log is not None:
             rate_hz = self.parameters["LOG_RATE_HZ"]
@@ -281,7 +282,7 @@ class Onboard:
         self._setup = build_setup(self.parameters, every)
         self._battery = battery_constants(self.parameters)
         # a mission under way keeps the paths that it began with
-        if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
+        if self._setup.settings.limits != self._prepared_for and not self._state.flight.mission.active:
             self._prepare()
 
     # ---- ground
@@ -364,11 +365,11 @@ class Onboard:
         state = self._state
         estimator, flight = state.estimator, state.flight
         settings = with_cable(self._setup, flight).settings
-        seen = as_reeled(control_state(estimator), estimator, flight.reel_rate)
+        seen = as_reeled(control_state(estimator), estimator, flight.cable.reel_rate)
         view = view_of(estimator, seen, settings, self.now_us, carrying=carries(flight))
         flight, verdict = decide(flight, request, view, settings)
         self._state = state._replace(flight=flight)
-        if isinstance(request, SetHome) and flight.home != state.flight.home:
+        if isinstance(request, SetHome) and flight.area.home != state.flight.area.home:
             self._follow_home()
         return verdict
 
@@ -376,13 +377,17 @@ class Onboard:
         """Read and prepare the mission anew where it returns to another home; one under way keeps its paths,
         as it does when a parameter is changed."""
         flight = self._state.flight
-        if flight.on_mission or not any(isinstance(step, ReturnHome) for step in flight.plan.steps):
+        mission = flight.mission
+        if mission.active or not any(isinstance(step, ReturnHome) for step in mission.plan.steps):
             return
-        plan = plan_of(self.endpoint.mission, self._options.home, None, flight.home)
-        current, item = flight.step, flight.plan.sequence[flight.step]
-        if len(plan.steps) != len(flight.plan.steps):  # to land at a place of its own may be two steps by now
+        plan = plan_of(self.endpoint.mission, self._options.home, None, flight.area.home)
+        current, item = mission.step, mission.plan.sequence[mission.step]
+        if len(plan.steps) != len(
+            mission.plan.steps
+        ):  # to land at a place of its own may be two steps by now
             current = plan.sequence.index(item)
-        self._state = self._state._replace(flight=replace(flight, plan=plan, step=current))
+        mission = replace(mission, plan=plan, step=current)
+        self._state = self._state._replace(flight=replace(flight, mission=mission))
         self._prepare()
 
     def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
@@ -390,13 +395,15 @@ class Onboard:
         self.endpoint.set_areas(kind, items)
         flight = self._state.flight
         if kind == mavlink.MAV_MISSION_TYPE_FENCE:
-            flight = replace(flight, fence=read_fence(items, self._options.home), breach="")
+            flight = replace(
+                flight, area=replace(flight.area, fence=read_fence(items, self._options.home), breach="")
+            )
         else:
-            flight = replace(flight, rally=read_rally(items, self._options.home))
+            flight = replace(flight, area=replace(flight.area, rally=read_rally(items, self._options.home)))
         self._state = self._state._replace(flight=flight)
 
     def _take_plan(self, mission: StoredMission) -> None:
-        plan = plan_of(mission, self._options.home, None, self._state.flight.home)
+        plan = plan_of(mission, self._options.home, None, self._state.flight.area.home)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
         self._prepare()
         kept = unflown(mission.items)
@@ -406,9 +413,9 @@ class Onboard:
 
     def _prepare(self) -> None:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
-        plan, limits = self._state.flight.plan, self._setup.settings.limits
+        plan, limits = self._state.flight.mission.plan, self._setup.settings.limits
         self._prepared_for = limits
-        self.work = Work(plan.steps, plan.sequence, limits, self._state.flight.home)
+        self.work = Work(plan.steps, plan.sequence, limits, self._state.flight.area.home)
         self._have_prepared(PENDING)
         short = self._state.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
         if self._options.clock_waits or short:
@@ -425,7 +432,9 @@ class Onboard:
 
     def _have_prepared(self, prepared: Prepared) -> None:
         flight = self._state.flight
-        flight = replace(flight, plan=replace(flight.plan, prepared=prepared))
+        flight = replace(
+            flight, mission=replace(flight.mission, plan=replace(flight.mission.plan, prepared=prepared))
+        )
         self._state = self._state._replace(flight=flight)
 
     def _snapshot(self) -> Snapshot:
