@@ -6,7 +6,7 @@ Everything is a function of the flight, the view and the settings.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import dist, isfinite
+from math import isfinite
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.s2 import tangent
@@ -44,6 +44,7 @@ from autopilot.supervisor.state import (
     setpoint,
 )
 from autopilot.trajectory.shaping import Shaped, unshaped
+from autopilot.trajectory.timeline import RELEASE_S, MissionState, return_place, state_after
 from autopilot.trajectory.waypoint_path import Passage
 from missions.model import (
     AttitudeRun,
@@ -67,7 +68,6 @@ SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
 HEIGHT_SIGMAS = 3.0  # by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
-RELEASE_S = 2.0  # hold of a mission after the load was released: the vehicle jumps up and comes back
 LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
 NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
@@ -181,7 +181,7 @@ def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = _raised(flight, view, settings)
-    goal = min((flight.area.home, *flight.area.rally), key=lambda place: dist(place[:2], here[:2]))
+    goal = return_place(here, flight.area.home, flight.area.rally)
     return (*legs, _carry(here, (goal[0], goal[1], here[2]), flight.mission.speed_m_s, settings))
 
 
@@ -278,12 +278,20 @@ def length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
     return settings.cable_length_m if top is None else top - here[2]
 
 
+def destination(step: Step, here: Vec3, flight: Flight) -> Vec3:
+    """Where a step leads that begins with load or vehicle at rest at `here`."""
+    there = state_after(step, MissionState(here), flight.area.home).expected
+    assert there is not None, "from a known place"
+    return there
+
+
 def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tuple[Leg, ...]:
     match step:
-        case Takeoff(altitude_m=altitude):
-            return (_carry(here, (here[0], here[1], altitude), settings.motion.lift_speed_m_s, settings),)
-        case Waypoint(east_m=east, north_m=north, altitude_m=altitude, hold_s=hold):
-            there = (east, north, altitude)
+        case Takeoff():
+            up = destination(step, here, flight)
+            return (_carry(here, up, settings.motion.lift_speed_m_s, settings),)
+        case Waypoint(hold_s=hold):
+            there = destination(step, here, flight)
             path = made(flight, flight.mission.step)
             go: Leg
             if isinstance(path, Passage) and path.begin_s == 0.0 and norm(sub(here, path.start)) < NEAR_START:
@@ -295,7 +303,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
         case Delay(duration_s=duration):
             return (Hold(here, max(duration - borrowed(flight), 0.0)),)
         case ReturnHome():
-            there = (flight.area.home[0], flight.area.home[1], here[2])
+            there = destination(step, here, flight)
             return (_carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight)),)
         case Signals():
             return (Run(here, _path_of(flight, flight.mission.step) or unshaped(step)),)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from autopilot.geometry.linear import Vec3, add, axpy, norm, scale, sub
+from autopilot.geometry.linear import Vec3, add, norm, scale, sub
 from autopilot.guidance.legs import Hold, carry_leg, reel_leg, top_of
 from autopilot.guidance.setpoint_follower import NEVER_US, AttitudeSetpoint, Circle, PositionSetpoint, Stream
 from autopilot.services import identity
@@ -45,6 +45,13 @@ from autopilot.supervisor.advance import (
     happen,
     release,
 )
+from autopilot.supervisor.mission_checks import (
+    LEAST_ALTITUDE_M,
+    lift_altitude_m,
+    mission_trouble,
+    reel_trouble,
+    upload_trouble,
+)
 from autopilot.supervisor.phase_legs import LEAST_REEL_M, as_flown, asked_motion, length_at, stop
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -65,7 +72,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
 ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
-LEAST_ALTITUDE_M = 0.3
 GROUND_SPEED_M_S = 0.3  # an arming vehicle moves no faster
 TILT_TO_ARM_RAD = math.radians(20.0)
 FARTHEST_M = 100_000.0
@@ -76,7 +82,6 @@ STREAM_US = 500_000  # a stream is there where its last setpoint is no older: tw
 LEVEL_HOME_M = 1.0
 CIRCLE_POINTS = 72
 LONGEST_CIRCLE_S = 1e9
-WAY_M, MOST_PIECES = 0.25, 4000  # at which a way between waypoints is looked at
 SLOWEST_M_S, FASTEST_M_S = 0.05, 15.0
 LEAST_REEL_M_S = 0.01
 
@@ -170,73 +175,6 @@ def _takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) -
     return flight, _denied("Take-off denied: in the air")
 
 
-def _leaves_fence(
-    flight: Flight, steps: tuple[model.Step, ...], sequence: tuple[int, ...], settings: Settings
-) -> str:
-    """Which item of a mission leads over the fence, and why; an empty string if none does.
-
-    Places and the straight ways between them are looked at; signals are watched in flight.
-    """
-    if not settings.fence.action:
-        return ""
-    here: Vec3 | None = None
-    for step, seq in zip(steps, sequence, strict=True):
-        match step:
-            case model.Takeoff(altitude_m=height):
-                places: list[Vec3] = [(0.0, 0.0, height)]
-            case model.Waypoint(east_m=east, north_m=north, altitude_m=height):
-                there = (east, north, height)
-                before = there if here is None else here
-                pieces = min(max(1, math.ceil(norm(sub(there, before)) / WAY_M)), MOST_PIECES)
-                places = [axpy((k + 1) / pieces, sub(there, before), before) for k in range(pieces)]
-            case _:
-                continue
-        here = places[-1]
-        why = next(filter(None, (forbidden(flight.area.fence, place, settings) for place in places)), "")
-        if why:
-            return f"item {seq} leads {why}"
-    return ""
-
-
-def _needs_load(flight: Flight) -> str:
-    """Which item that is still to be flown swings a load that is released by then; an empty string: none."""
-    released, plan = flight.cable.released, flight.mission.plan
-    for step, seq in zip(
-        plan.steps[flight.mission.step :], plan.sequence[flight.mission.step :], strict=True
-    ):
-        if isinstance(step, model.Release):
-            released = True
-        elif released and isinstance(step, model.Signals | model.AttitudeRun):
-            return f"item {seq} needs the load, which is released"
-    return ""
-
-
-def _reels_too_far(flight: Flight, settings: Settings) -> str:
-    """Which item that is still to be flown asks too much of the winch; an empty string: none."""
-    length, plan = settings.cable_length_m, flight.mission.plan
-    for step, seq in zip(
-        plan.steps[flight.mission.step :], plan.sequence[flight.mission.step :], strict=True
-    ):
-        if not isinstance(step, model.Winch):
-            continue
-        if not settings.winch.usable:
-            return f"item {seq}: the law lqr flies one length of the cable"
-        if flight.cable.released:
-            return f"item {seq} needs the load, which is released"
-        if step.speed_m_s is not None and step.speed_m_s > settings.winch.speed_m_s:
-            return f"item {seq}: {step.speed_m_s:g} m/s exceeds WNC_SPEED {settings.winch.speed_m_s:g}"
-        length += step.length_m
-        if flight.cable.reel_to_m is not None:  # taken up again
-            length, flight = (
-                flight.cable.reel_to_m,
-                replace(flight, cable=replace(flight.cable, reel_to_m=None)),
-            )
-        beyond = reel_trouble(length, math.inf, settings)
-        if beyond:
-            return f"item {seq}: {beyond}"
-    return ""
-
-
 def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     """Start the mission at `flight.step`, from the ground or from the air."""
     before, plan = flight, flight.mission.plan
@@ -244,12 +182,9 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         return flight, _denied("Mission denied: there is none")
     if plan.prepared.pending:
         return flight, Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "Mission begins when its paths are prepared")
-    beyond = _leaves_fence(flight, plan.steps, plan.sequence, settings)
-    if beyond:
-        return flight, _denied(f"Mission denied: {beyond}")
-    without = _needs_load(flight) or _reels_too_far(flight, settings)
-    if without:
-        return flight, _denied(f"Mission denied: {without}")
+    trouble = mission_trouble(flight, view, settings)
+    if trouble:
+        return flight, _denied(f"Mission denied: {trouble}")
     if plan.prepared.refusal:
         return flight, _denied(f"Mission denied: {plan.prepared.refusal}")
     if flight.phase == Phase.DISARMED:
@@ -258,8 +193,7 @@ def _begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         flight, mission=replace(flight.mission, active=True, done=False), selected=Selected.MISSION
     )
     if flight.phase == Phase.ARMED:
-        first = next((s for s in plan.steps if isinstance(s, model.Takeoff)), None)
-        altitude = settings.motion.takeoff_altitude_m if first is None else first.altitude_m
+        altitude = lift_altitude_m(plan, settings)
         return _take_off(
             replace(flight, mission=replace(flight.mission, takeoff_altitude_m=altitude)), view, settings
         ), ACCEPTED
@@ -297,6 +231,9 @@ def _set_current(flight: Flight, request: SetCurrent, view: View, settings: Sett
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
         return flight, _wrong_phase(flight, f"Mission item {request.seq}")
     if flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER):
+        trouble = mission_trouble(moved, view, settings)
+        if trouble:
+            return flight, _denied(f"Mission item {request.seq} denied: {trouble}")
         return begin_step(moved, view, settings), ACCEPTED
     return moved, ACCEPTED
 
@@ -402,7 +339,8 @@ def _replace_mission(flight: Flight, request: ReplaceMission, view: View, settin
     if flight.mission.active and flight.phase not in ON_GROUND:
         return flight, _denied("Mission denied: the present one is being flown; pause it first")
     steps = tuple(located.step for located in request.steps)
-    beyond = _leaves_fence(flight, steps, tuple(located.first for located in request.steps), settings)
+    sequence = tuple(located.first for located in request.steps)
+    beyond = upload_trouble(flight, steps, sequence, view, settings)
     if beyond:
         return flight, _denied(f"Mission denied: {beyond}")
     return flight, ACCEPTED
@@ -606,18 +544,6 @@ def _winch(flight: Flight, request: Winch, view: View, settings: Settings) -> De
     text = f"Winch: {length:.2f} m to {wanted:.2f} m"
     after = replace(flight, legs=(*legs, reel, Hold(there)), leg_start_us=view.now_us)
     return after, Verdict(mavlink.MAV_RESULT_ACCEPTED, text)
-
-
-def reel_trouble(wanted: float, height: float, settings: Settings) -> str:
-    """Why the cable may not get so long (m) with the load at that height; an empty string if it may."""
-    if not settings.winch.shortest_m - LEAST_REEL_M <= wanted <= settings.winch.longest_m + LEAST_REEL_M:
-        limits = (
-            f"{settings.winch.shortest_m:g} ... {settings.winch.longest_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
-        )
-        return f"a cable of {wanted:.2f} m; must be {limits}"
-    if height < LEAST_ALTITUDE_M - LEAST_REEL_M:
-        return f"load height {height:.2f} m, least {LEAST_ALTITUDE_M} m"
-    return ""
 
 
 def _terminate(flight: Flight, request: Terminate, view: View, settings: Settings) -> Decision:

@@ -36,7 +36,7 @@ TAUTEN_S = 10.0
 SET_DOWN_S = 10.0
 VERTICAL_SPEED_M_S = 0.8
 REEL_M_S = 0.3  # of a winch as delivered
-RELEASE_S = 2.0  # held when the load is released
+RELEASE_S = 2.0  # hold after the load was released: the vehicle jumps up and comes back
 # of transfers, for a vehicle as delivered (MIS_SPEED, MIS_ACCEL)
 SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
 AT_REST_M2_S2 = 1e-4  # squared speed at which signals that end count as at rest
