@@ -48,7 +48,8 @@ from autopilot.services.records import (
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
 from autopilot.services.snapshot import Snapshot
-from autopilot.supervisor.requests import decide, with_plan
+from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase, carries
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare

@@ -16,7 +16,7 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, asked_jet
 from autopilot.services import identity, snapshot
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.snapshot import GpsFix, Snapshot
-from autopilot.supervisor.requests import arming_complaints
+from autopilot.supervisor.requests.arming import arming_complaints
 from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,

@@ -34,6 +34,12 @@ class Phase(IntEnum):
     GUIDED = mavlink.PLUMBLINE_PHASE_GUIDED
 
 
+Text = tuple[int, str]  # severity, text
+INFO, WARNING, CRITICAL = (
+    mavlink.MAV_SEVERITY_INFO,
+    mavlink.MAV_SEVERITY_WARNING,
+    mavlink.MAV_SEVERITY_CRITICAL,
+)
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
 CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
@@ -45,13 +51,19 @@ class Event(Enum):
     ARM = "arm"
     DISARM = "disarm"
     TAKEOFF = "take off"
+    TAKEOFF_ALONE = "take off without a load"
     TAUT = "cable taut"
     DONE = "legs done"
+    STEP = "mission step"
+    LAND_STEP = "mission step: land"
     HOLD = "hold"
     MISSION = "fly the mission"
     GUIDE = "follow setpoints"
+    OTHER_SETPOINT = "setpoint of another kind"
     RETURN = "return"
     LAND = "land"
+    CAUGHT = "load caught"
+    RELEASED = "load released"
     LOAD_DOWN = "load on the ground"
     VEHICLE_DOWN = "vehicle on the ground"
     FAIL = "give up"
@@ -167,15 +179,20 @@ class View(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What came of an advance: texts (severity, text) for the operator, mission items reached."""
+    """What came of an advance: texts for the operator, mission items reached."""
 
-    texts: tuple[tuple[int, str], ...] = ()
+    texts: tuple[Text, ...] = ()
     reached: tuple[int, ...] = ()
 
 
 def off_mission(flight: Flight) -> Flight:
     """The flight with its mission interrupted; the step is kept."""
     return replace(flight, mission=replace(flight.mission, active=False))
+
+
+def takeoff_event(flight: Flight) -> Event:
+    """The event that takes off: with a load, its cable is pulled taut first."""
+    return Event.TAKEOFF_ALONE if flight.cable.released else Event.TAKEOFF
 
 
 def pace_of(flight: Flight, settings: Settings) -> FollowLimits:

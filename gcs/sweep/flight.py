@@ -1,7 +1,7 @@
 """One whole flight without the wire: the flight that `gcs.closed_loop` flies, some twenty times as fast.
 
 Python runs the ticks at which the supervisor has something to decide, with the functions that fly
-(`autopilot.core.tick.control`, `autopilot.supervisor.requests.decide`); all others pass in
+(`autopilot.core.tick.control`, `autopilot.supervisor.requests.decide.decide`); all others pass in
 `gcs.sweep.kernel`. The ground station's part is known beforehand: the two instants at which it arms and
 starts the mission.
 """
@@ -25,17 +25,10 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Catch, Creep, 
 from autopilot.onboard.onboard import Onboard, build_setup, plan_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.requests import Arm, StartMission
-from autopilot.supervisor.advance import (
-    LIFT_OFF_US,
-    LOAD_SUNK,
-    PULL_US,
-    STILL_SPEED,
-    STILL_US,
-    TAUT_LATEST,
-    VEHICLE_SUNK,
-)
+from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
-from autopilot.supervisor.requests import arming_complaints, decide, with_plan
+from autopilot.supervisor.requests.arming import arming_complaints
+from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import CARRYING as CARRYING_PHASES
 from autopilot.supervisor.state import (
     IN_AIR,
@@ -48,6 +41,10 @@ from autopilot.supervisor.state import (
     jet_ahead,
     leg_time_s,
 )
+from autopilot.supervisor.watches.cable_pull import PULL_US
+from autopilot.supervisor.watches.slack import LIFT_OFF_US
+from autopilot.supervisor.watches.tautening import TAUT_LATEST
+from autopilot.supervisor.watches.touchdown import LOAD_SUNK, STILL_SPEED, STILL_US, VEHICLE_SUNK
 from autopilot.trajectory.prepare import Limits
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.belief import load_belief

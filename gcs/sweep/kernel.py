@@ -16,8 +16,10 @@ from autopilot.estimation.records import EstimatorState, EstimatorTuning, Histor
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import E1, Vec3, add, axpy, column, dot, norm, scale, sub
 from autopilot.geometry.so3 import rotation_from_quat, tilt_angle
-from autopilot.supervisor.advance import ASTRAY, LEAST_GAP, PULLED
-from autopilot.supervisor.advance import SLACK as SLACK_SHARE
+from autopilot.supervisor.watches.cable_pull import PULLED
+from autopilot.supervisor.watches.cable_pull import SLACK as SLACK_SHARE
+from autopilot.supervisor.watches.slack import LEAST_GAP
+from autopilot.supervisor.watches.tautening import ASTRAY
 from gcs.sweep.link import LinkModel, estimate, settled, wire_forces
 from gcs.sweep.pilot import Pilot, PilotModel, air_tick, ground_tick
 from gcs.sweep.world import Buffers, Floats, World, WorldModel, tick

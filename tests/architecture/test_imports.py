@@ -189,7 +189,7 @@ BAD = {
     "autopilot/services/commands.py": "def f():\n    from autopilot.control.laws import thesis",
     "autopilot/services/endpoint.py": "from autopilot.onboard import onboard",
     "autopilot/supervisor/advance.py": "from autopilot.core.tick import step",
-    "autopilot/supervisor/requests.py": "from autopilot.estimation.filter import estimate",
+    "autopilot/supervisor/requests/arming.py": "from autopilot.estimation.filter import estimate",
     "autopilot/core/tick.py": "import time",
     "autopilot/core/warmup.py": "from autopilot.onboard.onboard import Onboard",
     "autopilot/onboard/onboard.py": "from sitl.sim_core import SimCore",

@@ -11,8 +11,9 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, Takeoff
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
-from autopilot.supervisor.requests import decide, with_plan
+from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.requests.decide import decide
+from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.settings import Settings, settings_from
 from autopilot.supervisor.state import Flight, MissionPlan, Phase, View
 from autopilot.vehicle.belief import load_belief

@@ -8,8 +8,8 @@ import pytest
 
 from autopilot.guidance.legs import QUAD_POSITION
 from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
-from autopilot.supervisor.advance import enter
-from autopilot.supervisor.requests import decide
+from autopilot.supervisor.machine import _enter as enter
+from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint

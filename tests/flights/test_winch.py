@@ -12,7 +12,7 @@ from autopilot.core.winch import cable_now, commanded_rate
 from autopilot.guidance.legs import Hold, Reel, Slow, reel_leg, top_of
 from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
-from autopilot.supervisor.advance import enter
+from autopilot.supervisor.machine import _enter as enter
 from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Waypoint, Winch

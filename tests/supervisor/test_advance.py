@@ -1,9 +1,9 @@
-"""The supervisor's table entry by entry, and whole flights in a world that does as it is told."""
+"""The supervisor from tick to tick: whole flights in a world that does as it is told, and what ends one."""
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -13,12 +13,12 @@ from autopilot.guidance.legs import LOAD_POSITION, Brake, Calm, Creep, Hold, Run
 from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
-from autopilot.supervisor.advance import TRANSITIONS, advance, enter, happen
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.machine import _enter as enter
 from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
     ON_GROUND,
-    Event,
     Flight,
     MissionPlan,
     MissionProgress,
@@ -29,95 +29,10 @@ from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
 
-# the table, said once more in words: from, what happens, to
-TABLE = """
-disarmed  arm                    armed
-armed     disarm                 disarmed
-armed     take off               tauten
-armed     give up                disarmed
-tauten    cable taut             lift
-tauten    land                   set_down
-lift      legs done              hold
-lift      hold                   hold
-lift      land                   lower
-lift      load on the ground     set_down
-hold      hold                   hold
-hold      fly the mission        mission
-hold      return                 return
-hold      follow setpoints       guided
-hold      land                   lower
-hold      load on the ground     set_down
-mission   legs done              hold
-mission   hold                   hold
-mission   fly the mission        mission
-mission   return                 return
-mission   follow setpoints       guided
-mission   land                   lower
-mission   load on the ground     set_down
-return    legs done              lower
-return    hold                   hold
-return    fly the mission        mission
-return    land                   lower
-return    follow setpoints       guided
-return    load on the ground     set_down
-guided    follow setpoints       guided
-guided    hold                   hold
-guided    fly the mission        mission
-guided    return                 return
-guided    land                   lower
-guided    load on the ground     set_down
-lift      follow setpoints       guided
-lower     load on the ground     set_down
-lower     hold                   hold
-lower     fly the mission        mission
-lower     return                 return
-lower     follow setpoints       guided
-lower     vehicle on the ground  disarmed
-set_down  vehicle on the ground  disarmed
-failsafe  disarm                 disarmed
-"""
-# in the air, whatever the phase, one can give up, and stop the rotors by force
-IN_ANY_PHASE_IN_AIR = {Event.FAIL: Phase.FAILSAFE, Event.DISARM: Phase.DISARMED}
 STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), model.Land())
 # m: setpoints on both sides of a join; a tick of 20 ms at 1.5 m/s is 30 mm
 CONTINUOUS = 1e-9
 JUMP_PER_TICK = 0.05
-
-
-def table() -> dict[tuple[Phase, Event], Phase]:
-    rows = [line.split("  ", 1) for line in TABLE.strip().splitlines()]
-    written = {}
-    for name, rest in rows:
-        event, after = rest.strip().rsplit("  ", 1)
-        written[(Phase[name.upper()], Event(event.strip()))] = Phase[after.strip().upper()]
-    for phase in IN_AIR:
-        written.update({(phase, what): to for what, to in IN_ANY_PHASE_IN_AIR.items()})
-    return written
-
-
-@pytest.mark.parametrize(("phase", "event"), list(product(Phase, Event)))
-def test_each_entry_of_the_table_and_each_that_is_not_there(phase: Phase, event: Event) -> None:
-    expected = table().get((phase, event))
-    assert TRANSITIONS.get((phase, event)) == expected
-    flight = Flight(
-        phase=phase,
-        mission=MissionProgress(plan=MissionPlan(STEPS, (0, 1, 2), 3), takeoff_altitude_m=2.0, speed_m_s=1.0),
-    )
-    after = happen(flight, event, hanging(5_000_000), SETTINGS)
-    if expected is None:
-        assert after is None
-    else:
-        assert after is not None
-        assert (after.phase, after.phase_start_us) == (expected, 5_000_000)
-        assert bool(after.legs) == (expected in IN_AIR), (
-            "there is something to fly in the air, and only there"
-        )
-
-
-def test_every_phase_can_be_left_and_reached() -> None:
-    assert {phase for phase, _ in TRANSITIONS} == set(Phase)
-    assert set(TRANSITIONS.values()) == set(Phase)
-
 
 # ---- whole missions
 

@@ -19,7 +19,7 @@ from autopilot.services.requests import (
     SetMode,
     StartMission,
 )
-from autopilot.supervisor.requests import decide
+from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon

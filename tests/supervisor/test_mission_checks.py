@@ -11,7 +11,7 @@ import pytest
 from autopilot.core.winch import cable_now
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.services.requests import Arm, Pause, ReplaceMission, Reposition, SetCurrent, StartMission
-from autopilot.supervisor.requests import with_plan
+from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.timeline import MissionState, state_after, timeline

@@ -14,7 +14,7 @@ from autopilot.guidance.legs import Hold, Pass, Run, asked_jet
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
 from autopilot.services.requests import Arm, Pause, StartMission
-from autopilot.supervisor.requests import with_plan
+from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.state import Phase, jet_ahead, leg_time_s
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.convert import Home

@@ -11,9 +11,11 @@ import pytest
 
 from autopilot.guidance.legs import Hold, Transfer
 from autopilot.services import identity, requests
-from autopilot.supervisor.advance import advance, enter
-from autopilot.supervisor.requests import ACCEPTED as YES
-from autopilot.supervisor.requests import arming_complaints, decide
+from autopilot.supervisor.advance import advance
+from autopilot.supervisor.machine import _enter as enter
+from autopilot.supervisor.requests.arming import arming_complaints
+from autopilot.supervisor.requests.decide import decide
+from autopilot.supervisor.requests.verdicts import ACCEPTED as YES
 from autopilot.supervisor.state import (
     IN_AIR,
     ON_GROUND,

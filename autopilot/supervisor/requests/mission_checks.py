@@ -10,13 +10,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from autopilot.geometry.linear import Vec3, axpy, norm, sub
-from autopilot.supervisor.phase_legs import LEAST_REEL_M, length_at, stop
+from autopilot.supervisor.motion import length_at, stop
+from autopilot.supervisor.requests.limits import LEAST_ALTITUDE_M
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import ON_GROUND, Flight, MissionPlan, View, below, forbidden
+from autopilot.supervisor.step_legs import LEAST_REEL_M
 from autopilot.trajectory.timeline import ANYWHERE, MissionState, TimelineEntry, timeline
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
-LEAST_ALTITUDE_M = 0.3
 WAY_M, MOST_PIECES = 0.25, 4000  # spacing of the places at which a way is looked at, and how many at most
 
 Ahead = list[tuple[int, TimelineEntry]]  # each with its mission item

@@ -1,0 +1,105 @@
+"""Motion that is asked of the load, or of the vehicle that has released it, and how it is brought to rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
+from autopilot.geometry.s2 import tangent
+from autopilot.guidance.legs import (
+    CALM_SHARE,
+    LOAD_POSITION,
+    QUAD_POSITION,
+    Calm,
+    Leg,
+    Swing,
+    brake_leg,
+    carry_leg,
+    slow_leg,
+    top_of,
+)
+from autopilot.guidance.setpoint_follower import Follow, Posture
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import CARRYING, Flight, View, leg_time_s
+
+AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
+FALLING = 1.0  # m/s, of a load that was caught and nobody lowers
+RESCUE_SHARE = 0.5  # of gravity: deceleration of a load that was caught
+STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load accelerates
+
+
+def position_mode(flight: Flight) -> int:
+    """The control mode in which positions are flown: of the load, or of the vehicle that has released it."""
+    return QUAD_POSITION if flight.cable.released else LOAD_POSITION
+
+
+def as_flown(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
+    """The legs as the vehicle flies them: by itself where the load is released."""
+    if not flight.cable.released:
+        return legs
+    return tuple(
+        replace(leg, control_mode=QUAD_POSITION) if leg.control_mode == LOAD_POSITION else leg for leg in legs
+    )
+
+
+def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, Vec3, Vec3]:
+    """Position, velocity and acceleration asked of the load; those it has if nothing is asked of it. Of the
+    vehicle where the load is released."""
+    if flight.legs and flight.legs[0].control_mode == position_mode(flight):
+        jet = flight.legs[0].jet(leg_time_s(flight, view.now_us))
+        return jet[0], jet[1], jet[2]
+    if flight.cable.released:
+        return view.x_quad, view.v_quad if flight.phase in CARRYING else ZERO, ZERO
+    if flight.phase not in CARRYING:
+        return view.x_load, ZERO, ZERO
+    # a load that neither rises nor falls is accelerated by as much of its weight as the cable leans
+    cable = sub(view.x_quad, view.x_load)
+    if not cable[2] > STEEPEST * norm(cable):
+        return view.x_load, view.v_load, ZERO
+    pull = settings.gravity_m_s2 / cable[2]
+    return view.x_load, view.v_load, (pull * cable[0], pull * cable[1], 0.0)
+
+
+def swings(leg: Leg) -> bool:
+    """Whether the leg controls an attitude: position is uncontrolled."""
+    return isinstance(leg, Swing | Calm | Posture)
+
+
+def calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
+    """What must come between a leg that left the position alone and one that asks for it."""
+    cable = sub(view.x_quad, view.x_load)
+    length = norm(cable)
+    lean = scale(1.0 / length, cable)
+    rate = scale(1.0 / length, tangent(lean, sub(view.v_quad, view.v_load)))
+    anchor = view.x_load if isinstance(leg, Posture) else leg.jet(0.0)[0]
+    duration = CALM_SHARE * settings.least_move_s
+    return Calm(anchor, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration)
+
+
+def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
+    """Legs that bring the load to rest out of its present motion (none if it rests), and where that is."""
+    x, v, a = asked_motion(flight, view, settings)
+    if norm(v) <= AT_REST and norm(a) <= AT_REST:
+        return (), x
+    if flight.legs and flight.legs[0].control_mode == position_mode(flight):
+        t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
+        if isinstance(leg, Follow):
+            return leg.stopped(t, settings.motion.accel_m_s2)
+        slow = slow_leg(leg, t, settings.motion.accel_m_s2, settings.least_move_s)
+        return (slow,), slow.end
+    accel, least_s = settings.motion.accel_m_s2, settings.least_move_s
+    if v[2] < -FALLING:  # out of a fall: there is no time to lose
+        accel, least_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * least_s
+    brake = brake_leg(x, v, a, accel, least_s)
+    return (brake,), brake.end
+
+
+def carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, least_s: float = 0.0) -> Leg:
+    """A transfer of the load to another place, at rest at both ends, that takes at least so long."""
+    return carry_leg(begin, end, speed, settings.motion.accel_m_s2, max(least_s, settings.least_move_s))
+
+
+def length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
+    """Length of the cable when the load has come to rest at `here`, whose height a winch at work decides."""
+    top = top_of(flight.legs[0]) if flight.legs else None
+    return settings.cable_length_m if top is None else top - here[2]

@@ -1,0 +1,84 @@
+"""What becomes of the flight by a request: the table from requests to their handlers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.services.records import Verdict
+from autopilot.services.requests import (
+    Arm,
+    ChangeAltitude,
+    ChangeSpeed,
+    Continue,
+    FollowAttitude,
+    FollowSetpoint,
+    FollowStick,
+    Grab,
+    Land,
+    Orbit,
+    Pause,
+    Release,
+    ReplaceMission,
+    Reposition,
+    ReturnHome,
+    RunPrearmChecks,
+    SetCurrent,
+    SetHome,
+    SetMode,
+    StartMission,
+    Takeoff,
+    Terminate,
+    Winch,
+)
+from autopilot.supervisor.requests.arming import arm, run_checks, terminate
+from autopilot.supervisor.requests.guided import follow_attitude, follow_setpoint, follow_stick
+from autopilot.supervisor.requests.mission import (
+    continue_mission,
+    replace_mission,
+    set_current,
+    start_mission,
+)
+from autopilot.supervisor.requests.modes import hold, land, return_home, set_home, set_mode
+from autopilot.supervisor.requests.orbit import orbit
+from autopilot.supervisor.requests.payload import grab, let_go, winch
+from autopilot.supervisor.requests.reposition import change_altitude, change_speed, reposition
+from autopilot.supervisor.requests.takeoff import takeoff
+from autopilot.supervisor.requests.verdicts import Decision, Handler
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import Flight, View
+from autopilot.wire.dialect import plumbline as mavlink
+
+
+def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    """The flight after the request, and the verdict on it; an unknown request is unsupported."""
+    handler = HANDLERS.get(type(request))
+    if handler is None:
+        return flight, Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
+    return handler(flight, request, view, settings)
+
+
+HANDLERS: dict[type, Handler] = {
+    Arm: arm,
+    Takeoff: takeoff,
+    Land: land,
+    ReturnHome: return_home,
+    SetMode: set_mode,
+    StartMission: start_mission,
+    Pause: hold,
+    Continue: continue_mission,
+    SetCurrent: set_current,
+    ReplaceMission: replace_mission,
+    Reposition: reposition,
+    FollowSetpoint: follow_setpoint,
+    FollowAttitude: follow_attitude,
+    FollowStick: follow_stick,
+    Orbit: orbit,
+    ChangeAltitude: change_altitude,
+    SetHome: set_home,
+    Winch: winch,
+    Release: let_go,
+    Grab: grab,
+    ChangeSpeed: change_speed,
+    Terminate: terminate,
+    RunPrearmChecks: run_checks,
+}

@@ -1,0 +1,99 @@
+"""Modes by request: hold, land and return home, and the table of PX4's modes that are flown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from autopilot.services import identity
+from autopilot.services.requests import SetHome, SetMode, Takeoff
+from autopilot.supervisor.machine import happen
+from autopilot.supervisor.requests.guided import offboard, position_control
+from autopilot.supervisor.requests.limits import FARTHEST_M
+from autopilot.supervisor.requests.mission import continue_mission
+from autopilot.supervisor.requests.takeoff import takeoff
+from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, Handler, denied, wrong_phase
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
+    ON_GROUND,
+    Event,
+    Flight,
+    Guide,
+    Phase,
+    Selected,
+    View,
+    off_mission,
+)
+
+LEVEL_HOME_M = 1.0
+
+
+def hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    """Stop and hold; on the ground, select nothing."""
+    if flight.phase in ON_GROUND:
+        return replace(flight, selected=Selected.NOTHING), ACCEPTED
+    after = happen(off_mission(flight), Event.HOLD, view, settings)
+    return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Hold"))
+
+
+def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    """Set the load down where it is, and the vehicle beside it."""
+    if flight.phase in ON_GROUND or flight.phase in (Phase.LOWER, Phase.SET_DOWN):
+        return flight, ACCEPTED
+    after = happen(off_mission(flight), Event.LAND, view, settings)
+    return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Landing"))
+
+
+def return_home(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    """Fly to home or a nearer rally point, and land."""
+    after = happen(off_mission(flight), Event.RETURN, view, settings)
+    return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Return"))
+
+
+def set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -> Decision:
+    """Make this place, or another, the one to which a return leads."""
+    place = view.x_quad if request.position is None else request.position
+    if not math.hypot(place[0], place[1]) <= FARTHEST_M:
+        return flight, denied(f"Home denied: more than {FARTHEST_M:g} m away")
+    if request.position is not None and not abs(place[2]) <= LEVEL_HOME_M:
+        return flight, denied("Home denied: its height must be that of the ground here, which is flat")
+    return replace(flight, area=replace(flight.area, home=(place[0], place[1], 0.0))), ACCEPTED
+
+
+def _mode_takeoff(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
+    return takeoff(flight, Takeoff(None), view, settings)
+
+
+_MODES: dict[tuple[int, int], Handler] = {
+    (identity.AUTO, identity.AUTO_TAKEOFF): _mode_takeoff,
+    (identity.AUTO, identity.AUTO_LOITER): hold,
+    (identity.AUTO, identity.AUTO_MISSION): continue_mission,
+    (identity.AUTO, identity.AUTO_RTL): return_home,
+    (identity.AUTO, identity.AUTO_LAND): land,
+    (identity.OFFBOARD, 0): offboard,
+    (identity.POSCTL, 0): position_control,
+}
+
+
+def set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -> Decision:
+    """Fly in another of PX4's modes."""
+    main, sub_mode = request.main, request.sub
+    if (main, sub_mode) == (identity.AUTO, 0):
+        sub_mode = identity.AUTO_MISSION
+    handler = _MODES.get((main, sub_mode))
+    if handler is None:
+        return flight, denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
+    heeds = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not hold
+    if settings.setpoints.guided_mode and handler is hold and heeds and _in_guided_mode(flight):
+        return flight, ACCEPTED
+    after, verdict = handler(flight, request, view, settings)
+    return (replace(after, heeds=heeds) if verdict.result == ACCEPTED.result else after), verdict
+
+
+def _in_guided_mode(flight: Flight) -> bool:
+    """Whether what is flown is a part of ArduPilot's GUIDED: a take-off, the way to a place, setpoints."""
+    if flight.mission.active:
+        return False
+    rising = flight.phase in (Phase.TAUTEN, Phase.LIFT) or (flight.phase == Phase.HOLD and flight.heeds)
+    return rising or (flight.phase == Phase.GUIDED and flight.setpoints.guide != Guide.MANUAL)

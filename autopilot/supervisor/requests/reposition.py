@@ -1,0 +1,65 @@
+"""Going to a place by request, and at which speed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.guidance.legs import Hold, carry_leg
+from autopilot.services.requests import ChangeAltitude, ChangeSpeed, Reposition
+from autopilot.supervisor.motion import as_flown
+from autopilot.supervisor.requests.limits import FASTEST_M_S, LEAST_ALTITUDE_M, SLOWEST_M_S
+from autopilot.supervisor.requests.modes import hold
+from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, later, wrong_phase
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import CARRYING, Flight, Phase, View, below, forbidden
+from autopilot.wire.dialect import plumbline as mavlink
+
+
+def reposition(flight: Flight, request: Reposition, view: View, settings: Settings) -> Decision:
+    """Fly to a place, and hold there."""
+    if flight.phase not in CARRYING:
+        return flight, wrong_phase(flight, "Reposition")
+    if flight.phase != Phase.HOLD and not request.change_mode:
+        return flight, later("Reposition denied: not holding")
+    speed = flight.mission.speed_m_s if request.speed_m_s is None else request.speed_m_s
+    if not SLOWEST_M_S <= speed <= FASTEST_M_S:
+        return flight, denied(f"Reposition denied: {speed:.2f} m/s; must be {SLOWEST_M_S} ... {FASTEST_M_S}")
+    held, verdict = hold(flight, request, view, settings)
+    asked = (request.east_m, request.north_m, request.altitude_m)
+    if verdict.result != mavlink.MAV_RESULT_ACCEPTED or asked == (None, None, None):
+        return held, verdict
+    resting = held.legs[-1]
+    assert isinstance(resting, Hold)
+    here = resting.position
+    there: Vec3 = (
+        here[0] if asked[0] is None else asked[0],
+        here[1] if asked[1] is None else asked[1],
+        here[2] if asked[2] is None else asked[2],
+    )
+    if not all(map(math.isfinite, there)):
+        return flight, denied("Reposition denied: not a place")
+    if there[2] < LEAST_ALTITUDE_M:
+        return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
+    place = below(there, settings) if flight.cable.released else there
+    beyond = forbidden(flight.area.fence, place, settings) if settings.fence.action else ""
+    if beyond:
+        return flight, denied(f"Reposition denied: {beyond}")
+    if norm(sub(there, here)) == 0.0:
+        return held, ACCEPTED
+    go = carry_leg(here, there, speed, settings.motion.accel_m_s2, settings.least_move_s)
+    legs = as_flown(held, (*held.legs[:-1], go, Hold(there)))
+    return replace(held, legs=legs, heeds=True), ACCEPTED
+
+
+def change_altitude(flight: Flight, request: ChangeAltitude, view: View, settings: Settings) -> Decision:
+    """Fly to another height of the load, and hold there."""
+    return reposition(flight, Reposition(None, None, request.altitude_m, True), view, settings)
+
+
+def change_speed(flight: Flight, request: ChangeSpeed, view: View, settings: Settings) -> Decision:
+    """Fly transfers at another speed from now on."""
+    if not SLOWEST_M_S <= request.speed_m_s <= FASTEST_M_S:
+        return flight, denied(f"Speed {request.speed_m_s:.2f} m/s denied; must be 0.05 ... 15")
+    return replace(flight, mission=replace(flight.mission, speed_m_s=request.speed_m_s)), ACCEPTED

@@ -1,0 +1,137 @@
+"""What each step of a mission sets out to fly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isfinite
+
+from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.guidance.legs import (
+    LOAD_ATTITUDE,
+    LOAD_POSITION,
+    QUAD_ATTITUDE,
+    Hold,
+    Leg,
+    Pass,
+    Run,
+    Swing,
+    reel_leg,
+)
+from autopilot.supervisor.motion import AT_REST, carry, length_at
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import Flight, Phase
+from autopilot.trajectory.shaping import Shaped, unshaped
+from autopilot.trajectory.timeline import RELEASE_S, MissionState, state_after
+from autopilot.trajectory.waypoint_path import Passage
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    Release,
+    ReturnHome,
+    Signals,
+    Speed,
+    Step,
+    Takeoff,
+    Waypoint,
+    Winch,
+)
+
+LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
+NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
+
+
+def destination(step: Step, here: Vec3, flight: Flight) -> Vec3:
+    """Where a step leads that begins with load or vehicle at rest at `here`."""
+    there = state_after(step, MissionState(here), flight.area.home).expected
+    assert there is not None, "from a known place"
+    return there
+
+
+def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tuple[Leg, ...]:
+    """The legs of a mission step that begins with the load at rest at `here`."""
+    match step:
+        case Takeoff():
+            up = destination(step, here, flight)
+            return (carry(here, up, settings.motion.lift_speed_m_s, settings),)
+        case Waypoint(hold_s=hold):
+            there = destination(step, here, flight)
+            path = made(flight, flight.mission.step)
+            go: Leg
+            if isinstance(path, Passage) and path.begin_s == 0.0 and norm(sub(here, path.start)) < NEAR_START:
+                fade = min(settings.least_move_s, float(path.table[-1, 1]))
+                go = Pass(path, sub(here, path.start), fade)
+            else:
+                go = carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight))
+            return (go, Hold(there, max(hold - borrowed(flight), 0.0))) if hold > 0.0 else (go,)
+        case Delay(duration_s=duration):
+            return (Hold(here, max(duration - borrowed(flight), 0.0)),)
+        case ReturnHome():
+            there = destination(step, here, flight)
+            return (carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight)),)
+        case Signals():
+            return (Run(here, _signals_of(flight, flight.mission.step) or unshaped(step)),)
+        case AttitudeRun(
+            controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
+        ):
+            mode = QUAD_ATTITUDE if controlled == "vehicle" else LOAD_ATTITUDE
+            return (Swing(here, north, east, duration, mode),)
+        case Speed():
+            return (Hold(here, 0.0),)
+        case Release():
+            return (Hold(here, RELEASE_S),)
+        case Winch(speed_m_s=speed):
+            wanted = settings.cable_length_m if flight.cable.reel_to_m is None else flight.cable.reel_to_m
+            length = length_at(flight, here, settings)
+            if abs(wanted - length) < LEAST_REEL_M:
+                return (Hold(here, 0.0),)
+            return (
+                reel_leg(here, length, wanted, speed or settings.winch.speed_m_s, settings.winch.accel_m_s2),
+            )
+        case Land():
+            return ()
+    raise AssertionError(step)
+
+
+def following_legs(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
+    """The legs of the step after the present one, where it begins at rest where this one ends."""
+    step = flight.mission.step + 1
+    if (
+        not flight.mission.active
+        or flight.phase not in (Phase.LIFT, Phase.MISSION)
+        or step >= len(flight.mission.plan.steps)
+    ):
+        return ()
+    last = flight.legs[-1] if flight.legs else None
+    if last is None or last.control_mode != LOAD_POSITION or not isfinite(last.duration_s):
+        return ()
+    end = last.jet(last.duration_s)
+    coming = flight.mission.plan.steps[step]
+    if norm(end[1]) > AT_REST or not isinstance(coming, Waypoint | Delay | ReturnHome | Signals):
+        return ()
+    return step_legs(coming, end[0], replace(flight, mission=replace(flight.mission, step=step)), settings)
+
+
+def made(flight: Flight, step: int) -> Shaped | Passage | None:
+    """What was made ready for a step of the plan, if anything was."""
+    made = flight.mission.plan.prepared.made
+    return made[step] if 0 <= step < len(made) else None
+
+
+def _signals_of(flight: Flight, step: int) -> Shaped | None:
+    """The signals that were made ready for a step of the plan, if it is one of these."""
+    found = made(flight, step)
+    return found if isinstance(found, Shaped) else None
+
+
+def borrowed(flight: Flight) -> float:
+    """Time (s) that the paths before and after the present step take from its hold: to come to rest, and to
+    get ready."""
+    before, after = _signals_of(flight, flight.mission.step - 1), _signals_of(flight, flight.mission.step + 1)
+    return (before.tail_s if before else 0.0) + (after.lead_s if after else 0.0)
+
+
+def _least_s(flight: Flight) -> float:
+    """What the transfer of the present step takes at least, for rotors, cable and tilt."""
+    least = flight.mission.plan.prepared.least_s
+    return least[flight.mission.step] if flight.mission.step < len(least) else 0.0

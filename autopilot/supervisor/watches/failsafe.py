@@ -1,0 +1,50 @@
+"""Failsafe: what makes it impossible to fly on. The rotors stop."""
+
+from __future__ import annotations
+
+from math import degrees, isfinite
+
+from autopilot.geometry.linear import norm, sub
+from autopilot.supervisor.motion import position_mode
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
+    CARRYING,
+    IN_AIR,
+    Event,
+    Flight,
+    View,
+    off_mission,
+    setpoint,
+)
+from autopilot.supervisor.watches.watched import Watched
+from autopilot.wire.dialect.plumbline import MAV_SEVERITY_EMERGENCY
+
+
+def watch_failsafe(flight: Flight, view: View, settings: Settings) -> Watched:
+    """Give the flight up when it cannot go on."""
+    why = trouble(flight, view, settings) if flight.phase in IN_AIR else ""
+    return given_up(flight, why) if why else Watched(flight)
+
+
+def given_up(flight: Flight, why: str) -> Watched:
+    """The end of a flight, with its reason."""
+    return Watched(off_mission(flight), Event.FAIL, ((MAV_SEVERITY_EMERGENCY, f"Flight given up: {why}"),))
+
+
+def trouble(flight: Flight, view: View, settings: Settings) -> str:
+    """Why the flight cannot go on, or an empty string."""
+    limits = settings.failsafe
+    if view.complaints:
+        return view.complaints[0]
+    if not all(map(isfinite, (view.tilt_rad, *view.x_quad, *view.v_quad, *view.x_load, *view.v_load))):
+        return "the estimate is no number"
+    if view.tilt_rad > limits.tilt_limit_rad:
+        limit = degrees(limits.tilt_limit_rad)
+        return f"tilt {degrees(view.tilt_rad):.0f} deg exceeds FS_TILT_DEG {limit:.0f}"
+    if flight.phase in CARRYING and flight.legs and flight.legs[0].control_mode == position_mode(flight):
+        jet = setpoint(flight, view.now_us)
+        what, place = ("vehicle", view.x_quad) if flight.cable.released else ("load", view.x_load)
+        error = norm(sub(place, jet[0])) if jet is not None else 0.0
+        if not error <= limits.load_error_limit_m:
+            return f"{what} error {error:.1f} m exceeds FS_LOAD_ERR {limits.load_error_limit_m:.1f} m"
+    return ""

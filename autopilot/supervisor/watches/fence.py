@@ -1,0 +1,61 @@
+"""The fence: load and vehicle, and the place at which the load could stop, must be within it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from autopilot.geometry.linear import axpy, sub
+from autopilot.guidance.legs import Catch
+from autopilot.supervisor.motion import asked_motion, stop, swings
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
+    CARRYING,
+    WARNING,
+    Event,
+    Flight,
+    View,
+    below,
+    forbidden,
+    off_mission,
+)
+from autopilot.supervisor.table import TRANSITIONS
+from autopilot.supervisor.watches.failsafe import given_up
+from autopilot.supervisor.watches.watched import Watched
+
+NO_ACTION, TERMINATE = 0, 4  # GF_ACTION
+FENCE_EVENTS = {2: Event.HOLD, 3: Event.RETURN, 5: Event.LAND}
+STOP_MARGIN = 0.05  # of the way to where the load would stop: while it speeds up, that moves on
+
+
+def watch_fence(flight: Flight, view: View, settings: Settings) -> Watched:
+    """Do what GF_ACTION says when the fence is breached, or the load could not stop before it."""
+    limits, area = settings.fence, flight.area
+    limited = area.fence.zones or limits.radius_m > 0.0 or limits.height_m > 0.0
+    if flight.phase not in CARRYING or limits.action == NO_ACTION or not limited:
+        return Watched(flight)
+    if isinstance(flight.legs[0], Catch):
+        return Watched(flight)
+    why = _breach(flight, view, settings)
+    if bool(why) == bool(area.breach):
+        return Watched(flight)
+    if not why:
+        return Watched(replace(flight, area=replace(area, breach="")))
+    noted = replace(area, breach=why, breaches=area.breaches + 1, breach_us=view.now_us)
+    flight = replace(flight, area=noted)
+    if limits.action == TERMINATE:
+        return given_up(flight, f"fence: {why}")
+    event, texts = FENCE_EVENTS.get(limits.action), ((WARNING, f"Fence: {why}"),)
+    if event is None or (flight.phase, event) not in TRANSITIONS:
+        return Watched(flight, None, texts)
+    return Watched(off_mission(flight), event, texts)
+
+
+def _breach(flight: Flight, view: View, settings: Settings) -> str:
+    """Why the fence is breached, or is about to be; an empty string if it is not."""
+    over = below(view.x_quad, settings)
+    places = [over] if flight.cable.released else [view.x_load, over]
+    if not swings(flight.legs[0]):
+        here, end = asked_motion(flight, view, settings)[0], stop(flight, view, settings)[1]
+        ahead = [here, axpy(STOP_MARGIN, sub(end, here), end)]
+        places += [below(place, settings) for place in ahead] if flight.cable.released else ahead
+    return next(filter(None, (forbidden(flight.area.fence, place, settings) for place in places)), "")

@@ -1,0 +1,20 @@
+"""Disarming by time: of a vehicle that stands armed for nothing, and of one that a failsafe brought down."""
+
+from __future__ import annotations
+
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import INFO, WARNING, Event, Flight, Phase, View
+from autopilot.supervisor.watches.watched import Watched
+
+IDLE_DISARM_US = 10_000_000
+FAILSAFE_DISARM_US = 3_000_000
+
+
+def watch_idle(flight: Flight, view: View, settings: Settings) -> Watched:
+    """Disarm when nothing has been asked of the armed vehicle, or some time after a failsafe."""
+    lasted_us = view.now_us - flight.phase_start_us
+    if flight.phase == Phase.ARMED and lasted_us > IDLE_DISARM_US:
+        return Watched(flight, Event.DISARM, ((INFO, "Disarmed: nothing was asked of the vehicle"),))
+    if flight.phase == Phase.FAILSAFE and lasted_us > FAILSAFE_DISARM_US:
+        return Watched(flight, Event.DISARM, ((WARNING, "Disarmed after failsafe"),))
+    return Watched(flight)

@@ -1,0 +1,82 @@
+"""The cable that goes slack in the air: a load that falls is caught, and then the phase goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from autopilot.geometry.linear import norm, sub
+from autopilot.guidance.legs import Catch, Creep
+from autopilot.supervisor.phase_legs import TOUCH_HEIGHT
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
+    CARRYING,
+    CRITICAL,
+    INFO,
+    WARNING,
+    Event,
+    Flight,
+    Phase,
+    View,
+    off_mission,
+)
+from autopilot.supervisor.watches.cable_pull import PULL_US, SLACK, share_pulled
+from autopilot.supervisor.watches.watched import Watched
+
+LIFT_OFF_US = 1_000_000  # after which a load that is being lifted is off the ground
+LYING_SPEED = 0.3  # m/s, less of a fallen load is noise or creep
+LEAST_GAP = 0.005  # m by which a cable must be too short for its ends to be believed slack
+SLACK_US = 20_000  # for which it must be so
+
+
+def watch_slack(flight: Flight, view: View, settings: Settings) -> Watched:
+    """Catch a load that falls freely; begin the phase again when it hangs on the cable."""
+    if flight.phase not in CARRYING or flight.cable.released:
+        return Watched(flight)
+    flight = _note_slack(flight, view, settings)
+    fallen = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < LYING_SPEED
+    if isinstance(flight.legs[0], Catch) and fallen:
+        flight = replace(off_mission(flight), cable=replace(flight.cable, slack_since_us=-1))
+        return Watched(flight, Event.LOAD_DOWN, ((CRITICAL, "The load fell to the ground: landing"),))
+    if flight.cable.slack_since_us < 0:
+        return Watched(flight)
+    lasted_us = view.now_us - flight.cable.slack_since_us
+    if not isinstance(flight.legs[0], Catch):
+        if lasted_us < SLACK_US:
+            return Watched(flight)
+        cable = replace(flight.cable, slack_since_us=-1)
+        catch = Catch(view.x_quad, cable.taut_length_m, settings.motion.snap_speed_m_s)
+        flight = replace(flight, legs=(catch,), leg_start_us=view.now_us, cable=cable)
+        return Watched(flight, None, ((WARNING, "Cable slack: falling with the load to catch it"),))
+    if lasted_us < PULL_US and not (lasted_us >= SLACK_US and share_pulled(view, settings) > SLACK):
+        return Watched(flight)
+    return _caught(flight)
+
+
+def _caught(flight: Flight) -> Watched:
+    """The load hangs on the cable again; a mission step that slackens it twice is not flown on."""
+    mission = flight.mission
+    again = mission.active and flight.cable.slack_step == mission.step
+    cable = replace(flight.cable, slack_since_us=-1, slack_step=mission.step if mission.active else -1)
+    flight = replace(flight, legs=(), cable=cable)
+    if again:
+        text = "Cable slack again in this mission item: holding"
+        return Watched(off_mission(flight), Event.HOLD, ((CRITICAL, text),))
+    return Watched(flight, Event.CAUGHT, ((INFO, "Load caught"),))
+
+
+def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
+    """Note since when the cable is slack although the load should hang on it; while it is caught: taut.
+
+    A gust can hide or feign a pull, a tracker's noise a few millimetres: both must tell of a small gap.
+    """
+    if isinstance(flight.legs[0], Catch):
+        noted = view.taut
+    else:
+        gap = flight.cable.taut_length_m - norm(sub(view.x_quad, view.x_load))
+        loose = not view.taut or (gap > LEAST_GAP and share_pulled(view, settings) < SLACK)
+        lifting = flight.phase == Phase.LIFT and view.now_us - flight.phase_start_us < LIFT_OFF_US
+        on_ground = lifting or (flight.phase == Phase.LOWER and isinstance(flight.legs[0], Creep))
+        noted = loose and not on_ground
+    if noted == (flight.cable.slack_since_us >= 0):
+        return flight
+    return replace(flight, cable=replace(flight.cable, slack_since_us=view.now_us if noted else -1))

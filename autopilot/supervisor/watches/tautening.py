@@ -1,0 +1,78 @@
+"""Pulling the cable taut: the rising vehicle is kept over its load until the cable pulls."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from autopilot.geometry.linear import norm, sub
+from autopilot.guidance.legs import QUAD_POSITION, Creep, transfer_leg
+from autopilot.supervisor.phase_legs import CLEARANCE, HEIGHT_SIGMAS, SLACK_ACCEL, SLACK_SPEED
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
+    CRITICAL,
+    INFO,
+    Event,
+    Flight,
+    Phase,
+    View,
+    leg_time_s,
+    off_mission,
+)
+from autopilot.supervisor.watches.cable_pull import PULL_US, PULLED, share_pulled
+from autopilot.supervisor.watches.watched import Watched
+
+ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable taut is moved over it
+TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have come taut
+
+
+def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
+    """Lift when the cable pulls; land when the vehicle rises and it never does."""
+    if flight.phase != Phase.TAUTEN or len(flight.legs) != 1:
+        return Watched(flight)
+    flight = _note_pull(flight, view, settings)
+    if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= PULL_US:
+        length = norm(sub(view.x_quad, view.x_load))
+        flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
+        return Watched(flight, Event.TAUT, ((INFO, "Cable taut, lifting the load"),))
+    flight = _over_load(flight, view)
+    creeps = len(flight.legs) == 1 and flight.still_since_us < 0
+    if creeps and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
+        flight, view, settings
+    ):
+        text = "Cable never taut, landing; check VEH_CABLE_LEN"
+        return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
+    return Watched(flight)
+
+
+def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
+    """Note since when the cable that is being tautened pulls.
+
+    It counts as taut a little before it is: if lifting began then, it would come taut in the middle of it.
+    """
+    pulls = share_pulled(view, settings) > PULLED and view.taut
+    if pulls == (flight.still_since_us >= 0):
+        return flight
+    return replace(flight, still_since_us=view.now_us if pulls else -1)
+
+
+def _over_load(flight: Flight, view: View) -> Flight:
+    """The rising vehicle, moved over a load that was not seen well from the ground."""
+    creep = flight.legs[0]
+    assert isinstance(creep, Creep)
+    at = creep.jet(leg_time_s(flight, view.now_us))[0]
+    over = (view.x_load[0], view.x_load[1], at[2])
+    if norm(sub(over, at)) <= ASTRAY:
+        return flight
+    legs = (
+        transfer_leg(at, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
+        replace(creep, begin=over),
+    )
+    return replace(flight, legs=legs, leg_start_us=view.now_us)
+
+
+def _taut_by(flight: Flight, view: View, settings: Settings) -> float:
+    """Height over home that the vehicle need not climb beyond to pull the cable taut."""
+    creep = flight.legs[0]
+    assert isinstance(creep, Creep)
+    unsure = HEIGHT_SIGMAS * view.height_std
+    return creep.begin[2] + (TAUT_LATEST - CLEARANCE) * settings.cable_length_m + unsure

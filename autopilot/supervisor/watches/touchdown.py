@@ -1,0 +1,56 @@
+"""Touchdown, first of the load and then of the vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from autopilot.guidance.legs import LOAD_POSITION, Creep
+from autopilot.supervisor.phase_legs import TOUCH_SPEED
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import INFO, Event, Flight, Phase, View, leg_time_s
+from autopilot.supervisor.watches.watched import Watched
+
+LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
+STILL_SPEED, STILL_US = 0.05, 200_000
+
+
+def watch_touchdown(flight: Flight, view: View, settings: Settings) -> Watched:
+    """Go on to set the vehicle down when the load lies; disarm when the vehicle stands."""
+    if flight.phase not in (Phase.LOWER, Phase.SET_DOWN):
+        return Watched(flight)
+    flight = _note_stop(flight, view, settings)
+    if flight.still_since_us < 0 or view.now_us - flight.still_since_us < STILL_US:
+        return Watched(flight)
+    if flight.phase == Phase.LOWER and not flight.cable.released:
+        return Watched(flight, Event.LOAD_DOWN, ((INFO, "Load on the ground"),))
+    return _landed(flight)
+
+
+def _landed(flight: Flight) -> Watched:
+    """The vehicle stands on the ground: a mission that landed it has reached that item."""
+    mission = flight.mission
+    reached: tuple[int, ...] = ()
+    if mission.active:
+        reached = (mission.plan.sequence[mission.step],)
+        mission = replace(mission, done=mission.step + 1 >= len(mission.plan.steps))
+    text = (INFO, "Landed, disarmed")
+    return Watched(replace(flight, mission=mission), Event.VEHICLE_DOWN, (text,), reached)
+
+
+def _note_stop(flight: Flight, view: View, settings: Settings) -> Flight:
+    """Note since when the thing that is set down no longer follows its sinking setpoint.
+
+    A load that still sinks keeps behind the setpoint by what it sinks in the lag of the law.
+    The vehicle must stand still as well: a gust may hold it up. The load's velocity says nothing once the
+    cable is slack.
+    """
+    leg = flight.legs[0]
+    if isinstance(leg, Creep):
+        target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
+        if leg.control_mode == LOAD_POSITION:
+            down = view.x_load[2] - target > LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED
+        else:
+            down = view.x_quad[2] - target > VEHICLE_SUNK and abs(view.v_quad[2]) < STILL_SPEED
+        if down:
+            return flight if flight.still_since_us >= 0 else replace(flight, still_since_us=view.now_us)
+    return flight if flight.still_since_us < 0 else replace(flight, still_since_us=-1)

@@ -1,0 +1,30 @@
+"""The one signature of all watches, and what they return."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import Event, Flight, Text, View
+
+
+class Watched(NamedTuple):
+    """What a watch found: the flight with what it noted in it, and an event with texts, or nothing.
+
+    Texts without an event are told, and the phase goes on. A watch that found something ends the tick: those
+    behind it look again at the next.
+    """
+
+    flight: Flight
+    event: Event | None = None
+    texts: tuple[Text, ...] = ()
+    reached: tuple[int, ...] = ()  # mission items
+
+    @property
+    def found(self) -> bool:
+        """Whether there is an event or a text."""
+        return self.event is not None or bool(self.texts)
+
+
+Watch = Callable[[Flight, View, Settings], Watched]
