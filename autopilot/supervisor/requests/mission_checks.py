@@ -37,8 +37,8 @@ def upload_trouble(
     On the ground it begins where the load stands; in the air it may be begun anywhere.
     """
     start = replace(ANYWHERE, cable_m=settings.cable_length_m, released=flight.cable.released)
-    if flight.phase in ON_GROUND and not view.complaints:
-        start = replace(start, expected=_stands_at(flight, view), known=True)
+    if flight.phase in ON_GROUND:
+        start = _on_ground(flight, view, settings)
     ahead = list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
     return leaves_fence(flight, ahead, settings)
 
@@ -48,7 +48,7 @@ def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
     mission, cable = flight.mission, flight.cable
     steps, sequence = mission.plan.steps[mission.step :], mission.plan.sequence[mission.step :]
     if flight.phase in ON_GROUND:
-        here, length = _stands_at(flight, view), settings.cable_length_m
+        start = _on_ground(flight, view, settings)
         lift = Takeoff(lift_altitude_m(mission.plan, settings))
         if isinstance(steps[0], Takeoff):
             steps = (lift, *steps[1:])
@@ -61,7 +61,7 @@ def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
             here = mission.step_anchor  # begun anew, from where it began
         if cable.reel_to_m is not None and isinstance(steps[0], Winch):  # taken up again
             steps = (replace(steps[0], length_m=cable.reel_to_m - length), *steps[1:])
-    start = MissionState(here, cable_m=length, released=cable.released)
+        start = MissionState(here, cable_m=length, released=cable.released)
     return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
 
 
@@ -71,8 +71,12 @@ def lift_altitude_m(plan: MissionPlan, settings: Settings) -> float:
     return settings.motion.takeoff_altitude_m if first is None else first.altitude_m
 
 
-def _stands_at(flight: Flight, view: View) -> Vec3:
-    return view.x_quad if flight.cable.released else view.x_load
+def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
+    """Where the load stands, or the vehicle without it; anywhere while the estimate is not fit for flight."""
+    released = flight.cable.released
+    here = view.x_quad if released else view.x_load
+    start = ANYWHERE if view.complaints else MissionState(here)
+    return replace(start, cable_m=settings.cable_length_m, released=released)
 
 
 def leaves_fence(flight: Flight, ahead: Ahead, settings: Settings) -> str:
