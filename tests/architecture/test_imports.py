@@ -36,7 +36,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.geometry": (),
     "autopilot.vehicle.model": (),
     "autopilot.trajectory": ("autopilot.geometry", "autopilot.vehicle.model", "missions"),
-    "autopilot.wire": ("autopilot.geometry", "missions"),
+    "autopilot.wire": ("autopilot.geometry", "autopilot.trajectory", "missions"),
     "autopilot.vehicle": ("autopilot.geometry", "missions", "autopilot.wire"),
     "autopilot.services": LEAVES,
     "autopilot.control": LEAVES,
