@@ -35,12 +35,12 @@ from autopilot.guidance.legs import (
 )
 from autopilot.guidance.setpoint_follower import Posture
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.flight import (
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
     IN_AIR,
     Flight,
     Phase,
     Report,
-    Settings,
     View,
     carries,
     jet_ahead,
@@ -86,7 +86,7 @@ class FlightState(NamedTuple):
 
 def with_cable(setup: Setup, flight: Flight) -> Setup:
     """The setup of a vehicle whose cable is as the winch has it; the same where that never worked."""
-    length = flight.cable_m
+    length = flight.cable.length_m
     if length is None:
         return setup
     settings = setup.settings
@@ -123,7 +123,7 @@ def view_of(
         state.v_load,
         estimator.load.taut > 0.0,
         tilt_angle(state.R),
-        complaints(estimator, settings.sensor_age_limit_s, carries=carrying),
+        complaints(estimator, settings.failsafe.sensor_age_limit_s, carries=carrying),
         pull_n,
         estimator.doubt.vertical if estimator.vehicle.source == RECEIVER else 0.0,
     )
@@ -146,12 +146,12 @@ def step(
     flight = cable_now(before.flight, now_us)
     setup = with_cable(setup, flight)
     estimator, tuning = before.estimator, setup.tuning
-    if flight.cable_m is not None:
-        was = before.flight.cable_m
-        estimator = lengthened(estimator, 0.0 if was is None else flight.cable_m - was)
-        readings = as_if_firm(readings, estimator, flight.reel_rate)
+    if flight.cable.length_m is not None:
+        was = before.flight.cable.length_m
+        estimator = lengthened(estimator, 0.0 if was is None else flight.cable.length_m - was)
+        readings = as_if_firm(readings, estimator, flight.cable.reel_rate)
     before = before._replace(flight=flight)
-    if before.flight.released:
+    if before.flight.cable.released:
         tuning = untied(tuning)
         estimator = parted(estimator, history, tuning)
     estimator = estimate(estimator, history, readings, tuning, dt, before.actuation.thrust)
@@ -164,13 +164,13 @@ def step(
 def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState, Report]:
     """The supervisor's, the law's and the mixer's part of a tick: `before` holds the estimate already."""
     estimator, reel = before.estimator, before.flight
-    state = as_reeled(control_state(estimator), estimator, reel.reel_rate)
+    state = as_reeled(control_state(estimator), estimator, reel.cable.reel_rate)
     pull_n = felt_pull(before, state, setup)
     view = view_of(estimator, state, setup.settings, now_us, pull_n, carries(before.flight))
     flight, report = advance(before.flight, view, setup.settings)
 
     taut = view.taut
-    slack_events = before.slack_events + (before.was_taut and not taut and not flight.released)
+    slack_events = before.slack_events + (before.was_taut and not taut and not flight.cable.released)
     observed = before.observed if before.observed is not None else nominal(setup.vehicle)
     observed = observe(
         observed,
@@ -205,7 +205,7 @@ def control(before: FlightState, setup: Setup, now_us: int) -> tuple[FlightState
     memory = after.memory
     if memory is None or leg.control_mode != after.control_mode:
         memory = setup.law.start(state, jet[0], jet[1])
-    pushed = with_reel(observed, state, reel.reel_accel, setup.vehicle.quad_mass)
+    pushed = with_reel(observed, state, reel.cable.reel_accel, setup.vehicle.quad_mass)
     memory, command = track(setup, memory, state, leg, jet, t, after.actuation, pushed)
     mixed = mix(command.thrust, command.moment, setup.vehicle, setup.limited)
     return after._replace(

@@ -21,24 +21,29 @@ from autopilot.estimation.filter import Readings
 from autopilot.estimation.records import EstimatorState
 from autopilot.geometry.linear import Vec3, axpy
 from autopilot.guidance.legs import top_of
-from autopilot.supervisor.flight import Flight, leg_time_s
+from autopilot.supervisor.state import Flight, leg_time_s
 
 
 def cable_now(flight: Flight, now_us: int) -> Flight:
     """The flight with its cable as the winch has it at this instant."""
     top = top_of(flight.legs[0]) if flight.legs else None
     if top is None:
-        resting = flight.reel_rate == 0.0 and flight.reel_accel == 0.0
-        return flight if resting else replace(flight, reel_rate=0.0, reel_accel=0.0)
+        resting = flight.cable.reel_rate == 0.0 and flight.cable.reel_accel == 0.0
+        return (
+            flight if resting else replace(flight, cable=replace(flight.cable, reel_rate=0.0, reel_accel=0.0))
+        )
     jet = flight.legs[0].jet(leg_time_s(flight, now_us))
     length = top - jet[0][2]
-    grown = 0.0 if flight.cable_m is None else length - flight.cable_m
+    grown = 0.0 if flight.cable.length_m is None else length - flight.cable.length_m
     return replace(
         flight,
-        cable_m=length,
-        reel_rate=-jet[1][2],
-        reel_accel=-jet[2][2],
-        taut_length_m=flight.taut_length_m + grown,
+        cable=replace(
+            flight.cable,
+            length_m=length,
+            reel_rate=-jet[1][2],
+            reel_accel=-jet[2][2],
+            taut_length_m=flight.cable.taut_length_m + grown,
+        ),
     )
 
 

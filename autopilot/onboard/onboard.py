@@ -25,6 +25,7 @@ from autopilot.core.warmup import rehearse
 from autopilot.core.winch import as_reeled, commanded_rate
 from autopilot.estimation.filter import control_state, estimator_tuning
 from autopilot.estimation.records import new_history
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
@@ -45,10 +46,11 @@ from autopilot.services.records import (
     Verdict,
     WorldSaved,
 )
-from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
+from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
 from autopilot.services.snapshot import Snapshot
-from autopilot.supervisor.flight import ON_GROUND, MissionPlan, Phase, carries, settings_from
 from autopilot.supervisor.requests import decide, with_plan
+from autopilot.supervisor.settings import settings_from
+from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase, carries
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
@@ -57,7 +59,7 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
-from missions.model import Step, Waypoint
+from missions.model import ReturnHome, Step, Waypoint
 
 GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
@@ -74,10 +76,11 @@ class Work(NamedTuple):
     steps: tuple[Step, ...]
     sequence: tuple[int, ...]
     limits: Limits
+    home: Vec3 = ZERO  # where a return leads
 
     def done(self) -> Prepared:
         """What comes of it; takes from a millisecond to some seconds."""
-        return prepare(self.steps, self.sequence, self.limits)
+        return prepare(self.steps, self.sequence, self.limits, self.home)
 
 
 def build_setup(table: ParameterTable, control_every: int) -> Setup:
@@ -96,11 +99,12 @@ def build_setup(table: ParameterTable, control_every: int) -> Setup:
     )
 
 
-def plan_of(mission: StoredMission, home: Home, limits: Limits | None) -> MissionPlan:
-    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet."""
-    steps = located_steps(mission.items, home)
+def plan_of(mission: StoredMission, home: Home, limits: Limits | None, return_to: Vec3 = ZERO) -> MissionPlan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet. A
+    return leads to `return_to`."""
+    steps = located_steps(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
-    prepared = PENDING if limits is None else prepare(flown, sequence, limits)
+    prepared = PENDING if limits is None else prepare(flown, sequence, limits, return_to)
     return MissionPlan(flown, sequence, len(mission.items), prepared)
 
 
@@ -171,7 +175,7 @@ class Onboard:
             self._state.mixed.forces,
             self.armed,
             self._options.lockstep,
-            self._state.flight.released,
+            self._state.flight.cable.released,
             commanded_rate(self._state.flight, tick.now_us, self._shortest_us * 1e-6),
         )
         aside = self._world.messages(self.now_us)
@@ -217,7 +221,7 @@ class Onboard:
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
-            last = self._state.flight.mission_done and seq == report.reached[-1]
+            last = self._state.flight.mission.done and seq == report.reached[-1]
             self.endpoint.item_reached(seq, last)
         if self._log is not None:
             rate_hz = self.parameters["LOG_RATE_HZ"]
@@ -278,7 +282,7 @@ class Onboard:
         self._setup = build_setup(self.parameters, every)
         self._battery = battery_constants(self.parameters)
         # a mission under way keeps the paths that it began with
-        if self._setup.settings.limits != self._prepared_for and not self._state.flight.on_mission:
+        if self._setup.settings.limits != self._prepared_for and not self._state.flight.mission.active:
             self._prepare()
 
     # ---- ground
@@ -361,24 +365,45 @@ class Onboard:
         state = self._state
         estimator, flight = state.estimator, state.flight
         settings = with_cable(self._setup, flight).settings
-        seen = as_reeled(control_state(estimator), estimator, flight.reel_rate)
+        seen = as_reeled(control_state(estimator), estimator, flight.cable.reel_rate)
         view = view_of(estimator, seen, settings, self.now_us, carrying=carries(flight))
         flight, verdict = decide(flight, request, view, settings)
         self._state = state._replace(flight=flight)
+        if isinstance(request, SetHome) and flight.area.home != state.flight.area.home:
+            self._follow_home()
         return verdict
+
+    def _follow_home(self) -> None:
+        """Read and prepare the mission anew where it returns to another home; one under way keeps its paths,
+        as it does when a parameter is changed."""
+        flight = self._state.flight
+        mission = flight.mission
+        if mission.active or not any(isinstance(step, ReturnHome) for step in mission.plan.steps):
+            return
+        plan = plan_of(self.endpoint.mission, self._options.home, None, flight.area.home)
+        current, item = mission.step, mission.plan.sequence[mission.step]
+        if len(plan.steps) != len(
+            mission.plan.steps
+        ):  # to land at a place of its own may be two steps by now
+            current = plan.sequence.index(item)
+        mission = replace(mission, plan=plan, step=current)
+        self._state = self._state._replace(flight=replace(flight, mission=mission))
+        self._prepare()
 
     def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Another fence, other rally points."""
         self.endpoint.set_areas(kind, items)
         flight = self._state.flight
         if kind == mavlink.MAV_MISSION_TYPE_FENCE:
-            flight = replace(flight, fence=read_fence(items, self._options.home), breach="")
+            flight = replace(
+                flight, area=replace(flight.area, fence=read_fence(items, self._options.home), breach="")
+            )
         else:
-            flight = replace(flight, rally=read_rally(items, self._options.home))
+            flight = replace(flight, area=replace(flight.area, rally=read_rally(items, self._options.home)))
         self._state = self._state._replace(flight=flight)
 
     def _take_plan(self, mission: StoredMission) -> None:
-        plan = plan_of(mission, self._options.home, None)
+        plan = plan_of(mission, self._options.home, None, self._state.flight.area.home)
         self._state = self._state._replace(flight=with_plan(self._state.flight, plan))
         self._prepare()
         kept = unflown(mission.items)
@@ -388,9 +413,9 @@ class Onboard:
 
     def _prepare(self) -> None:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
-        plan, limits = self._state.flight.plan, self._setup.settings.limits
+        plan, limits = self._state.flight.mission.plan, self._setup.settings.limits
         self._prepared_for = limits
-        self.work = Work(plan.steps, plan.sequence, limits)
+        self.work = Work(plan.steps, plan.sequence, limits, self._state.flight.area.home)
         self._have_prepared(PENDING)
         short = self._state.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
         if self._options.clock_waits or short:
@@ -407,7 +432,9 @@ class Onboard:
 
     def _have_prepared(self, prepared: Prepared) -> None:
         flight = self._state.flight
-        flight = replace(flight, plan=replace(flight.plan, prepared=prepared))
+        flight = replace(
+            flight, mission=replace(flight.mission, plan=replace(flight.mission.plan, prepared=prepared))
+        )
         self._state = self._state._replace(flight=flight)
 
     def _snapshot(self) -> Snapshot:

@@ -16,7 +16,8 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, asked_jet
 from autopilot.services import identity, snapshot
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.snapshot import GpsFix, Snapshot
-from autopilot.supervisor.flight import (
+from autopilot.supervisor.requests import arming_complaints
+from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
     ON_GROUND,
@@ -27,7 +28,6 @@ from autopilot.supervisor.flight import (
     carries,
     leg_time_s,
 )
-from autopilot.supervisor.requests import arming_complaints
 from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -87,7 +87,7 @@ class Options:
 
 def sub_mode(flight: Flight) -> int:
     """Sub-mode of AUTO: what was asked for, of which the phase is a part."""
-    if flight.on_mission:
+    if flight.mission.active:
         return identity.AUTO_MISSION
     if flight.phase in ON_GROUND:
         return _SELECTED_MODES[flight.selected]
@@ -99,8 +99,8 @@ def mode_of(flight: Flight) -> tuple[int, int]:
     rising = flight.phase in ON_GROUND or flight.phase in (Phase.TAUTEN, Phase.LIFT)
     if flight.selected == Selected.OFFBOARD and rising:
         return identity.OFFBOARD, 0
-    if flight.phase == Phase.GUIDED and flight.guide in _GUIDE_MODES:
-        return _GUIDE_MODES[flight.guide], 0
+    if flight.phase == Phase.GUIDED and flight.setpoints.guide in _GUIDE_MODES:
+        return _GUIDE_MODES[flight.setpoints.guide], 0
     return identity.AUTO, sub_mode(flight)
 
 
@@ -117,11 +117,11 @@ def mission_state(flight: Flight, items: int) -> int:
     """MISSION_STATE of the flight."""
     if items == 0:
         return mavlink.MISSION_STATE_NO_MISSION
-    if flight.on_mission:
+    if flight.mission.active:
         return mavlink.MISSION_STATE_ACTIVE
-    if flight.mission_done:
+    if flight.mission.done:
         return mavlink.MISSION_STATE_COMPLETE
-    if flight.phase not in ON_GROUND and (flight.step > 0 or flight.step_anchor is not None):
+    if flight.phase not in ON_GROUND and (flight.mission.step > 0 or flight.mission.step_anchor is not None):
         return mavlink.MISSION_STATE_PAUSED
     return mavlink.MISSION_STATE_NOT_STARTED
 
@@ -169,7 +169,7 @@ def make_snapshot(
 ) -> Snapshot:
     """All that telemetry tells of this instant."""
     flight, estimator, command = state.flight, state.estimator, state.command
-    control = as_reeled(control_state(estimator), estimator, flight.reel_rate)
+    control = as_reeled(control_state(estimator), estimator, flight.cable.reel_rate)
     view = view_of(estimator, control, setup.settings, now_us, carrying=carries(flight))
     ready = not arming_complaints(flight, view, setup.settings)
     present, healthy = sensor_bits(condition, state, ready, fake_gps, now_us)
@@ -194,17 +194,17 @@ def make_snapshot(
             x_asked, v_asked = asked[0], asked[1]
         elif leg.control_mode == QUAD_POSITION:
             x_quad_d = jet[0]
-    sequence = flight.plan.sequence
-    seq = sequence[min(flight.step, len(sequence) - 1)] if sequence else 0
+    sequence = flight.mission.plan.sequence
+    seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
     carrying = flight.phase in CARRYING
     return Snapshot(
         now_us=now_us,
         boot_unix_us=options.boot_unix_us,
         home=options.home,
-        launch=flight.home,
-        breach=flight.breach,
-        breaches=flight.breaches,
-        breach_us=flight.breach_us,
+        launch=flight.area.home,
+        breach=flight.area.breach,
+        breaches=flight.area.breaches,
+        breach_us=flight.area.breach_us,
         armed=flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
         phase=int(flight.phase),
         main_mode=mode_of(flight)[0],
@@ -264,7 +264,7 @@ def make_snapshot(
         mission_current=seq,
         mission_total=len(mission.items),
         mission_state=mission_state(flight, len(mission.items)),
-        reel_rate=flight.reel_rate,
+        reel_rate=flight.cable.reel_rate,
     )
 
 

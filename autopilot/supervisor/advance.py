@@ -25,24 +25,6 @@ from autopilot.guidance.legs import (
     transfer_leg,
 )
 from autopilot.guidance.setpoint_follower import SILENT, AttitudeSetpoint, Follow, PositionSetpoint, Posture
-from autopilot.supervisor.flight import (
-    CARRYING,
-    IN_AIR,
-    ON_GROUND,
-    Event,
-    Flight,
-    Guide,
-    Phase,
-    Report,
-    Selected,
-    Settings,
-    View,
-    below,
-    forbidden,
-    leg_time_s,
-    pace_of,
-    setpoint,
-)
 from autopilot.supervisor.phase_legs import (
     CLEARANCE,
     ENTRY,
@@ -64,6 +46,25 @@ from autopilot.supervisor.phase_legs import (
     step_legs,
     stop,
     swings,
+)
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
+    CARRYING,
+    IN_AIR,
+    ON_GROUND,
+    Event,
+    Flight,
+    Guide,
+    Phase,
+    Report,
+    Selected,
+    View,
+    below,
+    forbidden,
+    leg_time_s,
+    off_mission,
+    pace_of,
+    setpoint,
 )
 from autopilot.trajectory.waypoint_path import Passage
 from autopilot.wire.dialect import plumbline as mavlink
@@ -176,7 +177,7 @@ def enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Fligh
 def happen(flight: Flight, event: Event, view: View, settings: Settings) -> Flight | None:
     """The flight after an event; None where the table has no room for it."""
     phase = TRANSITIONS.get((flight.phase, event))
-    if phase == P.TAUTEN and flight.released:  # there is no cable to pull taut
+    if phase == P.TAUTEN and flight.cable.released:  # there is no cable to pull taut
         phase = P.LIFT
     return None if phase is None else enter(flight, phase, view, settings)
 
@@ -194,7 +195,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         return _to(flight, E.DISARM, view, settings, (INFO, "Disarmed: nothing was asked of the vehicle"))
     if flight.phase == P.FAILSAFE and view.now_us - flight.phase_start_us > FAILSAFE_DISARM_US:
         return _to(flight, E.DISARM, view, settings, (WARNING, "Disarmed after failsafe"))
-    had_load = not flight.released
+    had_load = not flight.cable.released
     if flight.phase in CARRYING and had_load:
         flight = _note_slack(flight, view, settings)
         caught = _watch_slack(flight, view, settings)
@@ -208,7 +209,9 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
     if flight.phase == P.TAUTEN and len(flight.legs) == 1:
         flight = _note_pull(flight, view, settings)
         if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= PULL_US:
-            flight = replace(flight, taut_length_m=norm(sub(view.x_quad, view.x_load)))
+            flight = replace(
+                flight, cable=replace(flight.cable, taut_length_m=norm(sub(view.x_quad, view.x_load)))
+            )
             return _to(flight, E.TAUT, view, settings, (INFO, "Cable taut, lifting the load"))
         flight = _over_load(flight, view)
         creeps = len(flight.legs) == 1 and flight.still_since_us < 0
@@ -216,7 +219,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
             flight, view, settings
         ):
             text = "Cable never taut, landing; check VEH_CABLE_LEN"
-            return _to(replace(flight, on_mission=False), E.LAND, view, settings, (CRITICAL, text))
+            return _to(off_mission(flight), E.LAND, view, settings, (CRITICAL, text))
     if flight.phase in (P.LOWER, P.SET_DOWN):
         flight = _watch_touchdown(flight, view, settings)
         if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= STILL_US:
@@ -242,7 +245,7 @@ def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Rep
         flight, more = _legs_done(_reeled(flight), view, settings)
         reached += more.reached
         texts += more.texts
-    if flight.released and had_load:
+    if flight.cable.released and had_load:
         texts += ((INFO, RELEASED_TEXT),)
     return flight, Report(texts, reached)
 
@@ -254,7 +257,7 @@ def _reeled(flight: Flight) -> Flight:
     if leg is None or top is None:
         return flight
     length = top - leg.jet(leg.duration_s)[0][2]
-    return replace(flight, cable_m=length, reel_rate=0.0, reel_accel=0.0)
+    return replace(flight, cable=replace(flight.cable, length_m=length, reel_rate=0.0, reel_accel=0.0))
 
 
 def _to(
@@ -270,35 +273,53 @@ def _to(
 def disarmed(flight: Flight) -> Flight:
     """The flight with its rotors stopped: nothing selected, the mission rewound."""
     return replace(
-        flight, selected=Selected.NOTHING, on_mission=False, step=0, step_anchor=None, reel_to_m=None, legs=()
+        flight,
+        selected=Selected.NOTHING,
+        mission=replace(flight.mission, active=False, step=0, step_anchor=None),
+        cable=replace(flight.cable, reel_to_m=None),
+        legs=(),
     )
 
 
 def _landed(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     reached: tuple[int, ...] = ()
-    if flight.on_mission:
-        reached = (flight.plan.sequence[flight.step],)
-        flight = replace(flight, mission_done=flight.step + 1 >= len(flight.plan.steps))
+    if flight.mission.active:
+        reached = (flight.mission.plan.sequence[flight.mission.step],)
+        flight = replace(
+            flight,
+            mission=replace(flight.mission, done=flight.mission.step + 1 >= len(flight.mission.plan.steps)),
+        )
     after, report = _to(flight, E.VEHICLE_DOWN, view, settings, (INFO, "Landed, disarmed"))
     return after, Report(report.texts, reached)
 
 
 def lost(flight: Flight, now_us: int, settings: Settings) -> bool:
     """Whether nothing is heard any more from the flight's guide."""
-    if flight.guide == Guide.OFFBOARD:
-        if settings.guided_mode:
-            stays = isinstance(flight.offboard.asked, PositionSetpoint) and flight.offboard.asked.is_place
-            return not stays and not flight.offboard.alive(now_us, settings.guided_loss_us)
-        return not flight.offboard.alive(now_us, settings.offboard_loss_us)
-    return flight.guide == Guide.MANUAL and not flight.manual.alive(now_us, settings.manual_loss_us)
+    if flight.setpoints.guide == Guide.OFFBOARD:
+        if settings.setpoints.guided_mode:
+            stays = (
+                isinstance(flight.setpoints.offboard.asked, PositionSetpoint)
+                and flight.setpoints.offboard.asked.is_place
+            )
+            return not stays and not flight.setpoints.offboard.alive(
+                now_us, settings.setpoints.guided_loss_us
+            )
+        return not flight.setpoints.offboard.alive(now_us, settings.setpoints.offboard_loss_us)
+    return flight.setpoints.guide == Guide.MANUAL and not flight.setpoints.manual.alive(
+        now_us, settings.setpoints.manual_loss_us
+    )
 
 
 def _guide(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The load led on towards what is asked at this moment; held if nobody asks any more."""
     if lost(flight, view.now_us, settings):
-        text = f"Nothing heard from {flight.guide.value} any more: holding"
+        text = f"Nothing heard from {flight.setpoints.guide.value} any more: holding"
         return _to(flight, E.HOLD, view, settings, (WARNING, text))
-    if flight.guide == Guide.ORBIT and flight.circle is not None and view.now_us >= flight.circle.ends_us:
+    if (
+        flight.setpoints.guide == Guide.ORBIT
+        and flight.setpoints.circle is not None
+        and view.now_us >= flight.setpoints.circle.ends_us
+    ):
         return _to(flight, E.HOLD, view, settings, (INFO, "Circle flown: holding"))
     asked, leg = asked_of(flight), flight.legs[0]
     if isinstance(leg, Posture) and isinstance(asked, AttitudeSetpoint):
@@ -316,7 +337,7 @@ def _guide(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Repo
 
 def _rise(flight: Flight, view: View, settings: Settings) -> Flight:
     """From the ground a setpoint above it takes the load up."""
-    asked = flight.offboard.asked
+    asked = flight.setpoints.offboard.asked
     if not isinstance(asked, PositionSetpoint) or lost(flight, view.now_us, settings):
         return flight
     height = asked.position[2]
@@ -324,7 +345,12 @@ def _rise(flight: Flight, view: View, settings: Settings) -> Flight:
         if not asked.velocity[2] > 0.0:
             return flight
         height = LEAST_HEIGHT
-    up = replace(flight, speed_m_s=settings.speed_m_s, takeoff_altitude_m=height, on_mission=False)
+    up = replace(
+        flight,
+        mission=replace(
+            flight.mission, speed_m_s=settings.motion.speed_m_s, takeoff_altitude_m=height, active=False
+        ),
+    )
     after = happen(up, E.TAKEOFF, view, settings)
     assert after is not None
     return after
@@ -336,10 +362,10 @@ def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     if isinstance(calm, Calm) and not calm.ends_step:  # now the phase can begin
         legs = as_flown(flight, ENTRY[flight.phase](flight, view, settings))
         return replace(flight, legs=legs, leg_start_us=view.now_us), Report()
-    if flight.on_mission and flight.phase in (P.LIFT, P.MISSION):
+    if flight.mission.active and flight.phase in (P.LIFT, P.MISSION):
         return _step_done(flight, view, settings)
     if flight.phase == P.LIFT and flight.selected == Selected.OFFBOARD:
-        offboard = replace(flight, guide=Guide.OFFBOARD)
+        offboard = replace(flight, setpoints=replace(flight.setpoints, guide=Guide.OFFBOARD))
         if not lost(offboard, view.now_us, settings):
             return enter(offboard, P.GUIDED, view, settings), Report()
     after = happen(flight, E.DONE, view, settings)
@@ -352,11 +378,11 @@ def _legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
 
 def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The present mission step is over: the next one, or the end of the mission."""
-    plan = flight.plan
-    step = plan.steps[flight.step]
+    plan = flight.mission.plan
+    step = plan.steps[flight.mission.step]
     if flight.phase == P.LIFT and not isinstance(step, Takeoff):  # lifted unasked
         return begin_step(flight, view, settings), Report()
-    following = plan.steps[flight.step + 1] if flight.step + 1 < len(plan.steps) else None
+    following = plan.steps[flight.mission.step + 1] if flight.mission.step + 1 < len(plan.steps) else None
     swung = flight.legs[0] if flight.legs else None
     if isinstance(swung, Swing) and not isinstance(following, AttitudeRun):
         calmed = calm(swung, view, settings, ends_step=True)
@@ -364,10 +390,14 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     if isinstance(swung, Calm):
         legs, here = stop(flight, view, settings)
         return replace(flight, legs=(*legs, Hold(here, SETTLE_S)), leg_start_us=view.now_us), Report()
-    done = Report((), (plan.sequence[flight.step],))
-    flight = replace(flight, step=flight.step + 1, step_anchor=None, reel_to_m=None)
+    done = Report((), (plan.sequence[flight.mission.step],))
+    flight = replace(
+        flight,
+        mission=replace(flight.mission, step=flight.mission.step + 1, step_anchor=None),
+        cable=replace(flight.cable, reel_to_m=None),
+    )
     if following is None:
-        rewound = replace(flight, on_mission=False, mission_done=True, step=0)
+        rewound = replace(flight, mission=replace(flight.mission, active=False, done=True, step=0))
         if isinstance(
             step, ReturnHome
         ):  # a return that nothing follows ends on the ground, as ordered by mode
@@ -376,7 +406,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
         return enter(rewound, P.HOLD, view, settings), Report(
             ((INFO, "Mission complete, holding"),), done.reached
         )
-    ahead = made(flight, flight.step)
+    ahead = made(flight, flight.mission.step)
     if isinstance(swung, Pass) and isinstance(ahead, Passage) and ahead.table is swung.path.table:
         # past the waypoint without a stop; the clock goes on from where the stretch ended
         assert isinstance(following, Waypoint)
@@ -391,41 +421,47 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
         # the next run takes the motion over as it is; only the height is still that of the first
         here = (view.x_load[0], view.x_load[1], swung.anchor[2])
         legs = step_legs(following, here, flight, settings)
-        return replace(flight, legs=legs, leg_start_us=view.now_us, step_anchor=here), done
+        return replace(
+            flight, legs=legs, leg_start_us=view.now_us, mission=replace(flight.mission, step_anchor=here)
+        ), done
     return begin_step(flight, view, settings), done
 
 
 def begin_step(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight on its present mission step, begun anew or taken up again."""
-    step = flight.plan.steps[flight.step]
+    step = flight.mission.plan.steps[flight.mission.step]
     if isinstance(step, Speed):
-        flight = replace(flight, speed_m_s=step.speed_m_s)
+        flight = replace(flight, mission=replace(flight.mission, speed_m_s=step.speed_m_s))
     if isinstance(step, Land):
         return enter(flight, P.LOWER, view, settings)
-    if isinstance(step, Winch) and flight.reel_to_m is None:
+    if isinstance(step, Winch) and flight.cable.reel_to_m is None:
         here = stop(flight, view, settings)[1]
-        flight = replace(flight, reel_to_m=length_at(flight, here, settings) + step.length_m)
-    if isinstance(step, Release) and not flight.released:
-        flight = replace(flight, released=True, legs=(), slack_since_us=-1)
-    if flight.step_anchor is None and not (flight.legs and swings(flight.legs[0])):
-        flight = replace(flight, step_anchor=stop(flight, view, settings)[1])
+        flight = replace(
+            flight, cable=replace(flight.cable, reel_to_m=length_at(flight, here, settings) + step.length_m)
+        )
+    if isinstance(step, Release) and not flight.cable.released:
+        flight = replace(flight, cable=replace(flight.cable, released=True, slack_since_us=-1), legs=())
+    if flight.mission.step_anchor is None and not (flight.legs and swings(flight.legs[0])):
+        flight = replace(flight, mission=replace(flight.mission, step_anchor=stop(flight, view, settings)[1]))
     return enter(flight, P.MISSION, view, settings)
 
 
 def release(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight whose load was let go by command: the vehicle goes on alone, a mission is held."""
-    if flight.released:
+    if flight.cable.released:
         return flight
-    alone = replace(flight, released=True, slack_since_us=-1, still_since_us=-1)
+    alone = replace(flight, cable=replace(flight.cable, released=True, slack_since_us=-1), still_since_us=-1)
     if flight.phase in ON_GROUND or flight.phase in (P.SET_DOWN, P.FAILSAFE):
         return alone
-    alone = replace(alone, on_mission=False)
+    alone = off_mission(alone)
     if flight.phase == P.TAUTEN:
         return enter(alone, P.LIFT, view, settings)
     alone = replace(alone, legs=())
     if flight.phase == P.GUIDED and isinstance(asked_of(flight), AttitudeSetpoint):
-        return enter(replace(alone, offboard=SILENT), P.HOLD, view, settings)
-    held = flight.on_mission or flight.phase == P.MISSION
+        return enter(
+            replace(alone, setpoints=replace(alone.setpoints, offboard=SILENT)), P.HOLD, view, settings
+        )
+    held = flight.mission.active or flight.phase == P.MISSION
     return enter(alone, P.HOLD if held else flight.phase, view, settings)
 
 
@@ -489,66 +525,81 @@ def _note_slack(flight: Flight, view: View, settings: Settings) -> Flight:
     if isinstance(flight.legs[0], Catch):
         noted = view.taut
     else:
-        gap = flight.taut_length_m - norm(sub(view.x_quad, view.x_load))
+        gap = flight.cable.taut_length_m - norm(sub(view.x_quad, view.x_load))
         loose = not view.taut or (gap > LEAST_GAP and _share_pulled(view, settings) < SLACK)
         lifting = flight.phase == P.LIFT and view.now_us - flight.phase_start_us < LIFT_OFF_US
         on_ground = lifting or (flight.phase == P.LOWER and isinstance(flight.legs[0], Creep))
         noted = loose and not on_ground
-    if noted == (flight.slack_since_us >= 0):
+    if noted == (flight.cable.slack_since_us >= 0):
         return flight
-    return replace(flight, slack_since_us=view.now_us if noted else -1)
+    return replace(flight, cable=replace(flight.cable, slack_since_us=view.now_us if noted else -1))
 
 
 def _watch_slack(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report] | None:
     """Catch a load that falls freely; take the phase up again when it hangs on the cable."""
     fallen = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < LYING_SPEED
     if isinstance(flight.legs[0], Catch) and fallen:
-        flight = replace(flight, on_mission=False, slack_since_us=-1)
+        flight = replace(
+            flight,
+            mission=replace(flight.mission, active=False),
+            cable=replace(flight.cable, slack_since_us=-1),
+        )
         return _to(flight, E.LOAD_DOWN, view, settings, (CRITICAL, "The load fell to the ground: landing"))
-    if flight.slack_since_us < 0:
+    if flight.cable.slack_since_us < 0:
         return None
-    lasted_us = view.now_us - flight.slack_since_us
+    lasted_us = view.now_us - flight.cable.slack_since_us
     if not isinstance(flight.legs[0], Catch):
         if lasted_us < SLACK_US:
             return None
-        catch = Catch(view.x_quad, flight.taut_length_m, settings.snap_speed_m_s)
-        caught = replace(flight, legs=(catch,), leg_start_us=view.now_us, slack_since_us=-1)
+        catch = Catch(view.x_quad, flight.cable.taut_length_m, settings.motion.snap_speed_m_s)
+        caught = replace(
+            flight, legs=(catch,), leg_start_us=view.now_us, cable=replace(flight.cable, slack_since_us=-1)
+        )
         return caught, Report(((WARNING, "Cable slack: falling with the load to catch it"),))
     if lasted_us < PULL_US and not (lasted_us >= SLACK_US and _share_pulled(view, settings) > SLACK):
         return None
-    again = flight.on_mission and flight.slack_step == flight.step
-    flight = replace(flight, legs=(), slack_since_us=-1, slack_step=flight.step if flight.on_mission else -1)
+    again = flight.mission.active and flight.cable.slack_step == flight.mission.step
+    flight = replace(
+        flight,
+        legs=(),
+        cable=replace(
+            flight.cable, slack_since_us=-1, slack_step=flight.mission.step if flight.mission.active else -1
+        ),
+    )
     if again:  # the step itself asks for it
-        held = enter(replace(flight, on_mission=False), P.HOLD, view, settings)
+        held = enter(off_mission(flight), P.HOLD, view, settings)
         return held, Report(((CRITICAL, "Cable slack again in this mission item: holding"),))
     return enter(flight, flight.phase, view, settings), Report(((INFO, "Load caught"),))
 
 
 def _watch_fence(flight: Flight, view: View, settings: Settings) -> Flight | tuple[Flight, Report]:
     """What GF_ACTION says where load or vehicle is over the fence, or the load could not stop before it."""
-    limited = flight.fence.zones or settings.fence_radius_m > 0.0 or settings.fence_height_m > 0.0
-    if settings.fence_action == NO_ACTION or not limited or isinstance(flight.legs[0], Catch):
+    limited = flight.area.fence.zones or settings.fence.radius_m > 0.0 or settings.fence.height_m > 0.0
+    if settings.fence.action == NO_ACTION or not limited or isinstance(flight.legs[0], Catch):
         return flight
     over = below(view.x_quad, settings)
-    places = [over] if flight.released else [view.x_load, over]
+    places = [over] if flight.cable.released else [view.x_load, over]
     if not swings(flight.legs[0]):
         here, end = asked_motion(flight, view, settings)[0], stop(flight, view, settings)[1]
         ahead = [here, axpy(STOP_MARGIN, sub(end, here), end)]
-        places += [below(place, settings) for place in ahead] if flight.released else ahead
-    why = next(filter(None, (forbidden(flight.fence, place, settings) for place in places)), "")
-    if bool(why) == bool(flight.breach):
+        places += [below(place, settings) for place in ahead] if flight.cable.released else ahead
+    why = next(filter(None, (forbidden(flight.area.fence, place, settings) for place in places)), "")
+    if bool(why) == bool(flight.area.breach):
         return flight
     if not why:
-        return replace(flight, breach="")
-    noted = replace(flight, breach=why, breaches=flight.breaches + 1, breach_us=view.now_us)
-    event = FENCE_EVENTS.get(settings.fence_action)
+        return replace(flight, area=replace(flight.area, breach=""))
+    noted = replace(
+        flight,
+        area=replace(flight.area, breach=why, breaches=flight.area.breaches + 1, breach_us=view.now_us),
+    )
+    event = FENCE_EVENTS.get(settings.fence.action)
     text = (WARNING, f"Fence: {why}")
-    if settings.fence_action == TERMINATE:
+    if settings.fence.action == TERMINATE:
         return _given_up(noted, f"fence: {why}", view, settings)
     landing = flight.phase == P.LOWER and event == E.LAND
     if event is None or landing or (flight.phase, event) not in TRANSITIONS:
         return noted, Report((text,))
-    return _to(replace(noted, on_mission=False), event, view, settings, text)
+    return _to(off_mission(noted), event, view, settings, text)
 
 
 def _taut_by(flight: Flight, view: View, settings: Settings) -> float:
@@ -565,19 +616,21 @@ def _trouble(flight: Flight, view: View, settings: Settings) -> str:
         return view.complaints[0]
     if not all(map(isfinite, (view.tilt_rad, *view.x_quad, *view.v_quad, *view.x_load, *view.v_load))):
         return "the estimate is no number"
-    if view.tilt_rad > settings.tilt_limit_rad:
-        limit = degrees(settings.tilt_limit_rad)
+    if view.tilt_rad > settings.failsafe.tilt_limit_rad:
+        limit = degrees(settings.failsafe.tilt_limit_rad)
         return f"tilt {degrees(view.tilt_rad):.0f} deg exceeds FS_TILT_DEG {limit:.0f}"
     if flight.phase in CARRYING and flight.legs and flight.legs[0].control_mode == position_mode(flight):
         jet = setpoint(flight, view.now_us)
-        what, place = ("vehicle", view.x_quad) if flight.released else ("load", view.x_load)
+        what, place = ("vehicle", view.x_quad) if flight.cable.released else ("load", view.x_load)
         error = norm(sub(place, jet[0])) if jet is not None else 0.0
-        if not error <= settings.load_error_limit_m:
-            return f"{what} error {error:.1f} m exceeds FS_LOAD_ERR {settings.load_error_limit_m:.1f} m"
+        if not error <= settings.failsafe.load_error_limit_m:
+            return (
+                f"{what} error {error:.1f} m exceeds FS_LOAD_ERR {settings.failsafe.load_error_limit_m:.1f} m"
+            )
     return ""
 
 
 def _given_up(flight: Flight, why: str, view: View, settings: Settings) -> tuple[Flight, Report]:
-    after = happen(replace(flight, on_mission=False), E.FAIL, view, settings)
+    after = happen(off_mission(flight), E.FAIL, view, settings)
     assert after is not None, flight.phase
     return after, Report(((mavlink.MAV_SEVERITY_EMERGENCY, f"Flight given up: {why}"),))

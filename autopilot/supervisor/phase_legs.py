@@ -6,7 +6,7 @@ Everything is a function of the flight, the view and the settings.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import dist, isfinite
+from math import isfinite
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.s2 import tangent
@@ -31,19 +31,20 @@ from autopilot.guidance.legs import (
     transfer_leg,
 )
 from autopilot.guidance.setpoint_follower import Asked, AttitudeSetpoint, Follow, Posture, begin_following
-from autopilot.supervisor.flight import (
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import (
     CARRYING,
     Event,
     Flight,
     Guide,
     Phase,
-    Settings,
     View,
     leg_time_s,
     pace_of,
     setpoint,
 )
 from autopilot.trajectory.shaping import Shaped, unshaped
+from autopilot.trajectory.timeline import RELEASE_S, MissionState, return_place, state_after
 from autopilot.trajectory.waypoint_path import Passage
 from missions.model import (
     AttitudeRun,
@@ -67,7 +68,6 @@ SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
 HEIGHT_SIGMAS = 3.0  # by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
-RELEASE_S = 2.0  # hold of a mission after the load was released: the vehicle jumps up and comes back
 LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
 NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
@@ -79,12 +79,12 @@ STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load ac
 
 def position_mode(flight: Flight) -> int:
     """The control mode in which positions are flown: of the load, or of the vehicle that has released it."""
-    return QUAD_POSITION if flight.released else LOAD_POSITION
+    return QUAD_POSITION if flight.cable.released else LOAD_POSITION
 
 
 def as_flown(flight: Flight, legs: tuple[Leg, ...]) -> tuple[Leg, ...]:
     """The legs, flown by the vehicle alone where the load is released."""
-    if not flight.released:
+    if not flight.cable.released:
         return legs
     return tuple(
         replace(leg, control_mode=QUAD_POSITION) if leg.control_mode == LOAD_POSITION else leg for leg in legs
@@ -97,7 +97,7 @@ def asked_motion(flight: Flight, view: View, settings: Settings) -> tuple[Vec3, 
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         jet = flight.legs[0].jet(leg_time_s(flight, view.now_us))
         return jet[0], jet[1], jet[2]
-    if flight.released:
+    if flight.cable.released:
         return view.x_quad, view.v_quad if flight.phase in CARRYING else ZERO, ZERO
     if flight.phase not in CARRYING:
         return view.x_load, ZERO, ZERO
@@ -132,10 +132,10 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
     if flight.legs and flight.legs[0].control_mode == position_mode(flight):
         t, leg = leg_time_s(flight, view.now_us), flight.legs[0]
         if isinstance(leg, Follow):
-            return leg.stopped(t, settings.accel_m_s2)
-        slow = slow_leg(leg, t, settings.accel_m_s2, settings.least_move_s)
+            return leg.stopped(t, settings.motion.accel_m_s2)
+        slow = slow_leg(leg, t, settings.motion.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
-    accel, least_s = settings.accel_m_s2, settings.least_move_s
+    accel, least_s = settings.motion.accel_m_s2, settings.least_move_s
     if v[2] < -FALLING:  # out of a fall: there is no time to lose
         accel, least_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * least_s
     brake = brake_leg(x, v, a, accel, least_s)
@@ -152,17 +152,17 @@ def _tauten(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     return (
         transfer_leg(view.x_quad, up, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
         transfer_leg(up, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
-        Creep(over, (0.0, 0.0, settings.taut_speed_m_s), QUAD_POSITION),
+        Creep(over, (0.0, 0.0, settings.motion.taut_speed_m_s), QUAD_POSITION),
     )
 
 
 def _lift(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    if flight.released:
+    if flight.cable.released:
         legs, here = stop(flight, view, settings)
-        up = (here[0], here[1], flight.takeoff_altitude_m)
-        return (*legs, _carry(here, up, settings.lift_speed_m_s, settings))
-    top = (view.x_load[0], view.x_load[1], flight.takeoff_altitude_m)
-    return (_carry(view.x_load, top, settings.lift_speed_m_s, settings),)
+        up = (here[0], here[1], flight.mission.takeoff_altitude_m)
+        return (*legs, _carry(here, up, settings.motion.lift_speed_m_s, settings))
+    top = (view.x_load[0], view.x_load[1], flight.mission.takeoff_altitude_m)
+    return (_carry(view.x_load, top, settings.motion.lift_speed_m_s, settings),)
 
 
 def _raised(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:
@@ -171,7 +171,7 @@ def _raised(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, 
     if here[2] >= LEAST_HEIGHT:
         return legs, here
     up = (here[0], here[1], LEAST_HEIGHT)
-    return (*legs, _carry(here, up, settings.lift_speed_m_s, settings)), up
+    return (*legs, _carry(here, up, settings.motion.lift_speed_m_s, settings)), up
 
 
 def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -181,19 +181,19 @@ def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = _raised(flight, view, settings)
-    goal = min((flight.home, *flight.rally), key=lambda place: dist(place[:2], here[:2]))
-    return (*legs, _carry(here, (goal[0], goal[1], here[2]), flight.speed_m_s, settings))
+    goal = return_place(here, flight.area.home, flight.area.rally)
+    return (*legs, _carry(here, (goal[0], goal[1], here[2]), flight.mission.speed_m_s, settings))
 
 
 def asked_of(flight: Flight) -> Asked | None:
     """What the flight's guide asks for."""
-    match flight.guide:
+    match flight.setpoints.guide:
         case Guide.ORBIT:
-            return flight.circle
+            return flight.setpoints.circle
         case Guide.MANUAL:
-            return flight.manual.asked
+            return flight.setpoints.manual.asked
         case Guide.OFFBOARD:
-            return flight.offboard.asked
+            return flight.setpoints.offboard.asked
 
 
 def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
@@ -212,19 +212,19 @@ def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = stop(flight, view, settings)
-    if flight.released:
+    if flight.cable.released:
         clear = _clear_of_load(here, view, settings)
         low = (clear[0], clear[1], min(here[2], LEAST_HEIGHT))
         return (
             *legs,
-            _carry(here, clear, flight.speed_m_s, settings),
-            _carry(clear, low, settings.lift_speed_m_s, settings),
+            _carry(here, clear, flight.mission.speed_m_s, settings),
+            _carry(clear, low, settings.motion.lift_speed_m_s, settings),
             Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
         )
     low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + HEIGHT_SIGMAS * view.height_std))
     return (
         *legs,
-        _carry(here, low, settings.lift_speed_m_s, settings),
+        _carry(here, low, settings.motion.lift_speed_m_s, settings),
         Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION),
     )
 
@@ -252,22 +252,22 @@ def _set_down(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]
 
 
 def _carry(begin: Vec3, end: Vec3, speed: float, settings: Settings, least_s: float = 0.0) -> Leg:
-    return carry_leg(begin, end, speed, settings.accel_m_s2, max(least_s, settings.least_move_s))
+    return carry_leg(begin, end, speed, settings.motion.accel_m_s2, max(least_s, settings.least_move_s))
 
 
 def _least_s(flight: Flight) -> float:
     """What the transfer of the present step takes at least, for rotors, cable and tilt."""
-    least = flight.plan.prepared.least_s
-    return least[flight.step] if flight.step < len(least) else 0.0
+    least = flight.mission.plan.prepared.least_s
+    return least[flight.mission.step] if flight.mission.step < len(least) else 0.0
 
 
 def _mission(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
-    step = flight.plan.steps[flight.step]
+    step = flight.mission.plan.steps[flight.mission.step]
     legs, here = stop(flight, view, settings)
-    anchor = flight.step_anchor
+    anchor = flight.mission.step_anchor
     if anchor is not None and isinstance(step, Signals | AttitudeRun) and norm(sub(anchor, here)) > 1e-6:
         # a step that is taken up again after a pause begins anew, from where it began
-        back = _carry(here, anchor, flight.speed_m_s, settings)
+        back = _carry(here, anchor, flight.mission.speed_m_s, settings)
         return (*legs, back, *step_legs(step, anchor, flight, settings))
     return (*legs, *step_legs(step, here, flight, settings))
 
@@ -278,27 +278,35 @@ def length_at(flight: Flight, here: Vec3, settings: Settings) -> float:
     return settings.cable_length_m if top is None else top - here[2]
 
 
+def destination(step: Step, here: Vec3, flight: Flight) -> Vec3:
+    """Where a step leads that begins with load or vehicle at rest at `here`."""
+    there = state_after(step, MissionState(here), flight.area.home).expected
+    assert there is not None, "from a known place"
+    return there
+
+
 def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tuple[Leg, ...]:
     match step:
-        case Takeoff(altitude_m=altitude):
-            return (_carry(here, (here[0], here[1], altitude), settings.lift_speed_m_s, settings),)
-        case Waypoint(east_m=east, north_m=north, altitude_m=altitude, hold_s=hold):
-            there = (east, north, altitude)
-            path = made(flight, flight.step)
+        case Takeoff():
+            up = destination(step, here, flight)
+            return (_carry(here, up, settings.motion.lift_speed_m_s, settings),)
+        case Waypoint(hold_s=hold):
+            there = destination(step, here, flight)
+            path = made(flight, flight.mission.step)
             go: Leg
             if isinstance(path, Passage) and path.begin_s == 0.0 and norm(sub(here, path.start)) < NEAR_START:
                 fade = min(settings.least_move_s, float(path.table[-1, 1]))
                 go = Pass(path, sub(here, path.start), fade)
             else:
-                go = _carry(here, there, flight.speed_m_s, settings, _least_s(flight))
+                go = _carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight))
             return (go, Hold(there, max(hold - borrowed(flight), 0.0))) if hold > 0.0 else (go,)
         case Delay(duration_s=duration):
             return (Hold(here, max(duration - borrowed(flight), 0.0)),)
         case ReturnHome():
-            there = (flight.home[0], flight.home[1], here[2])
-            return (_carry(here, there, flight.speed_m_s, settings, _least_s(flight)),)
+            there = destination(step, here, flight)
+            return (_carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight)),)
         case Signals():
-            return (Run(here, _path_of(flight, flight.step) or unshaped(step)),)
+            return (Run(here, _path_of(flight, flight.mission.step) or unshaped(step)),)
         case AttitudeRun(
             controlled=controlled, tilt_north_rad=north, tilt_east_rad=east, duration_s=duration
         ):
@@ -309,12 +317,12 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
         case Release():
             return (Hold(here, RELEASE_S),)
         case Winch(speed_m_s=speed):
-            wanted = settings.cable_length_m if flight.reel_to_m is None else flight.reel_to_m
+            wanted = settings.cable_length_m if flight.cable.reel_to_m is None else flight.cable.reel_to_m
             length = length_at(flight, here, settings)
             if abs(wanted - length) < LEAST_REEL_M:
                 return (Hold(here, 0.0),)
             return (
-                reel_leg(here, length, wanted, speed or settings.reel_speed_m_s, settings.reel_accel_m_s2),
+                reel_leg(here, length, wanted, speed or settings.winch.speed_m_s, settings.winch.accel_m_s2),
             )
         case Land():
             return ()
@@ -323,7 +331,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
 
 def made(flight: Flight, step: int) -> Shaped | Passage | None:
     """What was made ready for a step of the plan, if anything was."""
-    made = flight.plan.prepared.made
+    made = flight.mission.plan.prepared.made
     return made[step] if 0 <= step < len(made) else None
 
 
@@ -336,23 +344,27 @@ def _path_of(flight: Flight, step: int) -> Shaped | None:
 def borrowed(flight: Flight) -> float:
     """Time (s) that the paths before and after the present step take from its hold: to come to rest, and to
     get ready."""
-    before, after = _path_of(flight, flight.step - 1), _path_of(flight, flight.step + 1)
+    before, after = _path_of(flight, flight.mission.step - 1), _path_of(flight, flight.mission.step + 1)
     return (before.tail_s if before else 0.0) + (after.lead_s if after else 0.0)
 
 
 def following_legs(flight: Flight, settings: Settings) -> tuple[Leg, ...]:
     """The legs of the step after the present one, where it begins at rest where this one ends."""
-    step = flight.step + 1
-    if not flight.on_mission or flight.phase not in (P.LIFT, P.MISSION) or step >= len(flight.plan.steps):
+    step = flight.mission.step + 1
+    if (
+        not flight.mission.active
+        or flight.phase not in (P.LIFT, P.MISSION)
+        or step >= len(flight.mission.plan.steps)
+    ):
         return ()
     last = flight.legs[-1] if flight.legs else None
     if last is None or last.control_mode != LOAD_POSITION or not isfinite(last.duration_s):
         return ()
     end = last.jet(last.duration_s)
-    coming = flight.plan.steps[step]
+    coming = flight.mission.plan.steps[step]
     if norm(end[1]) > AT_REST or not isinstance(coming, Waypoint | Delay | ReturnHome | Signals):
         return ()
-    return step_legs(coming, end[0], replace(flight, step=step), settings)
+    return step_legs(coming, end[0], replace(flight, mission=replace(flight.mission, step=step)), settings)
 
 
 ENTRY = {

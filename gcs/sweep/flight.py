@@ -34,8 +34,10 @@ from autopilot.supervisor.advance import (
     TAUT_LATEST,
     VEHICLE_SUNK,
 )
-from autopilot.supervisor.flight import CARRYING as CARRYING_PHASES
-from autopilot.supervisor.flight import (
+from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
+from autopilot.supervisor.requests import arming_complaints, decide, with_plan
+from autopilot.supervisor.state import CARRYING as CARRYING_PHASES
+from autopilot.supervisor.state import (
     IN_AIR,
     ON_GROUND,
     Flight,
@@ -46,8 +48,6 @@ from autopilot.supervisor.flight import (
     jet_ahead,
     leg_time_s,
 )
-from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
-from autopilot.supervisor.requests import arming_complaints, decide, with_plan
 from autopilot.trajectory.prepare import Limits
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.belief import load_belief
@@ -186,8 +186,8 @@ class _Flight:
                 nominal(self.setup.vehicle),
             ),
             self.every,
-            self.setup.settings.sensor_age_limit_s,
-            self.setup.settings.tilt_limit_rad,
+            self.setup.settings.failsafe.sensor_age_limit_s,
+            self.setup.settings.failsafe.tilt_limit_rad,
         )
         self.fused = type(self.setup.law) in FUSED_LAWS
         self.trace = np.zeros((0, TRACE_COLUMNS)) if trace is None else trace
@@ -275,7 +275,7 @@ class _Flight:
             phase = self.state.flight.phase
             self.state, report = control(self.state, self.setup, now_us)
             self._hear(report.texts, phase)
-            if self.state.flight.released:
+            if self.state.flight.cable.released:
                 self._let_go()
             flight = self.state.flight
             if self._counts(flight):
@@ -343,7 +343,7 @@ class _Flight:
         if flown.outcome:
             return
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
-            flown.outcome = "completed" if flight.mission_done else "interrupted"
+            flown.outcome = "completed" if flight.mission.done else "interrupted"
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.limit_us:
             where: str = flight.phase.name.lower()
             flown.outcome, flown.lost_phase = "timeout", where
@@ -392,8 +392,8 @@ class _Flight:
             or leg.control_mode not in (LOAD_POSITION, QUAD_POSITION)
             or leg.control_mode != self.state.control_mode
             or isinstance(leg, Catch)
-            or flight.slack_since_us >= 0
-            or flight.released
+            or flight.cable.slack_since_us >= 0
+            or flight.cable.released
         ):
             return self._on_ground(here + 1)
         carries = leg.control_mode == LOAD_POSITION
@@ -425,9 +425,9 @@ class _Flight:
             level=level,
             still_speed=STILL_SPEED,
             still=flight.still_since_us >= 0,
-            error_limit=settings.load_error_limit_m if tracked else inf,
+            error_limit=settings.failsafe.load_error_limit_m if tracked else inf,
             hangs=hangs,
-            taut_length=flight.taut_length_m,
+            taut_length=flight.cable.taut_length_m,
             load_weight=settings.load_weight_n,
             counts=self._counts(flight),
         )

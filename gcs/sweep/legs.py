@@ -7,7 +7,7 @@ import numpy as np
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance.legs import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
-from autopilot.supervisor.flight import Flight
+from autopilot.supervisor.state import Flight
 from autopilot.trajectory.shaping import evaluate_asked, evaluate_shaped
 from autopilot.trajectory.signals import Jet, SignalTable
 from autopilot.trajectory.splines import PieceTable

@@ -1,10 +1,10 @@
 """Which room may import which, and who may touch the world.
 
-Missions and geometry stand alone; trajectory and wire on both; the vehicle on the wire; services, laws,
-estimator and guidance on those; the supervisor on guidance and services; the core of the flight on everything
-below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths and the definitions of
-parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. Sockets, clocks, threads and logging
-belong to the shells alone.
+Missions and geometry stand alone; trajectory on both, the wire on these; the vehicle on the wire; services,
+laws, estimator and guidance on those; the supervisor on guidance and services; the core of the flight on
+everything below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths and the
+definitions of parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. Sockets, clocks, threads
+and logging belong to the shells alone.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "missions": (),
     "autopilot.geometry": (),
     "autopilot.trajectory": ("autopilot.geometry", "missions"),
-    "autopilot.wire": ("autopilot.geometry", "missions"),
+    "autopilot.wire": ("autopilot.geometry", "autopilot.trajectory", "missions"),
     "autopilot.vehicle": ("autopilot.geometry", "missions", "autopilot.wire"),
     "autopilot.services": LEAVES,
     "autopilot.control": LEAVES,
@@ -185,8 +185,8 @@ BAD = {
     "autopilot/control/laws/thesis.py": "import autopilot.services.commands",
     "autopilot/control/actuators/mixer.py": "from autopilot.guidance.legs import Hold",
     "autopilot/estimation/predict.py": "from autopilot.control.laws import thesis",
-    "autopilot/estimation/measurements/pose.py": "from autopilot.supervisor.flight import Flight",
-    "autopilot/guidance/legs.py": "from autopilot.supervisor.flight import Flight",
+    "autopilot/estimation/measurements/pose.py": "from autopilot.supervisor.state import Flight",
+    "autopilot/guidance/legs.py": "from autopilot.supervisor.state import Flight",
     "autopilot/services/commands.py": "def f():\n    from autopilot.control.laws import thesis",
     "autopilot/services/endpoint.py": "from autopilot.onboard import onboard",
     "autopilot/supervisor/advance.py": "from autopilot.core.tick import step",

@@ -12,7 +12,7 @@ import pytest
 PROGRAM = """
 import sys
 from numba.core.dispatcher import Dispatcher
-from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, Craft

@@ -9,8 +9,8 @@ from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold
 from autopilot.onboard.onboard import Onboard
 from autopilot.services.mission_store import StoredMission
-from autopilot.supervisor.flight import Flight, Phase
 from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
+from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink

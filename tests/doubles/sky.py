@@ -11,9 +11,10 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, Takeoff
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.flight import Flight, MissionPlan, Phase, Settings, View, settings_from
 from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.requests import decide, with_plan
+from autopilot.supervisor.settings import Settings, settings_from
+from autopilot.supervisor.state import Flight, MissionPlan, Phase, View
 from autopilot.vehicle.belief import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
@@ -75,7 +76,7 @@ class Sky:
     def run(self, until: Callable[[Sky], bool], limit_s: float = 300.0) -> None:
         end = self.now_us + round(limit_s * 1e6)
         while not until(self):
-            assert self.now_us < end, (self.flight.phase, self.flight.step, self.texts)
+            assert self.now_us < end, (self.flight.phase, self.flight.mission.step, self.texts)
             self.tick()
 
     def wait(self, seconds: float) -> None:

@@ -28,7 +28,7 @@ from autopilot.estimation.records import (
     VELOCITY,
 )
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
-from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.state import Phase
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
 from tests.doubles.motion import Array

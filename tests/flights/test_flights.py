@@ -7,7 +7,7 @@ import io
 import pytest
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.state import Phase
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter

@@ -6,7 +6,7 @@ import math
 
 from autopilot.onboard.onboard import plan_of
 from autopilot.services.mission_store import StoredMission
-from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.state import Phase
 from autopilot.wire.convert import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import WireItem, located_steps
@@ -31,7 +31,7 @@ def test_turns() -> None:
         nonlocal widest
         if craft.flight.phase == Phase.MISSION:
             widest = max(widest, math.hypot(craft.truth.x_load[0], craft.truth.x_load[1]))
-        return craft.flight.mission_done
+        return craft.flight.mission.done
 
     craft.run(done, 90.0)
     # measured 1.503 m and 2 mm

@@ -9,8 +9,8 @@ import pytest
 from autopilot.guidance.legs import QUAD_POSITION
 from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
 from autopilot.supervisor.advance import enter
-from autopilot.supervisor.flight import Phase
 from autopilot.supervisor.requests import decide
+from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint
 from missions.model import Release as ReleaseStep
@@ -142,10 +142,10 @@ DELIVERY = (
 def test_a_mission_delivers_and_lands_beside_what_it_delivered() -> None:
     craft = Craft(*DELIVERY)
     craft.begin()
-    craft.run(lambda c: c.flight.released)
-    assert craft.flight.on_mission
+    craft.run(lambda c: c.flight.cable.released)
+    assert craft.flight.mission.active
     landed(craft)
-    assert craft.flight.mission_done
+    assert craft.flight.mission.done
     assert craft.truth.x_load == pytest.approx((1.0, 0.5, 0.02), abs=0.03)
     assert 0.3 < math.dist(craft.truth.x_quad[:2], (1.0, 0.5)) < 0.4
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
@@ -160,12 +160,12 @@ def test_released_by_command_a_mission_is_held_and_goes_on_as_the_vehicles() -> 
     sky.wait(1.0)
     verdict = sky.ask(Release())
     assert (verdict.result, verdict.text) == (ACCEPTED, "Load released, mission held")
-    assert (sky.flight.phase, sky.flight.on_mission) == (Phase.HOLD, False)
+    assert (sky.flight.phase, sky.flight.mission.active) == (Phase.HOLD, False)
     assert sky.ask(StartMission(None)).result == ACCEPTED
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     flown = [(mode, jet[0]) for _, mode, jet in sky.setpoints[-500:]]
     assert {mode for mode, _ in flown} == {QUAD_POSITION}
-    assert sky.flight.mission_done
+    assert sky.flight.mission.done
 
 
 SIGNALS = Signals(4.0, (Term("x", 0.1, 0.0, 2.0, None, 0.0),))
@@ -192,7 +192,7 @@ def test_a_release_is_never_refused(phase: Phase) -> None:
         sky.flight = enter(sky.flight, phase, sky.view, sky.settings)
     flight, verdict = decide(sky.flight, Release(), hanging(sky.now_us), sky.settings)
     assert verdict.result == ACCEPTED
-    assert flight.released
+    assert flight.cable.released
     if phase in (Phase.FAILSAFE, Phase.SET_DOWN):
         assert flight.phase == phase
         return
@@ -209,4 +209,4 @@ def test_a_load_out_of_reach_is_not_taken() -> None:
     assert verdict.text == "Gripper: the load lies 1.9 m away, the cable reaches 0.7 m"
     sky.view = sky.view._replace(x_load=(0.5, 0.0, 0.02))
     assert sky.ask(Grab()).result == ACCEPTED
-    assert not sky.flight.released
+    assert not sky.flight.cable.released

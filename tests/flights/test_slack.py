@@ -10,7 +10,11 @@ import pytest
 from autopilot.geometry.linear import ZERO, norm
 from autopilot.guidance.legs import CATCH_S, Catch, Hold
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.flight import Flight, Phase
+from autopilot.supervisor.state import (
+    CableState,
+    Flight,
+    Phase,
+)
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Signals, Sine, Takeoff, Term
 from tests.doubles.craft import Craft, at_phase
@@ -39,7 +43,7 @@ def test_the_cable_comes_taut_no_faster_than_the_parameter_says(limit: float, se
     craft.begin()
     found = snaps(craft, lambda c: c.flight.phase == Phase.MISSION)
     # measured 0.051 and 0.151 m/s (the creep of MIS_TAUT_SPEED): the vehicle's climb varies by its noise
-    assert 0.0 < max(found) < min(limit, SETTINGS.taut_speed_m_s) + 0.02
+    assert 0.0 < max(found) < min(limit, SETTINGS.motion.taut_speed_m_s) + 0.02
     assert snaps(craft, at_phase(Phase.DISARMED)) == [], "nor does landing snap"
 
 
@@ -120,12 +124,12 @@ def test_a_load_on_the_ground_is_no_slack_to_catch() -> None:
 
 def test_noise_alone_starts_no_catch() -> None:
     """No pull for a moment, and the length that it had: what a gust or a jolt of thrust feigns."""
-    flight = Flight(phase=Phase.HOLD, legs=(Hold((0.0, 0.0, 2.0)),), taut_length_m=0.7)
+    flight = Flight(phase=Phase.HOLD, legs=(Hold((0.0, 0.0, 2.0)),), cable=CableState(taut_length_m=0.7))
     for k in range(50):
         seen = hanging(k * 4000)._replace(pull_n=-1.0)
         flight, _ = advance(flight, seen, SETTINGS)
     assert isinstance(flight.legs[0], Hold)
-    flight = replace(flight, taut_length_m=0.75)  # now there is a gap as well
+    flight = replace(flight, cable=replace(flight.cable, taut_length_m=0.75))  # now there is a gap as well
     for k in range(50, 60):
         flight, _ = advance(flight, hanging(k * 4000)._replace(pull_n=-1.0), SETTINGS)
     assert isinstance(flight.legs[0], Catch)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from autopilot.guidance.legs import Hold, Swing
-from autopilot.supervisor.flight import Phase
+from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.fileformat import load_mission
 from missions.model import AttitudeRun, Land, Takeoff
@@ -26,7 +26,7 @@ def test_attitude_missions_are_flown_with_margin(name: str) -> None:
     assert craft.worst_error < SETTLING
     assert abs(craft.truth.x_load[2] - 3.0) < SETTLING, "the height is kept"
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
-    assert sorted(set(reached)) == list(range(len(craft.flight.plan.steps) - 1))
+    assert sorted(set(reached)) == list(range(len(craft.flight.mission.plan.steps) - 1))
 
 
 @pytest.mark.parametrize("controlled", ["vehicle", "load"])

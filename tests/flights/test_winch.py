@@ -13,7 +13,7 @@ from autopilot.guidance.legs import Hold, Reel, Slow, reel_leg, top_of
 from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor.advance import enter
-from autopilot.supervisor.flight import Flight, Phase
+from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Waypoint, Winch
 from tests.doubles.craft import Craft, at_phase
@@ -68,7 +68,7 @@ def test_the_vehicle_stays_and_the_load_goes_down_and_up(settings_: dict[str, fl
         assert load < OFF_M
         assert vehicle < OFF_M
         assert true_length(craft) == pytest.approx(there, abs=LENGTH_M)
-        assert craft.flight.cable_m == pytest.approx(there, abs=1e-12)
+        assert craft.flight.cable.length_m == pytest.approx(there, abs=1e-12)
         assert craft.truth.x_load[2] == pytest.approx(2.7 - there, abs=0.01)
     assert craft.truth.slack_events == slack
     assert "Winch: 1.50 m to 0.60 m" in craft.texts
@@ -102,7 +102,7 @@ def test_a_hold_stops_the_winch_and_belief_and_truth_stop_alike() -> None:
     load, vehicle = reeled(craft, 4.0)
     assert max(load, vehicle) < OFF_M
     assert 0.31 < true_length(craft) < 0.5  # two seconds of stopping behind two of getting under way
-    assert craft.flight.cable_m == pytest.approx(true_length(craft), abs=LENGTH_M)
+    assert craft.flight.cable.length_m == pytest.approx(true_length(craft), abs=LENGTH_M)
     assert isinstance(craft.flight.legs[0], Hold)
     assert craft.command(WINCH, 1.0, RETRACT) == ACCEPTED
     reeled(craft, 6.0)
@@ -114,7 +114,7 @@ def test_with_receiver_and_camera_the_length_is_followed_too() -> None:
     craft.command(WINCH, 1.0, LENGTH, 0.6, 0.3)
     load, _ = reeled(craft, 7.0)
     assert load < 0.06  # measured 25 mm, as in hover
-    assert craft.flight.cable_m == pytest.approx(true_length(craft), abs=LENGTH_M)
+    assert craft.flight.cable.length_m == pytest.approx(true_length(craft), abs=LENGTH_M)
 
 
 def test_a_mission_lowers_its_load_by_the_winch() -> None:
@@ -134,7 +134,7 @@ def test_a_mission_lowers_its_load_by_the_winch() -> None:
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
     craft.run(watched)
     assert lowest == pytest.approx(0.9, abs=0.01)
-    assert craft.flight.mission_done
+    assert craft.flight.mission.done
     assert true_length(craft) == pytest.approx(0.7, abs=LENGTH_M)
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
     assert reached == [0, 1, 2, 3, 4, 5]
@@ -143,8 +143,9 @@ def test_a_mission_lowers_its_load_by_the_winch() -> None:
 # ---- what is refused, and what a leg is
 
 
-def over(sky: Sky, **changes: object) -> Sky:
-    sky.settings = replace(sky.settings, **changes)  # type: ignore[arg-type]
+def over(sky: Sky, usable: bool) -> Sky:
+    """The same in which the law can, or cannot, fly another length of the cable."""
+    sky.settings = replace(sky.settings, winch=replace(sky.settings.winch, usable=usable))
     return sky
 
 
@@ -171,8 +172,8 @@ def test_the_winch_wants_a_load_that_is_held_in_the_air() -> None:
         sky.flight = enter(sky.flight, phase, sky.view, sky.settings)
         assert sky.ask(WinchRequest(0.5)).result == LATER, phase
         sky.flight = held_there
-    assert over(sky, reels=False).ask(WinchRequest(0.5)).result == DENIED
-    over(sky, reels=True).ask(Release())
+    assert over(sky, usable=False).ask(WinchRequest(0.5)).result == DENIED
+    over(sky, usable=True).ask(Release())
     assert sky.ask(WinchRequest(0.5)).result == DENIED
 
 
@@ -197,20 +198,20 @@ def test_a_mission_paused_while_reeling_goes_on_to_the_same_length() -> None:
         for _ in range(round(seconds / 0.02)):
             sky.tick()
             sky.flight = cable_now(sky.flight, sky.now_us)
-            length = sky.flight.cable_m or 0.7
+            length = sky.flight.cable.length_m or 0.7
             sky.settings = replace(sky.settings, cable_length_m=length)
 
     assert sky.ask(StartMission(1)).result == ACCEPTED
     tick(2.5)
     assert sky.ask(Pause()).result == ACCEPTED
     tick(4.0)
-    paused = sky.flight.cable_m
+    paused = sky.flight.cable.length_m
     assert paused is not None
     assert 0.75 < paused < 1.4
-    assert sky.flight.reel_rate == 0.0
+    assert sky.flight.cable.reel_rate == 0.0
     assert sky.ask(StartMission(None)).result == ACCEPTED
     tick(7.0)
-    assert sky.flight.cable_m == pytest.approx(1.5, abs=1e-9)
+    assert sky.flight.cable.length_m == pytest.approx(1.5, abs=1e-9)
 
 
 @pytest.mark.parametrize(("wanted", "speed"), [(1.9, 0.3), (0.75, 0.3), (0.4, 0.05), (0.7005, 0.3)])
@@ -229,17 +230,17 @@ def test_a_reel_keeps_to_rate_and_acceleration(wanted: float, speed: float) -> N
 def test_the_length_is_that_of_the_leg_also_while_it_is_stopped() -> None:
     leg = Reel((0.0, 0.0, 2.0), 2.7, 0.3, 1.0, 2.0)
     flight = Flight(phase=Phase.HOLD, legs=(leg,), leg_start_us=0)
-    assert cable_now(flight, 2_000_000).cable_m == pytest.approx(0.7 + 0.3 * 1.5)
-    assert cable_now(flight, 2_000_000).reel_rate == 0.3
+    assert cable_now(flight, 2_000_000).cable.length_m == pytest.approx(0.7 + 0.3 * 1.5)
+    assert cable_now(flight, 2_000_000).cable.reel_rate == 0.3
     assert commanded_rate(flight, 2_000_000, 0.004) == 0.3
     stopping = Slow(leg, 2.0, 1.0)
     assert top_of(stopping) == 2.7
     stopped = cable_now(replace(flight, legs=(stopping,)), 1_000_000)
-    assert stopped.cable_m == pytest.approx(0.7 + 0.3 * 2.0)
-    assert stopped.reel_rate == 0.0
+    assert stopped.cable.length_m == pytest.approx(0.7 + 0.3 * 2.0)
+    assert stopped.cable.reel_rate == 0.0
     resting = replace(flight, legs=(Hold((0.0, 0.0, 2.0)),))
     assert commanded_rate(resting, 0, 0.004) == 0.0
-    assert SETTINGS.longest_m == 3.0
+    assert SETTINGS.winch.longest_m == 3.0
 
 
 def test_while_the_winch_works_no_stream_takes_over() -> None:

@@ -33,7 +33,7 @@ from autopilot.guidance.legs import (
     slow_leg,
     transfer_leg,
 )
-from autopilot.supervisor.flight import limits_from
+from autopilot.supervisor.settings import limits_from
 from autopilot.trajectory.shaping import shape, unshaped
 from autopilot.trajectory.waypoint_path import Passage, passage
 from autopilot.vehicle.belief import load_belief

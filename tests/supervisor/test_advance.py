@@ -14,7 +14,17 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import TRANSITIONS, advance, enter, happen
-from autopilot.supervisor.flight import CARRYING, IN_AIR, ON_GROUND, Event, Flight, MissionPlan, Phase
+from autopilot.supervisor.state import (
+    CARRYING,
+    IN_AIR,
+    ON_GROUND,
+    Event,
+    Flight,
+    MissionPlan,
+    MissionProgress,
+    Phase,
+    Setpoints,
+)
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
@@ -89,7 +99,10 @@ def table() -> dict[tuple[Phase, Event], Phase]:
 def test_each_entry_of_the_table_and_each_that_is_not_there(phase: Phase, event: Event) -> None:
     expected = table().get((phase, event))
     assert TRANSITIONS.get((phase, event)) == expected
-    flight = Flight(phase=phase, plan=MissionPlan(STEPS, (0, 1, 2), 3), takeoff_altitude_m=2.0, speed_m_s=1.0)
+    flight = Flight(
+        phase=phase,
+        mission=MissionProgress(plan=MissionPlan(STEPS, (0, 1, 2), 3), takeoff_altitude_m=2.0, speed_m_s=1.0),
+    )
     after = happen(flight, event, hanging(5_000_000), SETTINGS)
     if expected is None:
         assert after is None
@@ -138,8 +151,8 @@ def test_a_mission_of_every_step_runs_from_the_ground_to_the_ground() -> None:
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     P = Phase
     assert sky.phases == [P.TAUTEN, P.LIFT, P.MISSION, P.LOWER, P.SET_DOWN, P.DISARMED]
-    assert sky.flight.mission_done
-    assert (sky.flight.step, sky.flight.on_mission) == (0, False)
+    assert sky.flight.mission.done
+    assert (sky.flight.mission.step, sky.flight.mission.active) == (0, False)
     assert sky.view.x_load[2] < 0.03
     assert sky.view.x_quad[2] < 0.07
     assert norm(sub(sky.view.x_quad, sky.view.x_load)) > 0.2, "the vehicle stands beside its load"
@@ -148,17 +161,17 @@ def test_a_mission_of_every_step_runs_from_the_ground_to_the_ground() -> None:
 def test_reached_numbers_are_those_of_the_items_a_step_ends_with() -> None:
     """Signals with one term of one factor are three items on the wire; a waypoint may be two."""
     sky = start(*EVERY_STEP)
-    sequence = sky.flight.plan.sequence
+    sequence = sky.flight.mission.plan.sequence
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     assert sky.reached == list(sequence)
-    assert sequence[-1] == sky.flight.plan.items - 1
+    assert sequence[-1] == sky.flight.mission.plan.items - 1
     assert sequence[4] - sequence[3] == 3, "term, factor, run"
 
 
 def test_a_mission_without_landing_holds_in_the_end() -> None:
     sky = start(Takeoff(2.0), Delay(0.5))
     sky.run(lambda s: s.flight.phase == Phase.HOLD)
-    assert sky.flight.mission_done
+    assert sky.flight.mission.done
     assert "Mission complete, holding" in sky.texts
     assert sky.reached == [0, 1]
 
@@ -166,7 +179,7 @@ def test_a_mission_without_landing_holds_in_the_end() -> None:
 def test_a_mission_that_ends_with_a_return_lands() -> None:
     sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.ReturnHome())
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
-    assert sky.flight.mission_done
+    assert sky.flight.mission.done
     assert "Mission complete, landing" in sky.texts
     assert sky.reached == [0, 1, 2]
     assert norm(sub(sky.view.x_load, (0.0, 0.0, 0.02))) < 0.03
@@ -182,7 +195,9 @@ def test_a_mission_that_does_not_begin_with_a_takeoff_is_lifted_all_the_same() -
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_a_pause_in_any_step_stops_and_continuing_finishes_the_mission(step: int, share: float) -> None:
     sky = start(*EVERY_STEP)
-    sky.run(lambda s: s.flight.on_mission and s.flight.step == step and s.flight.phase != Phase.TAUTEN)
+    sky.run(
+        lambda s: s.flight.mission.active and s.flight.mission.step == step and s.flight.phase != Phase.TAUTEN
+    )
     leg = sky.flight.legs[0]
     sky.wait(min(share * leg.duration_s, 2.0))
     assert sky.ask(Pause()).result == ACCEPTED
@@ -191,10 +206,10 @@ def test_a_pause_in_any_step_stops_and_continuing_finishes_the_mission(step: int
     resting = sky.view.x_load
     sky.wait(1.0)
     assert sky.view.x_load == pytest.approx(resting, abs=1e-6)
-    assert sky.flight.step == step
+    assert sky.flight.mission.step == step
     assert sky.ask(Continue()).result == ACCEPTED
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
-    assert sky.reached == list(sky.flight.plan.sequence)
+    assert sky.reached == list(sky.flight.mission.plan.sequence)
 
 
 def test_signals_begin_again_from_their_anchor_after_a_pause() -> None:
@@ -250,18 +265,20 @@ def test_interrupting_a_transfer_leaves_no_jump_in_the_setpoint(request_: object
 @pytest.mark.parametrize("step", range(len(EVERY_STEP) - 1))
 def test_landing_and_returning_end_on_the_ground_from_any_step(request_: object, step: int) -> None:
     sky = start(*EVERY_STEP)
-    sky.run(lambda s: s.flight.on_mission and s.flight.step >= step and s.flight.phase != Phase.TAUTEN)
+    sky.run(
+        lambda s: s.flight.mission.active and s.flight.mission.step >= step and s.flight.phase != Phase.TAUTEN
+    )
     sky.wait(0.4)
     if sky.flight.phase == Phase.LIFT and isinstance(request_, ReturnHome):
         assert sky.ask(request_).result != ACCEPTED, "there is no way back before the lift is done"
         return
     assert sky.ask(request_).result == ACCEPTED
-    assert not sky.flight.on_mission
+    assert not sky.flight.mission.active
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     assert "Landed, disarmed" in sky.texts
     if isinstance(request_, ReturnHome):
         assert math.hypot(*sky.view.x_load[:2]) < 0.01
-    assert not sky.flight.mission_done
+    assert not sky.flight.mission.done
 
 
 def test_holding_low_over_the_ground_rises_clear_of_it() -> None:
@@ -280,10 +297,10 @@ def test_setting_the_current_item_in_flight_goes_there_at_once() -> None:
     sky = start(Takeoff(2.0), Waypoint(9.0, 0.0, 2.0), Speed(0.5), Waypoint(0.0, 1.0, 2.0), model.Land())
     sky.run(lambda s: s.flight.phase == Phase.MISSION)
     sky.wait(1.0)
-    speed_item, land_item = sky.flight.plan.sequence[2], sky.flight.plan.sequence[4]
+    speed_item, land_item = sky.flight.mission.plan.sequence[2], sky.flight.mission.plan.sequence[4]
     assert sky.ask(SetCurrent(speed_item)).result == ACCEPTED
-    assert sky.flight.speed_m_s == 0.5, "a speed that is jumped to is a speed set"
-    sky.run(lambda s: s.flight.step == 3)
+    assert sky.flight.mission.speed_m_s == 0.5, "a speed that is jumped to is a speed set"
+    sky.run(lambda s: s.flight.mission.step == 3)
     sky.wait(3.0)
     assert sky.ask(SetCurrent(land_item)).result == ACCEPTED
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
@@ -306,7 +323,9 @@ def test_a_landing_that_is_called_off_by_another_item_is_called_off() -> None:
 
 def lowering(phase: Phase) -> Flight:
     """A flight in the last leg of its landing."""
-    flight = enter(Flight(phase=Phase.HOLD, speed_m_s=1.0), Phase.LOWER, hanging(), SETTINGS)
+    flight = enter(
+        Flight(phase=Phase.HOLD, mission=MissionProgress(speed_m_s=1.0)), Phase.LOWER, hanging(), SETTINGS
+    )
     if phase == Phase.SET_DOWN:
         flight = enter(flight, phase, hanging(x=(0.0, 0.0, 0.02)), SETTINGS)
     return Flight(phase=phase, legs=flight.legs[-1:], leg_start_us=0)
@@ -365,11 +384,8 @@ def under_way(phase: Phase) -> Flight:
     plan = MissionPlan(STEPS, (0, 1, 2), 3)
     held = Flight(
         phase=Phase.HOLD,
-        plan=plan,
-        step=1,
-        takeoff_altitude_m=4.0,
-        speed_m_s=1.0,
-        offboard=Stream(PositionSetpoint(HERE), 0),
+        mission=MissionProgress(plan=plan, step=1, takeoff_altitude_m=4.0, speed_m_s=1.0),
+        setpoints=Setpoints(offboard=Stream(PositionSetpoint(HERE), 0)),
     )
     return enter(held, phase, hanging(x=HERE), SETTINGS)
 
@@ -391,7 +407,7 @@ def test_trouble_in_the_air_ends_in_failsafe_and_says_why(phase: Phase, trouble:
 @pytest.mark.parametrize("phase", sorted(CARRYING))
 def test_a_load_that_is_too_far_off_ends_the_flight(phase: Phase) -> None:
     flight = under_way(phase)
-    off = hanging(STEP_US, x=(HERE[0] + SETTINGS.load_error_limit_m + 0.1, 0.0, 2.0))
+    off = hanging(STEP_US, x=(HERE[0] + SETTINGS.failsafe.load_error_limit_m + 0.1, 0.0, 2.0))
     after, report = advance(flight, off, SETTINGS)
     assert after.phase == Phase.FAILSAFE
     assert "exceeds FS_LOAD_ERR 5.0 m" in report.texts[0][1]

@@ -19,8 +19,8 @@ from autopilot.services.requests import (
     SetMode,
     StartMission,
 )
-from autopilot.supervisor.flight import Phase, Settings
 from autopilot.supervisor.requests import decide
+from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon
 from autopilot.wire.items import LocatedStep
@@ -35,9 +35,9 @@ EAST = FollowSetpoint(NOTHING, (2.0, 0.0, 0.0), NOTHING, False)
 
 
 def fenced(*steps: Any, **changes: Any) -> Sky:
-    settings: Settings = replace(SETTINGS, **changes)
+    settings = replace(SETTINGS, fence=replace(SETTINGS.fence, **changes))
     sky = Sky(*steps, settings=settings)
-    sky.flight = replace(sky.flight, fence=FENCE)
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=FENCE))
     return sky
 
 
@@ -62,7 +62,7 @@ def test_the_load_is_held_within_the_fence() -> None:
     assert sky.texts[-1] == "Fence: outside the fence"
     # stopped before it, though not much: measured 4.89 m
     assert 3.5 < farthest < 5.0
-    assert sky.flight.breaches == 1
+    assert sky.flight.area.breaches == 1
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_the_load_is_held_within_the_fence() -> None:
     ],
 )
 def test_each_action(action: int, phase: Phase, told: bool) -> None:
-    sky = fenced(fence_action=action).airborne()
+    sky = fenced(action=action).airborne()
     seen = set()
     for _ in range(5):
         sky.ask(EAST)
@@ -93,10 +93,10 @@ def test_each_action(action: int, phase: Phase, told: bool) -> None:
 
 
 def test_distance_and_height() -> None:
-    sky = fenced(fence_radius_m=3.0).airborne()
+    sky = fenced(radius_m=3.0).airborne()
     assert eastward(sky, 10.0) < 3.0
     assert sky.texts[-1] == "Fence: more than GF_MAX_HOR_DIST 3 m from home"
-    high = fenced(fence_height_m=4.0).airborne()
+    high = fenced(height_m=4.0).airborne()
     assert high.ask(Reposition(None, None, 3.5, True)).result == DENIED  # the vehicle would be at 4.2 m
     assert high.ask(Reposition(None, None, 3.2, True)).result == ACCEPTED
 
@@ -127,13 +127,15 @@ def test_a_mission_that_leaves_it_is_refused_with_the_item() -> None:
     through = (Takeoff(2.0), Waypoint(-3.0, 3.0, 2.0), Waypoint(3.0, 3.0, 2.0))
     verdict = sky.ask(ReplaceMission(3, tuple(LocatedStep(i, i, step) for i, step in enumerate(through))))
     assert verdict.text == "Mission denied: item 2 leads in an exclusion zone of the fence"
-    free = fenced(*steps, fence_action=0)
+    free = fenced(*steps, action=0)
     assert free.ask(ReplaceMission(3, located)).result == ACCEPTED
 
 
 def test_no_arming_outside() -> None:
     sky = fenced()
-    sky.flight = replace(sky.flight, fence=Fence((Disc(True, (50.0, 0.0), 10.0),)))
+    sky.flight = replace(
+        sky.flight, area=replace(sky.flight.area, fence=Fence((Disc(True, (50.0, 0.0), 10.0),)))
+    )
     assert sky.ask(Arm(True, False)).text == "Arming denied: outside the fence"
     _, verdict = decide(sky.flight, RunPrearmChecks(), sky.view, sky.settings)
     assert verdict.text == "outside the fence"
@@ -141,7 +143,7 @@ def test_no_arming_outside() -> None:
 
 def test_a_return_leads_to_the_nearest_rally_point() -> None:
     sky = Sky().airborne()
-    sky.flight = replace(sky.flight, rally=((4.0, 0.0, 0.0), (20.0, 0.0, 0.0)))
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, rally=((4.0, 0.0, 0.0), (20.0, 0.0, 0.0))))
     sky.ask(Reposition(3.0, 0.0, 2.0, True))
     sky.wait(8.0)
     assert sky.ask(ReturnHome()).result == ACCEPTED

@@ -12,9 +12,17 @@ import pytest
 from autopilot.guidance.legs import Hold, Transfer
 from autopilot.services import identity, requests
 from autopilot.supervisor.advance import advance, enter
-from autopilot.supervisor.flight import IN_AIR, ON_GROUND, Flight, MissionPlan, Phase, Selected
 from autopilot.supervisor.requests import ACCEPTED as YES
 from autopilot.supervisor.requests import arming_complaints, decide
+from autopilot.supervisor.state import (
+    IN_AIR,
+    ON_GROUND,
+    Flight,
+    MissionPlan,
+    MissionProgress,
+    Phase,
+    Selected,
+)
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
@@ -102,12 +110,17 @@ def flight_in(phase: Phase, on_mission: bool, plan: MissionPlan) -> Flight:
     """A flight in the first leg of a phase; on the mission's waypoint if it is on a mission."""
     step = 2 if plan.steps else 0
     selected = Selected.MISSION if on_mission else Selected.NOTHING
-    held = Flight(Phase.HOLD, plan=plan, step=step, takeoff_altitude_m=4.0, speed_m_s=1.0, selected=selected)
+    held = Flight(
+        Phase.HOLD,
+        mission=MissionProgress(plan=plan, step=step, takeoff_altitude_m=4.0, speed_m_s=1.0),
+        selected=selected,
+    )
     if phase in ON_GROUND or phase == Phase.FAILSAFE:
         return replace(held, phase=phase)
     if phase == Phase.MISSION and not plan.steps:
         return replace(held, phase=phase, legs=(Hold((0.5, 0.0, 2.0)),))
-    return replace(enter(held, phase, hanging(x=(0.5, 0.0, 2.0)), SETTINGS), on_mission=on_mission)
+    entered = enter(held, phase, hanging(x=(0.5, 0.0, 2.0)), SETTINGS)
+    return replace(entered, mission=replace(entered.mission, active=on_mission))
 
 
 def seen_in(phase: Phase) -> Any:
@@ -190,13 +203,13 @@ def test_arming_and_choosing_what_to_fly_come_in_either_order(what: Any, ask_fir
     for request in (what, R.Arm(True, False)) if ask_first else (R.Arm(True, False), what):
         assert sky.ask(request).result == ACCEPTED
     assert sky.flight.phase == Phase.TAUTEN
-    assert sky.flight.on_mission == isinstance(what, R.StartMission)
-    assert sky.flight.takeoff_altitude_m == 2.0
+    assert sky.flight.mission.active == isinstance(what, R.StartMission)
+    assert sky.flight.mission.takeoff_altitude_m == 2.0
 
 
 def test_a_mission_that_is_gone_is_not_begun_by_arming() -> None:
-    chosen, _ = decide(Flight(plan=PLAN), R.StartMission(None), view(), SETTINGS)
-    gone = replace(chosen, plan=MissionPlan())
+    chosen, _ = decide(Flight(mission=MissionProgress(plan=PLAN)), R.StartMission(None), view(), SETTINGS)
+    gone = replace(chosen, mission=replace(chosen.mission, plan=MissionPlan()))
     after, verdict = decide(gone, R.Arm(True, False), view(), SETTINGS)
     assert (after, verdict.result, verdict.text) == (gone, DENIED, "Mission denied: there is none")
 

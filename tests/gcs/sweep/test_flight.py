@@ -20,7 +20,8 @@ from autopilot.guidance.legs import (
     asked_jet,
 )
 from autopilot.onboard.onboard import Onboard
-from autopilot.supervisor.flight import Flight, jet_ahead, limits_from
+from autopilot.supervisor.settings import limits_from
+from autopilot.supervisor.state import Flight, jet_ahead
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.shaping import Shaped, unshaped
 from autopilot.trajectory.waypoint_path import Passage

@@ -1,0 +1,154 @@
+"""What a mission is refused for before it is flown: the fence, a load that is gone, the winch.
+
+Each check walks the timeline of the steps (`autopilot.trajectory.timeline`) from where the flight stands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from autopilot.geometry.linear import Vec3, axpy, norm, sub
+from autopilot.supervisor.phase_legs import LEAST_REEL_M, length_at, stop
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import ON_GROUND, Flight, MissionPlan, View, below, forbidden
+from autopilot.trajectory.timeline import ANYWHERE, MissionState, TimelineEntry, timeline
+from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
+
+LEAST_ALTITUDE_M = 0.3
+WAY_M, MOST_PIECES = 0.25, 4000  # spacing of the places at which a way is looked at, and how many at most
+
+Ahead = list[tuple[int, TimelineEntry]]  # each with its mission item
+
+
+def mission_trouble(flight: Flight, view: View, settings: Settings) -> str:
+    """Which item that is still to be flown must not be flown from here, and why; an empty string: none."""
+    ahead = steps_ahead(flight, view, settings)
+    return leaves_fence(flight, ahead, settings) or needs_load(ahead) or reels_too_far(ahead, settings)
+
+
+def upload_trouble(
+    flight: Flight, steps: Sequence[Step], sequence: Sequence[int], view: View, settings: Settings
+) -> str:
+    """Which item of a mission that is uploaded leads over the fence, and why; an empty string: none.
+
+    On the ground it begins where the load stands; in the air it may be begun anywhere.
+    """
+    start = replace(ANYWHERE, cable_m=settings.cable_length_m, released=flight.cable.released)
+    if flight.phase in ON_GROUND and not view.complaints:
+        start = replace(start, expected=_stands_at(flight, view), known=True)
+    ahead = list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
+    return leaves_fence(flight, ahead, settings)
+
+
+def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
+    """The steps that are left of the mission, flown from where the load is or comes to rest."""
+    mission, cable = flight.mission, flight.cable
+    steps, sequence = mission.plan.steps[mission.step :], mission.plan.sequence[mission.step :]
+    if flight.phase in ON_GROUND:
+        here, length = _stands_at(flight, view), settings.cable_length_m
+        lift = Takeoff(lift_altitude_m(mission.plan, settings))
+        if isinstance(steps[0], Takeoff):
+            steps = (lift, *steps[1:])
+        else:  # lifted unasked
+            steps, sequence = (lift, *steps), (sequence[0], *sequence)
+    else:
+        here = stop(flight, view, settings)[1]
+        length = length_at(flight, here, settings)
+        if mission.step_anchor is not None and isinstance(steps[0], Signals | AttitudeRun):
+            here = mission.step_anchor  # begun anew, from where it began
+        if cable.reel_to_m is not None and isinstance(steps[0], Winch):  # taken up again
+            steps = (replace(steps[0], length_m=cable.reel_to_m - length), *steps[1:])
+    start = MissionState(here, cable_m=length, released=cable.released)
+    return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
+
+
+def lift_altitude_m(plan: MissionPlan, settings: Settings) -> float:
+    """Height to which a mission that begins on the ground is lifted, whichever step it begins with."""
+    first = next((step for step in plan.steps if isinstance(step, Takeoff)), None)
+    return settings.motion.takeoff_altitude_m if first is None else first.altitude_m
+
+
+def _stands_at(flight: Flight, view: View) -> Vec3:
+    return view.x_quad if flight.cable.released else view.x_load
+
+
+def leaves_fence(flight: Flight, ahead: Ahead, settings: Settings) -> str:
+    """Which item leads over the fence, and why; an empty string if none does.
+
+    Looked at are the straight ways to take-off height, to waypoints and home, and the places at which signals
+    and the winch leave the load; signals and curves between waypoints are watched in flight.
+    """
+    if not settings.fence.action:
+        return ""
+    for seq, entry in ahead:
+        why = _why_forbidden(flight, entry, settings)
+        if why:
+            return f"item {seq} leads {why}"
+    return ""
+
+
+def _why_forbidden(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
+    begin, end, cable = entry.before.expected, entry.after.expected, entry.after.cable_m
+    if end is None or not isinstance(entry.step, Takeoff | Waypoint | ReturnHome | Signals | Winch):
+        return ""
+    if cable is not None:
+        settings = replace(settings, cable_length_m=cable)
+
+    def why(place: Vec3) -> str:
+        load = below(place, settings) if entry.after.released else place
+        return forbidden(flight.area.fence, load, settings)
+
+    straight = not isinstance(entry.step, Signals | Winch)
+    # a way that begins over the fence leads back: only its end counts
+    if begin is None or not straight or why(begin):
+        return why(end)
+    return next(filter(None, map(why, _along(begin, end))), "")
+
+
+def _along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
+    """Places on a straight way, at most WAY_M apart, up to its end."""
+    way = sub(end, begin)
+    pieces = min(max(1, math.ceil(norm(way) / WAY_M)), MOST_PIECES)
+    return (axpy((k + 1) / pieces, way, begin) for k in range(pieces))
+
+
+def needs_load(ahead: Ahead) -> str:
+    """Which item swings a load that is released by then; an empty string: none."""
+    for seq, entry in ahead:
+        if entry.before.released and isinstance(entry.step, Signals | AttitudeRun):
+            return f"item {seq} needs the load, which is released"
+    return ""
+
+
+def reels_too_far(ahead: Ahead, settings: Settings) -> str:
+    """Which item asks too much of the winch; an empty string: none."""
+    for seq, entry in ahead:
+        step, left = entry.step, entry.after
+        if not isinstance(step, Winch):
+            continue
+        if not settings.winch.usable:
+            return f"item {seq}: the law lqr flies one length of the cable"
+        if left.released:
+            return f"item {seq} needs the load, which is released"
+        if step.speed_m_s is not None and step.speed_m_s > settings.winch.speed_m_s:
+            return f"item {seq}: {step.speed_m_s:g} m/s exceeds WNC_SPEED {settings.winch.speed_m_s:g}"
+        assert left.cable_m is not None, "a flight knows its cable"
+        height = math.inf if left.position is None else left.position[2]
+        beyond = reel_trouble(left.cable_m, height, settings)
+        if beyond:
+            return f"item {seq}: {beyond}"
+    return ""
+
+
+def reel_trouble(wanted: float, height: float, settings: Settings) -> str:
+    """Why the cable may not get so long (m) with the load at that height; an empty string if it may."""
+    if not settings.winch.shortest_m - LEAST_REEL_M <= wanted <= settings.winch.longest_m + LEAST_REEL_M:
+        limits = (
+            f"{settings.winch.shortest_m:g} ... {settings.winch.longest_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
+        )
+        return f"a cable of {wanted:.2f} m; must be {limits}"
+    if height < LEAST_ALTITUDE_M - LEAST_REEL_M:
+        return f"load height {height:.2f} m, least {LEAST_ALTITUDE_M} m"
+    return ""

@@ -1,0 +1,230 @@
+"""The supervisor's state: the record of a flight, what it is decided from, and what follows from both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum, IntEnum
+from math import hypot, nan, sqrt
+from typing import NamedTuple
+
+from autopilot.control.records import Jet
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.guidance.legs import Leg
+from autopilot.guidance.setpoint_follower import SILENT, SMOOTH_SHARE, Circle, FollowLimits, Stream
+from autopilot.supervisor.settings import Settings
+from autopilot.trajectory.prepare import UNPREPARED, Prepared
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.fence import NO_FENCE, Fence
+from missions.model import Step
+
+
+class Phase(IntEnum):
+    """Phases of flight, numbered as PLUMBLINE_PHASE."""
+
+    DISARMED = mavlink.PLUMBLINE_PHASE_DISARMED
+    ARMED = mavlink.PLUMBLINE_PHASE_ARMED
+    TAUTEN = mavlink.PLUMBLINE_PHASE_TAUTEN
+    LIFT = mavlink.PLUMBLINE_PHASE_LIFT
+    HOLD = mavlink.PLUMBLINE_PHASE_HOLD
+    MISSION = mavlink.PLUMBLINE_PHASE_MISSION
+    RETURN = mavlink.PLUMBLINE_PHASE_RETURN
+    LOWER = mavlink.PLUMBLINE_PHASE_LOWER
+    SET_DOWN = mavlink.PLUMBLINE_PHASE_SET_DOWN
+    FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
+    GUIDED = mavlink.PLUMBLINE_PHASE_GUIDED
+
+
+ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
+CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
+IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
+
+
+class Event(Enum):
+    """Events that begin a phase."""
+
+    ARM = "arm"
+    DISARM = "disarm"
+    TAKEOFF = "take off"
+    TAUT = "cable taut"
+    DONE = "legs done"
+    HOLD = "hold"
+    MISSION = "fly the mission"
+    GUIDE = "follow setpoints"
+    RETURN = "return"
+    LAND = "land"
+    LOAD_DOWN = "load on the ground"
+    VEHICLE_DOWN = "vehicle on the ground"
+    FAIL = "give up"
+
+
+class Selected(Enum):
+    """What begins when the vehicle is armed."""
+
+    NOTHING = "hold"
+    TAKEOFF = "take-off"
+    MISSION = "mission"
+    OFFBOARD = "offboard"
+
+
+class Guide(Enum):
+    """Setpoint source while GUIDED."""
+
+    OFFBOARD = "setpoints"
+    MANUAL = "the stick"
+    ORBIT = "a circle"
+
+
+@dataclass(frozen=True, slots=True)
+class MissionPlan:
+    """The mission in force: its steps, the mission item each came from, and how many items there are."""
+
+    steps: tuple[Step, ...] = ()
+    sequence: tuple[int, ...] = ()
+    items: int = 0
+    prepared: Prepared = UNPREPARED
+
+
+@dataclass(frozen=True, slots=True)
+class MissionProgress:
+    """How far the mission is flown, and with what."""
+
+    plan: MissionPlan = MissionPlan()
+    step: int = 0  # of the plan: the present one, or the one to begin with
+    active: bool = False
+    done: bool = False
+    step_anchor: Vec3 | None = None  # where the present step began
+    takeoff_altitude_m: float = 0.0
+    speed_m_s: float = 0.0  # of transfers
+
+
+@dataclass(frozen=True, slots=True)
+class CableState:
+    """What is known of cable, winch and gripper."""
+
+    released: bool = False  # the load: what is flown and asked for is the vehicle, by itself
+    length_m: float | None = None  # as the winch has it; None: VEH_CABLE_LEN
+    reel_rate: float = 0.0  # m/s, at which the length grows now
+    reel_accel: float = 0.0  # m/s^2
+    reel_to_m: float | None = None  # length that the present mission step asks for
+    taut_length_m: float = 0.0  # from load to vehicle when lifting began: of the cable as it is
+    slack_since_us: int = -1  # since when the cable does not pull while it should, -1: it pulls
+    slack_step: int = -1  # mission step in which it last went slack
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoints:
+    """The setpoints received, and the source of those that are followed while GUIDED."""
+
+    guide: Guide = Guide.OFFBOARD
+    offboard: Stream = SILENT
+    manual: Stream = SILENT
+    circle: Circle | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """Places that matter to the flight, and whether the fence is breached."""
+
+    home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
+    rally: tuple[Vec3, ...] = ()  # where it leads as well, if that is nearer
+    fence: Fence = NO_FENCE
+    breach: str = ""  # why load or vehicle may not be where it is, or is about to be
+    breaches: int = 0
+    breach_us: int = 0  # when the last one began
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """State of the flight. `legs[0]` is being flown since `leg_start_us`."""
+
+    phase: Phase = Phase.DISARMED
+    phase_start_us: int = 0
+    legs: tuple[Leg, ...] = ()
+    leg_start_us: int = 0
+    following: tuple[Leg, ...] = ()  # what will be flown after `legs`, where that is known
+    still_since_us: int = -1  # since when the condition that ends the phase holds, -1: it does not
+    selected: Selected = Selected.NOTHING
+    heeds: bool = True  # holding, it follows a setpoint at once: ArduPilot's GUIDED, not its LOITER
+    mission: MissionProgress = MissionProgress()
+    cable: CableState = CableState()
+    setpoints: Setpoints = Setpoints()
+    area: Area = Area()
+
+
+class View(NamedTuple):
+    """What the supervisor sees of the world at a tick: estimates, ENU from home."""
+
+    now_us: int
+    x_quad: Vec3
+    v_quad: Vec3
+    x_load: Vec3
+    v_load: Vec3
+    taut: bool
+    tilt_rad: float
+    complaints: tuple[str, ...]
+    pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
+    height_std: float = 0.0  # m, of heights over home, where a receiver tells them
+
+
+class Report(NamedTuple):
+    """What came of an advance: texts (severity, text) for the operator, mission items reached."""
+
+    texts: tuple[tuple[int, str], ...] = ()
+    reached: tuple[int, ...] = ()
+
+
+def off_mission(flight: Flight) -> Flight:
+    """The flight with its mission interrupted; the step is kept."""
+    return replace(flight, mission=replace(flight.mission, active=False))
+
+
+def pace_of(flight: Flight, settings: Settings) -> FollowLimits:
+    """How setpoints are followed."""
+    rate = SMOOTH_SHARE * sqrt(settings.gravity_m_s2 / settings.cable_length_m)
+    return FollowLimits(
+        flight.mission.speed_m_s, settings.setpoints.fastest_m_s, settings.motion.accel_m_s2, rate
+    )
+
+
+def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
+    """Why load or vehicle may not be there, the vehicle a cable length above; an empty string if they may."""
+    if settings.fence.radius_m > 0.0 and hypot(x_load[0], x_load[1]) > settings.fence.radius_m:
+        return f"more than GF_MAX_HOR_DIST {settings.fence.radius_m:g} m from home"
+    if settings.fence.height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence.height_m:
+        return f"higher than GF_MAX_VER_DIST {settings.fence.height_m:g} m"
+    return fence.complaint(x_load[0], x_load[1])
+
+
+def carries(flight: Flight) -> bool:
+    """Whether the load must be known to go on: not one that is released or lies, the vehicle landing
+    beside it."""
+    return not flight.cable.released and flight.phase != Phase.SET_DOWN
+
+
+def below(x_quad: Vec3, settings: Settings) -> Vec3:
+    """Where a load would hang under the vehicle."""
+    return (x_quad[0], x_quad[1], x_quad[2] - settings.cable_length_m)
+
+
+def leg_time_s(flight: Flight, now_us: int) -> float:
+    """Time in the present leg."""
+    return (now_us - flight.leg_start_us) * 1e-6
+
+
+def setpoint(flight: Flight, now_us: int) -> Jet | None:
+    """Position and derivatives to be flown now, of load or vehicle as the leg says; None without a leg."""
+    return jet_ahead(flight, leg_time_s(flight, now_us)) if flight.legs else None
+
+
+def jet_ahead(flight: Flight, t: float) -> Jet:
+    """Position and derivatives `t` seconds into the present leg, or into what follows where that is known.
+
+    Only legs that control the same as the present one follow it for this.
+    """
+    leg = flight.legs[0]
+    for after in (*flight.legs[1:], *flight.following):
+        if t < leg.duration_s or after.control_mode != leg.control_mode:
+            break
+        t -= leg.duration_s
+        leg = after
+    return leg.jet(t)
