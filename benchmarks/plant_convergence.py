@@ -23,7 +23,7 @@ from autopilot.geometry.linear import axpy
 from autopilot.geometry.so3 import quat_exp
 from sitl.plant.records import PlantState, Rotors, Truth
 from sitl.plant.step import advance_many, initial_state
-from sitl.vehicles import load_truth
+from sitl.vehicles.truth import load_truth
 
 TICK = 4e-3
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)

@@ -54,7 +54,7 @@ from missions.fileformat import load_mission
 from missions.model import Signals, Term
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
-from sitl.vehicles import load_truth
+from sitl.vehicles.truth import load_truth
 
 PRINTED = (0.61, 15.0, 1.26)  # s, %, s: 4-4
 TOLERANCE = (0.08, 6.0, 0.25)

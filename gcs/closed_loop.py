@@ -14,7 +14,7 @@ from autopilot.onboard.snapshot import Options
 from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_mission
@@ -39,7 +39,7 @@ class Conditions:
 
 def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
     """An autopilot under these conditions."""
-    table = autopilot_parameters(load_belief(conditions.vehicle))
+    table = autopilot_parameters(load_vehicle(conditions.vehicle))
     apply_settings(table, conditions.settings.items())
     table.freeze()
     return Onboard(table, identity_of(table), Options(home, LOCKSTEP_BOOT_UNIX_US), mission)

@@ -7,7 +7,7 @@ the value is; error messages and the documentation quote it.
 from __future__ import annotations
 
 from math import radians
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -29,8 +29,6 @@ class Spec(BaseModel):
     """Strict: no unknown keys, no silent conversion, no nan and no infinity."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-    # keys that hold a list of tables, and what a table of it may say
-    nested: ClassVar[dict[str, type[Spec]]] = {}
 
 
 class Item(Spec):
@@ -105,7 +103,6 @@ class SineSpec(Spec):
 
 
 class TermSpec(Spec):
-    nested: ClassVar[dict[str, type[Spec]]] = {"factors": SineSpec}
     axis: Literal["x", "y", "z"] = Field(description="x east, y north, z up")
     amplitude_m: Metres = Field(description="height of the envelope")
     start_s: Seconds = Field(0.0, description="beginning of the rise, from the beginning of the signals")
@@ -145,7 +142,6 @@ class TermSpec(Spec):
 
 
 class SignalsItem(Item):
-    nested: ClassVar[dict[str, type[Spec]]] = {"terms": TermSpec}
     duration_s: PositiveSeconds = Field(description="duration of the whole trajectory")
     terms: list[TermSpec] = Field(min_length=1, max_length=32)
 

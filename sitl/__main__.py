@@ -28,9 +28,11 @@ from autopilot.shell.options import (
     setting_option,
     shown,
 )
+from autopilot.vehicle.file import VEHICLES
 from autopilot.wire.convert import Home
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing
+from sitl.sensors.shipped import PROFILES
 
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 1.0
@@ -260,8 +262,20 @@ def _run_on(cpu: int) -> None:
 
 
 @click.command()
-@click.option("--sensors", default="lab", show_default=True, metavar="NAME|FILE", help="Sensor profile.")
-@click.option("--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help="What really flies.")
+@click.option(
+    "--sensors",
+    default="lab",
+    show_default=True,
+    metavar="NAME|FILE",
+    help=f"Sensor profile: {PROFILES.choice()}.",
+)
+@click.option(
+    "--vehicle",
+    default="bebop",
+    show_default=True,
+    metavar="NAME|FILE",
+    help=f"What really flies: {VEHICLES.choice()}.",
+)
 @click.option(
     "--seed", default=1, show_default=True, type=click.IntRange(0, 2**63 - 1), help="Seed of all noise."
 )

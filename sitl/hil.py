@@ -23,9 +23,9 @@ from sitl.sensors.files import load_profile
 from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
 from sitl.sim_core import SECOND_US, STOPPED, Readings, SimCore, settings_of
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 VEHICLE_SYSTEM = 1
 SIMULATOR_COMPONENT = 26

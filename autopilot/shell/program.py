@@ -45,7 +45,7 @@ from autopilot.shell.options import (
 from autopilot.shell.path_worker import Aside
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.tcp_server import TcpServer
-from autopilot.vehicle.belief import BeliefError, load_belief
+from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
@@ -406,7 +406,11 @@ def _address_or_none(text: str) -> Address | None:
     help="One ground station that shares our clock, in place of --gcs and --api.",
 )
 @click.option(
-    "--vehicle", default="bebop", show_default=True, metavar="NAME|FILE", help="What is believed to fly."
+    "--vehicle",
+    default="bebop",
+    show_default=True,
+    metavar="NAME|FILE",
+    help=f"What is believed to fly: {VEHICLES.choice()}.",
 )
 @click.option(
     "--set",
@@ -455,7 +459,7 @@ def main(
     place = home or Home()
     in_step = ground_lockstep is not None
     try:
-        table = autopilot_parameters(load_belief(vehicle))
+        table = autopilot_parameters(load_vehicle(vehicle))
         kept = Storage(storage or user_state_path("plumbline"))
         kept.lock()
         for trouble in kept.load_parameters(table):
@@ -493,7 +497,7 @@ def main(
         be_punctual()
         with StopRequest() as stop:
             program.run(stop)
-    except (AutopilotError, BeliefError, ParameterError, StorageError) as error:
+    except (AutopilotError, VehicleFileError, ParameterError, StorageError) as error:
         print(f"autopilot: {error}", file=sys.stderr)
         sys.exit(1)
     except Stop:

@@ -17,7 +17,7 @@ from math import cos, degrees, inf, nextafter, radians
 
 from numpy import linspace
 
-from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.geometry.linear import norm, sub
 from autopilot.trajectory.peaks import (
     Body,
     Extreme,
@@ -33,6 +33,7 @@ from autopilot.trajectory.shaping import Shaped, path_jets, shape
 from autopilot.trajectory.signals import evaluate, joints, signal_table
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import Passage, passage_jets
+from autopilot.vehicle.model import Vehicle
 from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint, Winch
 
 __all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
@@ -51,55 +52,45 @@ _GROUND_M = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class VehicleLimits:
-    """What the check believes of the vehicle. Defaults: Table 4-1, and chosen where it is silent.
+    """The vehicle that is to fly, and what is asked of it at most.
 
-    `thrust_reserve` is the share of the total thrust kept free for control. `rotor_max_n` may be infinite.
-    `speed_m_s` (until the mission sets its own) and `accel_m_s2` are the peaks of transfers.
+    `thrust_reserve` is the share of the total thrust kept free for control. `speed_m_s` (until the mission
+    sets its own) and `accel_m_s2` are the peaks of transfers.
     """
 
-    quad_mass_kg: float = 0.4
-    load_mass_kg: float = 0.1
-    cable_length_m: float = 0.7
-    inertia_kg_m2: Vec3 = (2.23e-3, 2.99e-3, 4.8e-3)
-    gravity_m_s2: float = 9.81
-    arm_m: float = 0.126
-    torque_ratio_m: float = 0.016
-    rotor_min_n: float = 0.0
-    rotor_max_n: float = 1.96
+    vehicle: Vehicle
     thrust_reserve: float = 0.1
     tilt_max_rad: float = radians(45.0)
     speed_m_s: float = 1.5
     accel_m_s2: float = 1.5
-    quad_drag_n_s_m: float = 0.0
-    quad_drag_quadratic_n_s2_m2: float = 0.0
-    rotor_tau_s: float = 0.0
 
     @property
     def body(self) -> Body:
         """The part of it that the survey needs."""
+        vehicle = self.vehicle
         return Body(
-            self.quad_mass_kg,
-            self.load_mass_kg,
-            self.cable_length_m,
-            self.inertia_kg_m2,
-            self.gravity_m_s2,
-            self.arm_m,
-            self.torque_ratio_m,
-            self.quad_drag_n_s_m,
-            self.quad_drag_quadratic_n_s2_m2,
+            vehicle.quad_mass_kg,
+            vehicle.load_mass_kg,
+            vehicle.cable_length_m,
+            vehicle.inertia_kg_m2,
+            vehicle.gravity_m_s2,
+            vehicle.arm_m,
+            vehicle.torque_ratio_m,
+            vehicle.quad_drag_n_s_m,
+            vehicle.quad_drag_quadratic_n_s2_m2,
         )
 
     @property
     def shaping(self) -> Limits:
         """What the autopilot shapes paths to, as delivered: its MIS_ parameters."""
-        margin = ROTOR_MARGIN * (self.rotor_max_n - self.rotor_min_n)
-        limited = self.rotor_max_n < inf
+        vehicle = self.vehicle
+        margin = ROTOR_MARGIN * (vehicle.rotor_max_n - vehicle.rotor_min_n)
         bounds = Bounds(
-            self.rotor_min_n + margin if limited else -inf,
-            self.rotor_max_n - margin if limited else inf,
-            LEAST_TENSION * self.load_mass_kg * self.gravity_m_s2,
+            vehicle.rotor_min_n + margin if vehicle.limited else -inf,
+            vehicle.rotor_max_n - margin if vehicle.limited else inf,
+            LEAST_TENSION * vehicle.load_mass_kg * vehicle.gravity_m_s2,
             cos(self.tilt_max_rad),
-            self.rotor_tau_s,
+            vehicle.rotor_tau_s,
         )
         return Limits(
             self.body, bounds, True, SHAPING_M, REFUSE, self.speed_m_s, self.accel_m_s2, time_optimal=False
@@ -222,7 +213,7 @@ def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:
 
 
 def _timeline(mission: Mission, limits: VehicleLimits) -> Iterator[TimelineEntry]:
-    start = MissionState(cable_m=limits.cable_length_m, speed_m_s=limits.speed_m_s)
+    start = MissionState(cable_m=limits.vehicle.cable_length_m, speed_m_s=limits.speed_m_s)
     return timeline(mission.steps, start, accel_m_s2=limits.accel_m_s2)
 
 
@@ -243,7 +234,8 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
         return Violation(entry.item, quantity, worst.value, limit, worst.time_s, text)
 
     fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
-    gravity, full = limits.gravity_m_s2, 4.0 * limits.rotor_max_n
+    vehicle = limits.vehicle
+    gravity, full = vehicle.gravity_m_s2, vehicle.rotors * vehicle.rotor_max_n
     usable = full * (1.0 - limits.thrust_reserve)
     # a step that begins under the ground has been told of at the one that led there
     if along.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
@@ -265,18 +257,18 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
             f"{reserve if usable < full else ''} ({_excess(thrust.value, usable)})"
         )
         yield violation("thrust", thrust, usable, says)
-    if high.value > limits.rotor_max_n:
+    if high.value > vehicle.rotor_max_n:
         says = (
-            f"one rotor has to give {high.value:.2f} N; it gives {limits.rotor_max_n:.2f} N at most "
-            f"({_excess(high.value, limits.rotor_max_n)})"
+            f"one rotor has to give {high.value:.2f} N; it gives {vehicle.rotor_max_n:.2f} N at most "
+            f"({_excess(high.value, vehicle.rotor_max_n)})"
         )
-        yield violation("rotor force", high, limits.rotor_max_n, says)
-    if low.value < limits.rotor_min_n:
+        yield violation("rotor force", high, vehicle.rotor_max_n, says)
+    if low.value < vehicle.rotor_min_n:
         says = (
-            f"one rotor has to give {low.value:.2f} N; it gives {limits.rotor_min_n:.2f} N at least "
-            f"({limits.rotor_min_n - low.value:.2f} N under)"
+            f"one rotor has to give {low.value:.2f} N; it gives {vehicle.rotor_min_n:.2f} N at least "
+            f"({vehicle.rotor_min_n - low.value:.2f} N under)"
         )
-        yield violation("rotor force", low, limits.rotor_min_n, says)
+        yield violation("rotor force", low, vehicle.rotor_min_n, says)
     if tilt.value > limits.tilt_max_rad:
         angle, bound = degrees(tilt.value), degrees(limits.tilt_max_rad)
         says = (

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from autopilot.wire.parameter_table import ParameterTable
 
 if TYPE_CHECKING:
-    from autopilot.vehicle.belief import Belief
+    from autopilot.vehicle.model import Vehicle
     from autopilot.wire.parameter_file import ParameterFile
 
 FILE = "parameters.toml"
@@ -58,13 +58,17 @@ def definitions() -> ParameterFile:
     return parameter_file(_DOCUMENT, FILE)
 
 
-def autopilot_parameters(belief: Belief) -> ParameterTable:
+def autopilot_parameters(belief: Vehicle) -> ParameterTable:
     """The table, with the vehicle's numbers taken from `belief`."""
-    return ParameterTable(definitions().definitions(_vehicle_values(belief)))
+    return ParameterTable(definitions().definitions(vehicle_values(belief)))
 
 
-def _vehicle_values(belief: Belief) -> dict[str, float]:
+def vehicle_values(belief: Vehicle) -> dict[str, float]:
     """The numbers of the vehicle by the names that `from_vehicle` and `proportional_to` use."""
+    from autopilot.wire.convert import ROTOR_FMAX
+
+    # where there is no limit the parameters keep the forces of Table 4-1 and the mixer ignores them
+    rotor_min, rotor_max = (belief.rotor_min_n, belief.rotor_max_n) if belief.limited else (0.0, ROTOR_FMAX)
     j_xx, j_yy, j_zz = belief.inertia_kg_m2
     return {
         "quad_mass_kg": belief.quad_mass_kg,
@@ -74,8 +78,8 @@ def _vehicle_values(belief: Belief) -> dict[str, float]:
         "inertia_xx_kg_m2": j_xx,
         "inertia_yy_kg_m2": j_yy,
         "inertia_zz_kg_m2": j_zz,
-        "rotor_min_n": belief.rotor_min_n,
-        "rotor_max_n": belief.rotor_max_n,
+        "rotor_min_n": rotor_min,
+        "rotor_max_n": rotor_max,
         "rotor_limited": 1.0 if belief.limited else 0.0,
         "torque_ratio_m": belief.torque_ratio_m,
         "rotor_tau_ms": 1e3 * belief.rotor_tau_s,

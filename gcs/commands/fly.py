@@ -8,7 +8,15 @@ import click
 from click.core import ParameterSource
 
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
-from gcs.commands.options import AddressType, PositiveType, SettingType, json_option, print_json
+from gcs.commands.options import (
+    AddressType,
+    PositiveType,
+    SettingType,
+    json_option,
+    print_json,
+    sensors_option,
+    vehicle_option,
+)
 from gcs.shell.display import say
 from gcs.shell.link import DEFAULT_PORT, Address
 
@@ -24,18 +32,8 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
     show_default=True,
     help="Control law to fly with.",
 )
-@click.option(
-    "--sensors",
-    default="lab",
-    show_default=True,
-    help="What the vehicle senses with: ideal, lab, rtk, gps or a profile file.",
-)
-@click.option(
-    "--vehicle",
-    default="bebop",
-    show_default=True,
-    help="What really flies: bebop, thesis (no rotor limits, no lag, no drag) or a vehicle file.",
-)
+@sensors_option
+@vehicle_option()
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of all noise.")
 @click.option("--lockstep", is_flag=True, help="As fast as it goes, the same bytes each time (default).")
 @click.option(

@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 import click
 
-from gcs.commands.options import json_option, print_json, print_table
+from gcs.commands.options import json_option, print_json, print_table, vehicle_option
 from gcs.errors import EXIT_DONE, EXIT_ERROR
 
 
@@ -36,7 +36,7 @@ def missions_command(as_json: bool) -> None:
 
 @click.command("check")
 @click.argument("mission")
-@click.option("--vehicle", default="bebop", show_default=True, help="Vehicle name or file with the limits.")
+@vehicle_option("The vehicle that is to fly it")
 @click.option("--as-asked", is_flag=True, help="Judge the paths as asked, not shaped.")
 @json_option
 def check_command(mission: str, vehicle: str, as_asked: bool, as_json: bool) -> int:

@@ -79,6 +79,21 @@ def connect_option(function: F) -> F:
     )(function)
 
 
+def vehicle_option(what: str = "What flies, in truth and by belief") -> Callable[[F], F]:
+    """--vehicle of every command that reads a vehicle file; its help lists the shipped ones."""
+    from autopilot.vehicle.file import VEHICLES
+
+    return click.option("--vehicle", default="bebop", show_default=True, help=f"{what}: {VEHICLES.choice()}.")
+
+
+def sensors_option(function: F) -> F:
+    """--sensors of every command that starts a simulator; its help lists the shipped profiles."""
+    from sitl.sensors.shipped import PROFILES
+
+    help_text = f"What the vehicle senses with: {PROFILES.choice()}."
+    return click.option("--sensors", default="lab", show_default=True, help=help_text)(function)
+
+
 def json_option(function: F) -> F:
     """--json of every command with a result."""
     return click.option("--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else.")(

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
-from gcs.commands.options import SettingType, json_option, print_json
+from gcs.commands.options import SettingType, json_option, print_json, sensors_option, vehicle_option
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
 from gcs.shell.display import say
 
@@ -24,8 +24,8 @@ from gcs.shell.display import say
     multiple=True,
     help=f"Control law to fly with; may be given again.  [default: {DEFAULT_LAW}]",
 )
-@click.option("--sensors", default="lab", show_default=True, help="What the vehicle senses with, as gcs fly.")
-@click.option("--vehicle", default="bebop", show_default=True, help="What really flies, as gcs fly.")
+@sensors_option
+@vehicle_option()
 @click.option(
     "--vary",
     "varied",

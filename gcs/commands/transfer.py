@@ -12,7 +12,7 @@ from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.missions import MissionClear, MissionDownload, MissionUpload
-from gcs.commands.options import connect_option, json_option, print_json, print_table
+from gcs.commands.options import connect_option, json_option, print_json, print_table, vehicle_option
 from gcs.errors import GcsError
 from gcs.formats.items import command_name
 from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
@@ -29,7 +29,7 @@ _RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 
 @click.command("upload")
 @click.argument("mission")
-@click.option("--vehicle", default="bebop", show_default=True, help="Vehicle against which it is checked.")
+@vehicle_option("Vehicle against which it is checked")
 @click.option("--force", is_flag=True, help="Upload even what the vehicle cannot do.")
 @click.option(
     "--skip", is_flag=True, help="Upload a .plan or .waypoints file without what is not flown of it."

@@ -50,7 +50,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.trajectory.prepare import Limits
 from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -70,9 +70,9 @@ from sitl.plant.gripper import dropped, without_cable
 from sitl.sensors.files import load_profile
 from sitl.sensors.profile import Profile
 from sitl.sim_core import settings_of
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 GROUND_WINDOW_US = 20_000  # between two turns of the ground station
 LONGEST_STRETCH = 1000  # ticks
@@ -153,7 +153,7 @@ class _Flight:
         self, mission: Mission, conditions: Conditions, boarding: Boarding, trace: Floats | None
     ) -> None:
         home = Home()
-        table = autopilot_parameters(load_belief(conditions.vehicle))
+        table = autopilot_parameters(load_vehicle(conditions.vehicle))
         apply_settings(table, conditions.settings.items())
         truth = load_truth(conditions.vehicle)
         sim_table = sim_parameters(truth)

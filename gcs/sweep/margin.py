@@ -21,14 +21,14 @@ from autopilot.control.records import Reference, State, Vehicle
 from autopilot.core.tick import Setup
 from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.onboard.onboard import build_setup
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from gcs.analysis.axes import Floats
 from gcs.sweep.plan import SweepPlan, simulated
 from sitl.sim_core import settings_of
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 STEP = 1e-5  # central differences: truncation and rounding both below 1e-9
 LOST = 1.0 + 1e-7  # spectral radius; what the law carries but does not use has eigenvalue 1
@@ -176,7 +176,7 @@ def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
     """Moduli of the eigenvalues of hovering, sorted, under settings by name."""
     import control
 
-    table = autopilot_parameters(load_belief(vehicle))
+    table = autopilot_parameters(load_vehicle(vehicle))
     apply_settings(table, settings.items())
     truth = load_truth(vehicle)
     sim_table = sim_parameters(truth)

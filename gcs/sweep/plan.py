@@ -14,7 +14,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
 from autopilot.wire.parameter_table import ParameterError
 from gcs.closed_loop import Conditions
@@ -22,8 +22,8 @@ from gcs.errors import EXIT_USAGE, GcsError
 from missions.fileformat import load_mission
 from sitl.sensors.files import load_profile
 from sitl.sim_core import settings_of
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 PLAN_FILE = "plan.json"
 MOST_FLIGHTS = 10_000_000
@@ -216,7 +216,7 @@ def make_plan(
 def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
     try:
         world = sim_parameters(load_truth(vehicle))
-        table = autopilot_parameters(load_belief(vehicle))
+        table = autopilot_parameters(load_vehicle(vehicle))
     except ValueError as error:
         raise PlanError(str(error)) from None
     for name, value in values:

@@ -11,7 +11,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.sweep.margin import linear_range
@@ -19,8 +19,8 @@ from gcs.sweep.plan import PLAN_FILE, SweepPlan
 from gcs.sweep.plots import draw_curve, draw_map
 from gcs.sweep.results import Flights, flights_of, reach
 from gcs.sweep.store import Store
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 PAGE_FILE = "report.html"
 _TEMPLATE = "sweep.html"
@@ -113,7 +113,7 @@ def _law(flights: Flights) -> dict[str, Any]:
 
 
 def _tables(plan: SweepPlan) -> tuple[ParameterTable, ...]:
-    return (sim_parameters(load_truth(plan.vehicle)), autopilot_parameters(load_belief(plan.vehicle)))
+    return (sim_parameters(load_truth(plan.vehicle)), autopilot_parameters(load_vehicle(plan.vehicle)))
 
 
 def _parameter(tables: tuple[ParameterTable, ...], name: str) -> Parameter:

@@ -40,6 +40,7 @@ from gcs.shell.processes import Processes
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.check_mission import load_checked
+from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.flight_loops import run_lockstep, run_wall_clock
 from gcs.workflows.report import make_report
 from missions.model import Mission
@@ -94,6 +95,8 @@ class Flight:
 
 def fly(options: FlightOptions) -> Flight:
     """The whole flight; GcsError if there was none."""
+    if options.connect is None:
+        check_flight_inputs(options.vehicle, options.sensors, map(_setting, options.settings))
     mission = load_checked(
         options.mission, options.vehicle, options.force or _tried_anyway(options), options.law == "plumbline"
     )
@@ -262,8 +265,8 @@ def _meta(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: fl
     own = options.connect is None
     settings: dict[str, float | str] = {}
     for setting in options.settings:
-        name, _, value = setting.partition("=")
-        settings[name] = float(value)
+        name, value = _setting(setting)
+        settings[name] = value
     return FlightMeta(
         mission=options.mission,
         title=mission.title,
@@ -278,6 +281,12 @@ def _meta(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: fl
         version=version("plumbline"),
         settings=settings,
     )
+
+
+def _setting(text: str) -> tuple[str, float]:
+    """NAME=VALUE as the command line has checked it."""
+    name, _, value = text.partition("=")
+    return name, float(value)
 
 
 def _tried_anyway(options: FlightOptions) -> bool:

@@ -3,8 +3,9 @@
 Missions and geometry stand alone; trajectory on both, the wire on these; the vehicle on the wire; services,
 laws, estimator and guidance on those; the supervisor on guidance and services; the core of the flight on
 everything below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths and the
-definitions of parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. Sockets, clocks, threads
-and logging belong to the shells alone.
+definitions of parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. What a vehicle is and how
+a TOML file is read are leaves that every program shares. Sockets, clocks, threads and logging belong to the
+shells alone.
 """
 
 from __future__ import annotations
@@ -19,12 +20,24 @@ ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("autopilot", "sitl", "gcs", "missions")
 
 LEAVES = ("autopilot.geometry", "missions", "autopilot.trajectory", "autopilot.wire", "autopilot.vehicle")
+VEHICLE = ("autopilot.vehicle.model", "autopilot.vehicle.file")  # the record of a vehicle, and its file
 RECORDS = "autopilot.control.records"  # what the laws speak of: vehicle, state, reference, command
+GCS = (
+    "autopilot.geometry",
+    "autopilot.trajectory",
+    "autopilot.wire",
+    "autopilot.shell.options",
+    *VEHICLE,
+    "autopilot.vehicle.parameters",
+    "sitl.sensors.shipped",
+    "missions",
+)
 # room: what it may import besides itself. A module belongs to the longest room that begins its name.
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "missions": (),
     "autopilot.geometry": (),
-    "autopilot.trajectory": ("autopilot.geometry", "missions"),
+    "autopilot.vehicle.model": (),
+    "autopilot.trajectory": ("autopilot.geometry", "autopilot.vehicle.model", "missions"),
     "autopilot.wire": ("autopilot.geometry", "autopilot.trajectory", "missions"),
     "autopilot.vehicle": ("autopilot.geometry", "missions", "autopilot.wire"),
     "autopilot.services": LEAVES,
@@ -52,14 +65,19 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.shell.options": ("autopilot.wire",),
     "autopilot.shell": ("autopilot",),
     "autopilot.__main__": ("autopilot",),
-    "sitl": ("autopilot.geometry", "autopilot.wire", "autopilot.shell.options"),
-    "gcs": (
+    "sitl": (
         "autopilot.geometry",
-        "autopilot.trajectory",
-        "autopilot.vehicle.parameters",
         "autopilot.wire",
         "autopilot.shell.options",
-        "missions",
+        *VEHICLE,
+        "missions.toml_files",
+    ),
+    "gcs": GCS,
+    "gcs.workflows.flight_inputs": (
+        *GCS,
+        "gcs",
+        "sitl.sensors.files",
+        "sitl.vehicles",
     ),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
@@ -180,8 +198,10 @@ def test_every_module_has_a_room() -> None:
 BAD = {
     "autopilot/geometry/so3.py": "from missions.model import Step",
     "autopilot/trajectory/prepare.py": "from autopilot.wire.codec import decode",
-    "autopilot/wire/codec.py": "from autopilot.vehicle import belief",
-    "autopilot/vehicle/belief.py": "from ..control.laws import thesis",
+    "autopilot/wire/codec.py": "from autopilot.vehicle import model",
+    "autopilot/vehicle/file.py": "from ..control.laws import thesis",
+    "autopilot/vehicle/model.py": "from autopilot.wire.convert import Home",
+    "autopilot/trajectory/feasibility.py": "from autopilot.vehicle.file import load_vehicle",
     "autopilot/control/laws/thesis.py": "import autopilot.services.commands",
     "autopilot/control/actuators/mixer.py": "from autopilot.guidance.legs import Hold",
     "autopilot/estimation/predict.py": "from autopilot.control.laws import thesis",
@@ -201,11 +221,14 @@ BAD = {
     "missions/schema.py": "import random",
     "sitl/plant/step.py": "from autopilot.control.records import Vehicle",
     "sitl/hil.py": "import socket as s",
+    "sitl/vehicles/truth.py": "from autopilot.vehicle.parameters import autopilot_parameters",
+    "sitl/sensors/files.py": "from missions.model import Step",
     "sitl/sensors/imu.py": "from gcs.analysis import align",
     "sitl/vehicles/loader.py": "from sitl.__main__ import main",
     "gcs/clients/flight.py": "from autopilot.core.tick import step",
-    "gcs/analysis/axes.py": "from autopilot.vehicle.belief import load_belief",
     "gcs/analysis/align.py": "from sitl.plant.records import Truth",
+    "gcs/commands/fly.py": "from sitl.sensors.files import load_profile",
+    "gcs/workflows/fly.py": "from sitl.vehicles.sim_parameters import sim_parameters",
     "gcs/clients/link.py": "from asyncio import sleep",
     "gcs/report/page.py": "import logging.handlers",
 }
@@ -218,8 +241,17 @@ GOOD = {
     ),
     "autopilot/wire/items/table.py": "from missions.model import Step",
     "autopilot/trajectory/timeline.py": "from missions.model import Step",
+    "autopilot/trajectory/feasibility.py": "from autopilot.vehicle.model import Vehicle",
+    "sitl/vehicles/truth.py": (
+        "from autopilot.vehicle.file import load_vehicle\nfrom autopilot.vehicle.model import Vehicle"
+    ),
+    "sitl/sensors/shipped.py": "from missions.toml_files import TomlFiles",
+    "gcs/workflows/flight_inputs.py": "from sitl.vehicles.sim_parameters import sim_parameters",
     "gcs/closed_loop.py": "from sitl.hil import HilSimulator\nfrom autopilot.onboard.onboard import Onboard",
-    "gcs/commands/fly.py": "import subprocess, signal\nfrom autopilot.vehicle.parameters import LAWS",
+    "gcs/commands/fly.py": (
+        "import subprocess, signal\nfrom sitl.sensors.shipped import PROFILES\n"
+        "from autopilot.vehicle.file import VEHICLES\nfrom autopilot.vehicle.parameters import LAWS"
+    ),
     "sitl/__main__.py": "import selectors\nfrom sitl.hil import HilSimulator",
     "missions/fileformat.py": "import pydantic, datetime, timeit",
 }

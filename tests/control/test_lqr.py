@@ -29,7 +29,7 @@ from missions.fileformat import load_mission
 from missions.model import Signals
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
-from sitl.vehicles import load_truth
+from sitl.vehicles.truth import load_truth
 
 Array = NDArray[np.float64]
 PRINTED = np.array(json.loads((Path(__file__).parent / "printed_gains.json").read_text())["K"])

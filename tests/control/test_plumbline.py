@@ -32,13 +32,13 @@ from autopilot.control.records import Jet, Reference, State, Vehicle
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.signals import evaluate, signal_table
-from autopilot.vehicle.belief import BeliefError, load_belief
+from autopilot.vehicle.file import VehicleFileError, load_vehicle
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
 from missions.fileformat import load_mission
 from missions.model import Signals
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import advance, initial_state
-from sitl.vehicles import load_truth
+from sitl.vehicles.truth import load_truth
 
 Array = NDArray[np.float64]
 ROOM = Path(autopilot.__file__).parent
@@ -773,7 +773,7 @@ def test_rotors_that_are_fast_enough_are_left_alone() -> None:
 
 
 def built(**values: float) -> PlumblineLaw:
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     table.set("CTL_LAW", float(LAWS.index("plumbline")))
     for name, value in values.items():
         table.set(name, value)
@@ -810,12 +810,15 @@ def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
 
 
 def test_a_vehicle_file_may_leave_out_rotor_lag_and_drag(tmp_path: Path) -> None:
-    believed = load_belief("thesis")
+    believed = load_vehicle("thesis")
     assert (believed.rotor_tau_s, believed.quad_drag_n_s_m, believed.quad_drag_quadratic_n_s2_m2) == (0, 0, 0)
-    text = (ROOM / "vehicle" / "thesis.toml").read_text() + "rotor_tau_s = -0.01\n"
-    (tmp_path / "backwards.toml").write_text(text)
-    with pytest.raises(BeliefError, match=r"rotor_tau_s = -0.01; must be >= 0"):
-        load_belief(str(tmp_path / "backwards.toml"))
+    lines = (ROOM / "vehicle" / "vehicles" / "thesis.toml").read_text().splitlines()
+    kept = [line for line in lines if "_drag_" not in line and not line.startswith("rotor_tau_s")]
+    (tmp_path / "short.toml").write_text("\n".join(kept))
+    assert load_vehicle(str(tmp_path / "short.toml")) == believed
+    (tmp_path / "backwards.toml").write_text("\n".join([*kept, "rotor_tau_s = -0.01"]))
+    with pytest.raises(VehicleFileError, match=r"rotor_tau_s = -0.01; must be >= 0"):
+        load_vehicle(str(tmp_path / "backwards.toml"))
 
 
 # ---- margins and flights

@@ -8,11 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from autopilot.vehicle import parameters
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.wire.parameter_file import ParameterFile, group_of
 from autopilot.wire.parameter_table import ParameterTable
 from sitl.vehicles import sim_parameters
-from sitl.vehicles.files import load_truth
+from sitl.vehicles.truth import load_truth
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"
 HEAD = """# Parameters
@@ -60,7 +60,7 @@ def tables(definitions: ParameterFile, table: ParameterTable) -> str:
 
 def page() -> str:
     """The page as it should be."""
-    autopilot = parameters.autopilot_parameters(load_belief("bebop"))
+    autopilot = parameters.autopilot_parameters(load_vehicle("bebop"))
     world = sim_parameters.sim_parameters(load_truth("bebop"))
     simulated = tables(sim_parameters.definitions(), world)
     return HEAD + AUTOPILOT + tables(parameters.definitions(), autopilot) + SIMULATOR + simulated

@@ -19,7 +19,7 @@ from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator
 from sitl.plant.records import PlantState
-from sitl.vehicles.files import load_truth
+from sitl.vehicles.truth import load_truth
 
 ACCEPTED = ACCEPTANCE.result
 GCS = "gcs"

@@ -24,7 +24,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.so3 import Quat
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 
 Array = NDArray[Any]
@@ -34,7 +34,7 @@ GRAVITY, CABLE_LENGTH = 9.81, 0.7
 
 def bebop_tuning() -> EstimatorTuning:
     """The estimator as delivered, for the vehicle of Table 4-1."""
-    return estimator_tuning(autopilot_parameters(load_belief("bebop")))
+    return estimator_tuning(autopilot_parameters(load_vehicle("bebop")))
 
 
 class Motion:

@@ -15,14 +15,14 @@ from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.requests import decide, with_plan
 from autopilot.supervisor.settings import Settings, settings_from
 from autopilot.supervisor.state import Flight, MissionPlan, Phase, View
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_steps, located_steps
 from missions.model import Step
 
 ACCEPTED = ACCEPTANCE.result
-TABLE = autopilot_parameters(load_belief("bebop"))
+TABLE = autopilot_parameters(load_vehicle("bebop"))
 SETTINGS = settings_from(TABLE, build_law(TABLE).ramp_lag_s)
 STEP_US = 20_000
 LOAD_RADIUS, GEAR = 0.02, 0.06

@@ -14,7 +14,7 @@ from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.identity import Identity
 from autopilot.services.records import Verdict
 from autopilot.services.snapshot import Snapshot
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
@@ -58,7 +58,7 @@ class World:
     def __init__(self, seed: int) -> None:
         rng = random.Random(seed)
         self.up, self.down = BadLine(rng), BadLine(rng)
-        self.parameters = autopilot_parameters(load_belief("bebop"))
+        self.parameters = autopilot_parameters(load_vehicle("bebop"))
         self.vehicle = VehicleEndpoint(Identity(), HOME, self.parameters)
         self.vehicle.add_link(LINK)
         self.writer = FrameWriter(*GROUND)

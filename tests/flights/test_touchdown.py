@@ -10,7 +10,7 @@ import pytest
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.closed_loop import Conditions, fly
 from missions.model import Land, Mission, Takeoff
-from sitl.vehicles import load_truth
+from sitl.vehicles.truth import load_truth
 
 SIMULATOR = 26  # component of its truth telemetry
 RESTING = 2e-3  # m, by which the ground may give way under the load, and an exchange of telemetry

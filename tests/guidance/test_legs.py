@@ -36,13 +36,13 @@ from autopilot.guidance.legs import (
 from autopilot.supervisor.settings import limits_from
 from autopilot.trajectory.shaping import shape, unshaped
 from autopilot.trajectory.waypoint_path import Passage, passage
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from missions.model import Signals, Sine, Term
 
 HERE, THERE = (1.0, -2.0, 3.0), (2.0, 1.0, 2.5)
 SIGNALS = Signals(4.0, (Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
-LIMITS = limits_from(autopilot_parameters(load_belief("bebop")))
+LIMITS = limits_from(autopilot_parameters(load_vehicle("bebop")))
 SHAPED = shape(Signals(3.0, (Term("y", 0.2, 0.2, 0.7, None, 0.0),)), LIMITS.body, LIMITS.bounds)
 POINTS = (HERE, THERE, (3.0, 1.0, 3.0))
 _PATH, _TIMES = passage(POINTS, 1.5, 1.5, LIMITS.body, LIMITS.bounds, False)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 import missions.fileformat
 from missions.fileformat import MissionFileError, load_mission, parse_mission, shipped
@@ -25,6 +26,7 @@ from missions.model import (
     Term,
     Waypoint,
 )
+from missions.toml_files import problems
 
 FRAME = 'title = "T"\n[[items]]\ntype = "takeoff"\naltitude_m = 2\n{}\n[[items]]\ntype = "land"\n'
 WAYPOINT = '[[items]]\ntype = "waypoint"\neast_m = 1.0\nnorth_m = -2.0\naltitude_m = 3.0\n'
@@ -250,8 +252,8 @@ def test_no_value_breaks_the_messages(value: object) -> None:
         for kind in missions.fileformat.ITEMS.values():
             try:
                 kind.model_validate({key: value})
-            except missions.fileformat.ValidationError as error:
-                for line in missions.fileformat._problems(error, kind, "x.toml", "items[0]"):
+            except ValidationError as error:
+                for line in problems(error, kind, "x.toml", "items[0]"):
                     assert line.startswith("x.toml: items[0]")
                     assert "\n" not in line
 

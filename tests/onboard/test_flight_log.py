@@ -14,7 +14,7 @@ from autopilot.onboard.flight_log import FAST, MOST_WAITING, SLOW, TAIL_US, Flig
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
 from autopilot.services.identity import Identity
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.tlog import TlogWriter
@@ -109,7 +109,7 @@ def test_the_load_was_held_where_the_mission_says(log: ULog) -> None:
     assert np.median((load["position[2]"] - vehicle["z"])[held]) == pytest.approx(distance, abs=0.01)
     assert np.median(load["cable[2]"][held]) == pytest.approx(1.0, abs=0.01)
     forces = sum(log.get_dataset("rotor_forces").data[f"force[{i}]"][held] for i in range(4))
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     weight = (table["VEH_QUAD_MASS"] + table["VEH_LOAD_MASS"]) * table["VEH_GRAVITY"]
     assert np.median(forces) == pytest.approx(weight, rel=0.02)
     # what does not move feels gravity upwards, which is negative in FRD
@@ -128,7 +128,7 @@ def test_no_log_where_none_is_wanted() -> None:
 
 
 def make_log() -> FlightLog:
-    return FlightLog(autopilot_parameters(load_belief("bebop")), "0.1.0", BOOT_US)
+    return FlightLog(autopilot_parameters(load_vehicle("bebop")), "0.1.0", BOOT_US)
 
 
 def no_sample() -> Any:
@@ -145,7 +145,7 @@ def test_a_second_flight_gets_a_name_of_its_own() -> None:
 def test_texts_before_arming_begin_the_log_and_a_changed_parameter_is_in_it(
     tmp_path: Path, flown: Flown
 ) -> None:
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     log = FlightLog(table, "0.1.0", BOOT_US)
     sample = flown.onboard._log_sample
     log.say(10, 4, "not ready")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.shell.link import LOOPBACK, free_port
 
@@ -74,7 +74,7 @@ def test_mavsdk(port: str, tmp_path: Path) -> None:
     assert told["down True"] == told["down False"] == ["SUCCESS", True]
     assert told["moved"] == ["other.bin"]
     assert told["left"] == ["log"]
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     assert told["metadata"].items() >= {name: table.describe(name).text for name in table.names}.items()
     assert told["logs"] == [len(LOG)]
     assert told["log"] == "SUCCESS"
@@ -86,7 +86,7 @@ def test_pymavlink(port: str, tmp_path: Path) -> None:
     told = told_by("pymavlink_files.py", port, str(tmp_path / "client"))
     assert told["codes"] == [0, 0, 0, 0, 0, 0, 9, 10]  # protected, not found
     assert told["equal"] is True
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     for name in table.names:
         assert told["parameters"][name] == pytest.approx(table[name], rel=1e-7)  # a float32
 

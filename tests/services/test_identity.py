@@ -20,7 +20,7 @@ from autopilot.services.identity import (
     identity_of,
 )
 from autopilot.supervisor import requests as decisions
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -70,7 +70,7 @@ def test_what_is_called_flown_is_what_the_supervisor_flies():
 
 
 def test_the_parameters_choose_the_identity():
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     for number, name in enumerate(("px4", "ardupilot", "generic")):
         table.set("MAV_IDENTITY", number)
         assert identity_of(table).flavour is FLAVOURS[name]

@@ -11,7 +11,7 @@ from autopilot.services.files import path_of
 from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.virtual_files import GENERAL, PARAMETER_TEXTS, made_files
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.parameter_table import Parameter
@@ -39,7 +39,7 @@ def test_a_ground_station_finds_the_texts_of_the_parameters(rig: Any) -> None:
 
 
 def test_every_parameter_is_described() -> None:
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     record = json.loads(made(table)[PARAMETER_TEXTS]({}))
     assert record["version"] == 3
     assert [p["name"] for p in record["parameters"]] == list(table.names)
@@ -72,7 +72,7 @@ _METADATA_KEYS = {
 
 
 def test_the_metadata_keep_to_mavlinks_schemas() -> None:
-    table = autopilot_parameters(load_belief("bebop"))
+    table = autopilot_parameters(load_vehicle("bebop"))
     table.learn(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
     texts = json.loads(made(table)[PARAMETER_TEXTS]({}))
     assert texts.keys() == {"version", "parameters"}

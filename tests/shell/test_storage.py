@@ -17,7 +17,7 @@ from autopilot.shell.storage import (
     Storage,
     StorageError,
 )
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_steps, located_steps
@@ -28,7 +28,7 @@ HOME = Home()
 
 
 def table() -> ParameterTable:
-    return autopilot_parameters(load_belief("bebop"))
+    return autopilot_parameters(load_vehicle("bebop"))
 
 
 def stored(name: str) -> StoredMission:

@@ -13,8 +13,8 @@ from sitl.hil import HilSimulator
 from sitl.plant.step import initial_state
 from sitl.sensors.files import load_profile, parse_profile
 from sitl.sim_core import SimCore, settings_of
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply, sim_parameters
+from sitl.vehicles.truth import load_truth
 
 Forces = tuple[float, float, float, float]
 

@@ -366,8 +366,8 @@ def test_settings_of_the_other_process_are_passed_over() -> None:
     [
         ({"settings": {"SIM_WIND": 1.0}}, "SIM_WIND: no such parameter; did you mean SIM_WIND_"),
         ({"settings": {"SIM_WIND_E": nan}}, "SIM_WIND_E = nan m/s; must be -50 ... 50"),
-        ({"sensors": "perfect"}, "perfect: no such sensors"),
-        ({"vehicle": "saucer"}, "saucer: no such vehicle"),
+        ({"sensors": "perfect"}, "unknown sensors 'perfect'; shipped: gps, ideal, lab, rtk; or the path"),
+        ({"vehicle": "saucer"}, "unknown vehicle 'saucer'; shipped: bebop, heavy, thesis; or the path"),
     ],
 )
 def test_bad_options_are_told_in_one_line(kwargs, complaint: str) -> None:

@@ -157,7 +157,7 @@ def test_lockstep_goes_no_faster_than_it_may(port: int) -> None:
             1,
             "sitl: cannot listen on 127.0.0.1:{busy}: address already in use; ",
         ),
-        (["--sensors", "nothing"], 1, "sitl: nothing: no such sensors"),
+        (["--sensors", "nothing"], 1, "sitl: unknown sensors 'nothing'; shipped: gps, ideal, lab, rtk; or"),
         (["--set", "SIM_RATE_HZ=300"], 1, "sitl: SIM_RATE_HZ = 300 Hz; a tick must be"),
         (["--set", "SIM_RATE_HZ"], 2, "'SIM_RATE_HZ'; must be NAME=VALUE with a number"),
         (["--listen", "4560"], 2, "'4560'; must be HOST:PORT"),

@@ -11,6 +11,7 @@ import pytest
 from autopilot.trajectory.feasibility import VehicleLimits, check, peaks
 from autopilot.trajectory.timeline import SET_DOWN_S, TAUTEN_S, MissionState, expected_duration_s, timeline
 from autopilot.trajectory.transfer import transfer_duration
+from autopilot.vehicle.file import load_vehicle
 from missions.fileformat import load_mission, shipped
 from missions.model import (
     AttitudeRun,
@@ -27,7 +28,10 @@ from missions.model import (
     Waypoint,
 )
 
-LIMITS = VehicleLimits()
+WITHOUT_DRAG = load_vehicle("bebop").model_copy(
+    update={"quad_drag_n_s_m": 0.0, "quad_drag_quadratic_n_s2_m2": 0.0}
+)
+LIMITS = VehicleLimits(WITHOUT_DRAG)
 WithAmplitude = Callable[[str, str, float], Mission]
 
 
@@ -72,7 +76,8 @@ def test_a_tilt_beyond_the_limit(with_amplitude: WithAmplitude) -> None:
 
 
 def test_without_rotor_limits_only_gravity_and_tilt_bind(with_amplitude: WithAmplitude) -> None:
-    unlimited = replace(LIMITS, rotor_max_n=inf, rotor_min_n=-inf, tilt_max_rad=pi)
+    vehicle = WITHOUT_DRAG.model_copy(update={"rotor_max_n": inf, "rotor_min_n": -inf})
+    unlimited = replace(LIMITS, vehicle=vehicle, tilt_max_rad=pi)
     assert check(with_amplitude("case-c", "z", 0.3), unlimited) == []
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import fields
 
 import pytest
 
-from autopilot.vehicle.belief import Belief, load_belief, shipped_vehicles
+from autopilot.vehicle.file import VEHICLES, load_vehicle
 from autopilot.vehicle.parameters import (
     DEFAULT_LAW,
     LAWS,
@@ -18,14 +17,16 @@ from autopilot.vehicle.parameters import (
     SHAPE_WITH_PLUMBLINE,
     autopilot_parameters,
     definitions,
+    vehicle_values,
 )
-from sitl.vehicles.files import load_truth
+from autopilot.wire.convert import ROTOR_FMAX
 from sitl.vehicles.sim_parameters import definitions as sim_definitions
 from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
 
 
 def test_the_laws_are_the_values_of_their_parameter():
-    law = autopilot_parameters(load_belief("bebop")).describe("CTL_LAW")
+    law = autopilot_parameters(load_vehicle("bebop")).describe("CTL_LAW")
     assert (law.low, law.high, law.integer, law.fixed) == (0.0, len(LAWS) - 1.0, True, True)
     assert LAWS[int(law.default)] == DEFAULT_LAW == "plumbline"
     assert law.text == "Control law: 0 thesis, 1 lqr, 2 plumbline"
@@ -38,9 +39,9 @@ def test_the_constants_of_shaping_are_its_values():
     assert (never, with_plumbline, always) == ("never", "with the law plumbline", "always")
 
 
-@pytest.mark.parametrize("name", shipped_vehicles())
+@pytest.mark.parametrize("name", VEHICLES.names())
 def test_the_numbers_of_the_vehicle_are_the_defaults(name):
-    belief = load_belief(name)
+    belief = load_vehicle(name)
     table = autopilot_parameters(belief)
     assert table["VEH_QUAD_MASS"] == belief.quad_mass_kg
     assert (table["VEH_J_XX"], table["VEH_J_YY"], table["VEH_J_ZZ"]) == belief.inertia_kg_m2
@@ -54,21 +55,14 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     assert world.describe("SIM_QUAD_MASS").high == truth.quad_mass * 100.0
 
 
-def test_every_number_of_the_vehicle_has_a_parameter():
-    """Each field of the belief, moved, moves a default."""
-    belief = load_belief("heavy")
-    before = autopilot_parameters(belief).values()
-    for field in fields(Belief):
-        value = getattr(belief, field.name)
-        moved = tuple(1.5 * v for v in value) if isinstance(value, tuple) else not value
-        if isinstance(value, float):
-            moved = 1.5 * value + 1e-3
-        after = autopilot_parameters(Belief(**{**vars(belief), field.name: moved})).values()
-        assert after != before, field.name
+def test_every_number_that_is_taken_from_the_vehicle_is_a_default():
+    taken = [spec.vehicle_keys for spec in definitions().parameters.values()]
+    assert frozenset().union(*taken) == vehicle_values(load_vehicle("bebop")).keys()
 
 
-def test_parameters_are_no_vehicle():
-    assert shipped_vehicles() == ("bebop", "heavy", "thesis")
+def test_without_a_rotor_limit_the_forces_are_those_of_the_wire():
+    table = autopilot_parameters(load_vehicle("thesis"))
+    assert (table["VEH_ROTOR_LIM"], table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]) == (0.0, 0.0, ROTOR_FMAX)
 
 
 def test_what_is_measured_on_the_bench_has_a_parameter_on_either_side():

@@ -25,7 +25,7 @@ from autopilot.supervisor.state import Flight, jet_ahead
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.shaping import Shaped, unshaped
 from autopilot.trajectory.waypoint_path import Passage
-from autopilot.vehicle.belief import load_belief
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
@@ -122,7 +122,7 @@ def test_a_leg_laid_out_is_the_leg(leg: Leg, asked: bool) -> None:
 
 
 def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
-    limits = limits_from(autopilot_parameters(load_belief("bebop")))._replace(shaped=True)
+    limits = limits_from(autopilot_parameters(load_vehicle("bebop")))._replace(shaped=True)
     steps = (
         Takeoff(1.0),
         Waypoint(2.0, 0.0, 2.0, 0.0),

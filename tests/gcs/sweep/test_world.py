@@ -8,8 +8,8 @@ import pytest
 from gcs.sweep.world import READING, SHOWS, arrived, new_world, tick
 from sitl.sensors.files import load_profile
 from sitl.sim_core import SimCore, settings_of
-from sitl.vehicles.files import load_truth
 from sitl.vehicles.sim_parameters import apply, sim_parameters
+from sitl.vehicles.truth import load_truth
 
 TICKS = 600
 ROUGH = {

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from sitl.plant.records import PlantState, Truth
 from sitl.plant.step import initial_state
-from sitl.vehicles import load_truth
+from sitl.vehicles.truth import load_truth
 
 Array = NDArray[np.float64]
 CALM = (0.0, 0.0, 0.0)

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = """
 import json, sys
 from sitl.plant.step import advance, initial_state
-from sitl.vehicles import load_truth
+from sitl.vehicles.truth import load_truth
 
 def numbers(value):
     return [value] if isinstance(value, float) else [n for part in value for n in numbers(part)]

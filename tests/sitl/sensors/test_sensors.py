@@ -19,7 +19,7 @@ from sitl.sensors import (
     pose_tracker,
 )
 from sitl.sensors.noise import Drift, Noise
-from sitl.vehicles.files import load_truth
+from sitl.vehicles.truth import load_truth
 
 NONE = Drift(0.0, 1.0, 0.0)
 SILENT = Noise(1, 1, 0, 0.0)

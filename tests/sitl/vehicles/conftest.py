@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sitl.plant.records import Truth
-from sitl.vehicles.files import load_truth
+from sitl.vehicles.truth import load_truth
 
 
 @pytest.fixture(scope="session")

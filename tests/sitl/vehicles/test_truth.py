@@ -1,34 +1,13 @@
-"""Truth files and the SIM_ parameters."""
+"""What really flies: the plant's record of a vehicle, and the SIM_ parameters that change it."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
 
-import sitl.vehicles
 from autopilot.wire.parameter_table import ParameterError
-from sitl.vehicles import TruthFileError, load_truth, shipped
 from sitl.vehicles.sim_parameters import apply, sim_parameters
-
-BEBOP = (Path(sitl.vehicles.__file__).parent / "bebop.toml").read_text()
-
-
-def _broken(tmp_path, old, new):
-    assert old in BEBOP
-    path = tmp_path / "foo.toml"
-    path.write_text(BEBOP.replace(old, new))
-    with pytest.raises(TruthFileError) as caught:
-        load_truth(path)
-    text = str(caught.value)
-    assert "\n" not in text
-    assert text.startswith(f"{path}: ")
-    return text.removeprefix(f"{path}: ")
-
-
-def test_shipped_vehicles():
-    assert shipped() == ("bebop", "heavy", "thesis")
 
 
 def test_bebop_is_table_4_1(bebop):
@@ -55,44 +34,6 @@ def test_thesis_is_bebop_without_limits_lag_and_drag(bebop, thesis):
         load_drag=0.0,
         load_drag_quadratic=0.0,
     )
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("load_mass_kg = 0.1", "load_mass_kg = -1", "load_mass_kg = -1; must be > 0"),
-        ("load_mass_kg = 0.1", "load_mass_kg = nan", "load_mass_kg = nan; must be a finite number"),
-        ("load_mass_kg = 0.1", "load_mass_kg = inf", "load_mass_kg = inf; must be a finite number"),
-        ("load_mass_kg = 0.1", "load_mass_kg = 'light'", "load_mass_kg = 'light'; must be a valid number"),
-        ("load_mass_kg = 0.1", "", "load_mass_kg is missing"),
-        ("rotor_max_n = 1.96", "rotor_max_n = 0.0", "rotor_max_n = 0; must be > rotor_min_n = 0"),
-        ("rotor_max_n = 1.96", "rotor_max_n = nan", "rotor_max_n = nan; must be > rotor_min_n = 0"),
-        ("[2.23e-3, 2.99e-3, 4.8e-3]", "[2.23e-3, -1.0, 4.8e-3]", "inertia_kg_m2[1] = -1.0; must be > 0"),
-        ("friction = 0.6", "friction = 9.0", "friction = 9.0; must be <= 5"),
-        ("slip_rate_1_s = 500.0", "slip_rate_1_s = 0.0", "slip_rate_1_s = 0.0; must be > 0"),
-    ],
-)  # fmt: skip
-def test_one_line_says_what_is_wrong(tmp_path, old, new, message):
-    assert _broken(tmp_path, old, new) == message
-
-
-def test_inertia_of_no_body(tmp_path):
-    assert "sum of the other two" in _broken(tmp_path, "4.8e-3]", "4.8e-2]")
-
-
-def test_unknown_key_lists_the_known(tmp_path):
-    text = _broken(tmp_path, "load_mass_kg", "load_mas_kg")
-    assert text.startswith("load_mass_kg is missing") or text.startswith("load_mas_kg: unknown key")
-
-
-def test_broken_toml_and_missing_files(tmp_path):
-    assert _broken(tmp_path, "load_mass_kg = 0.1", "load_mass_kg = ").startswith("not TOML: ")
-    with pytest.raises(
-        TruthFileError, match=r"nosuch: no such vehicle; must be bebop, heavy, thesis or the path"
-    ):
-        load_truth("nosuch")
-    with pytest.raises(TruthFileError, match="cannot be read"):
-        load_truth(tmp_path)
 
 
 def test_parameters_start_from_the_truth(bebop, thesis):

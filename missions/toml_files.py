@@ -1,0 +1,241 @@
+"""TOML files that a pydantic schema describes: which are shipped, how one is read, and what is wrong with it.
+
+Missions, vehicles and sensor profiles are such files. This module knows none of them: it imports nothing of
+Plumbline, so that every room may use it.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+Spec = TypeVar("Spec", bound=BaseModel)
+
+_SUFFIX = ".toml"
+_LONGEST_SHOWN = 40  # characters of a value
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+# last part of a key: its unit in words; the longest that fits counts
+_UNITS = {
+    "_m_s": "metres per second",
+    "_rad_s": "radians per second",
+    "_n_s_m": "newtons per metre per second",
+    "_1_s": "per second",
+    "_m": "metres",
+    "_s": "seconds",
+    "_ms": "milliseconds",
+    "_deg": "degrees",
+    "_rad": "radians",
+    "_kg": "kilograms",
+    "_n": "newtons",
+    "_hz": "hertz",
+}
+
+
+class FileError(ValueError):
+    """The file or the name given is at fault. `problems` has one line each; str() has them all."""
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("; ".join(self.problems))
+
+
+@dataclass(frozen=True)
+class TomlText:
+    """A file as read: the name it goes by, the beginning of every message about it, and its text."""
+
+    name: str
+    where: str
+    text: str
+
+
+@dataclass(frozen=True)
+class TomlFiles:
+    """One kind of file. The names of the shipped ones are those of the files in `folder` of `package`."""
+
+    kind: str  # as messages call it
+    package: str
+    folder: str = ""
+    error: type[FileError] = FileError
+
+    def names(self) -> tuple[str, ...]:
+        """Names that may be given in place of a path, sorted."""
+        entries = (entry.name for entry in self._folder().iterdir())
+        return tuple(sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX)))
+
+    def choice(self) -> str:
+        """What an option that names such a file may be, for its help: `bebop, heavy, thesis or a file`."""
+        return f"{', '.join(self.names())} or a file"
+
+    def read(self, name_or_path: str | PathLike[str]) -> TomlText:
+        """The text of a shipped name or of a file; else an error that lists the names."""
+        given = str(name_or_path)
+        if given in self.names():
+            text = self._folder().joinpath(given + _SUFFIX).read_text(encoding="utf-8")
+            parts = (*self.package.split("."), self.folder, given + _SUFFIX)
+            return TomlText(given, "/".join(filter(None, parts)), text)
+        path = Path(given)
+        if not given or not (path.is_file() or path.suffix == _SUFFIX or len(path.parts) > 1):
+            near = get_close_matches(given, self.names(), n=1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            names = ", ".join(self.names())
+            raise self.error(
+                [f"unknown {self.kind} {given!r}; {hint}shipped: {names}; or the path of a file"]
+            )
+        try:
+            return TomlText(path.stem, given, path.read_text(encoding="utf-8"))
+        except UnicodeDecodeError as error:
+            raise self.error([f"{given}: not a text file in UTF-8 (byte {error.start})"]) from None
+        except OSError as error:
+            raise self.error([f"{given}: cannot be read: {error.strerror}"]) from None
+
+    def table(self, text: str, where: str) -> dict[str, Any]:
+        """The keys and values of a TOML text. `where` begins each line of an error."""
+        try:
+            return tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise self.error([_toml_problem(error, text, where)]) from None
+
+    def record(self, spec: type[Spec], table: Mapping[str, Any], where: str) -> Spec:
+        """The table as `spec` describes it."""
+        try:
+            return spec.model_validate(table)
+        except ValidationError as error:
+            raise self.error(problems(error, spec, where)) from None
+
+    def _folder(self) -> Traversable:
+        return files(self.package).joinpath(self.folder) if self.folder else files(self.package)
+
+
+def problems(error: ValidationError, spec: type[BaseModel], where: str, at: str = "") -> list[str]:
+    """One line for each finding, unknown keys first; a key missing for being misspelt is not told twice.
+
+    `where` names the file, `at` the table within it that was validated against `spec`.
+    """
+    unknown, others, meant = [], [], set()
+    for finding in error.errors(include_url=False):
+        path, key, owner = _place(finding["loc"], spec, at)
+        if finding["type"] == "extra_forbidden":
+            near = _meant_key(key, owner)
+            meant.add(path.removesuffix(key) + near)
+            unknown.append(f"{where}: {path}: {_unknown_key(near, owner)}")
+        else:
+            others.append((path, _problem(dict(finding), path, owner.model_fields.get(key))))
+    return unknown + [f"{where}: {line}" for path, line in others if path not in meant]
+
+
+def shown(value: Any) -> str:
+    """The value as the file would write it, cut to fit a line."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    text = " ".join(text.split())
+    return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
+
+
+def bounds(field: FieldInfo) -> str:
+    """The range of a number, as `> 0 and <= 1000`; empty if it has none."""
+    found = []
+    for rule in field.metadata:
+        for attribute in ("gt", "ge", "lt", "le"):
+            bound = getattr(rule, attribute, None)
+            if bound is not None:
+                found.append(f"{_SIGNS[attribute]} {bound:g}")
+    return " and ".join(found)
+
+
+def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
+    """`file:line:column: not TOML: what`; the parser says the place within its sentence."""
+    message = str(error)
+    place = re.search(r"\(at line (\d+), column (\d+)\)", message)
+    if place:
+        line, column = place.groups()
+    else:
+        line, column = str(text.count("\n") + 1), str(len(text) - text.rfind("\n"))
+    return f"{where}:{line}:{column}: not TOML: {message.split(' (at ', maxsplit=1)[0]}"
+
+
+def _place(location: Sequence[str | int], spec: type[BaseModel], at: str) -> tuple[str, str, type[BaseModel]]:
+    """(`items[3].terms[0].axis`, `axis`, the table's spec) for a location within `spec`."""
+    path, key, owner = at, "", spec
+    for part in location:
+        if isinstance(part, int):
+            path += f"[{part}]"
+            continue
+        if key in owner.model_fields:
+            owner = _table_of(owner.model_fields[key].annotation) or owner
+        key = part if part.isprintable() else repr(part)  # a message is one line
+        path += f".{key}" if path else key
+    return path, "" if location and isinstance(location[-1], int) else key, owner
+
+
+def _table_of(annotation: Any) -> type[BaseModel] | None:
+    """The spec of the table that a key holds, alone, in a list, or optionally; None if it holds none."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (_table_of(argument) for argument in get_args(annotation))
+    return next((table for table in found if table is not None), None)
+
+
+def _problem(error: dict[str, Any], path: str, field: FieldInfo | None) -> str:
+    about = f" ({field.description})" if field is not None and field.description else ""
+    if error["type"] == "missing":
+        return f"{path} is missing{about}"
+    if error["type"] == "value_error":
+        return f"{path} {error['ctx']['error']}".lstrip()
+    return f"{path} = {shown(error['input'])}; must be {_allowed(error, field)}{about}"
+
+
+def _meant_key(key: str, owner: type[BaseModel]) -> str:
+    """The key that was meant, or "": the same quantity in another unit, or a near spelling."""
+    known = list(owner.model_fields)
+    # altitude_ft and altitude both mean altitude_m: compare what stands before the unit
+    stem = key.rsplit("_", 1)[0]
+    same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]
+    return (get_close_matches(key, same, n=1, cutoff=0.0) + get_close_matches(key, known, n=1) + [""])[0]
+
+
+def _unknown_key(near: str, owner: type[BaseModel]) -> str:
+    if near:
+        return f"unknown key; write {near}{_unit_note(near)}"
+    known = ", ".join(owner.model_fields)
+    return "unknown key; " + (f"allowed: {known}" if known else "this item takes no keys")
+
+
+def _unit_note(key: str) -> str:
+    fitting = [suffix for suffix in _UNITS if key.endswith(suffix)]
+    return f" (in {_UNITS[max(fitting, key=len)]})" if fitting else ""
+
+
+def _allowed(error: dict[str, Any], field: FieldInfo | None) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        # the rules of an element of a tuple or of an optional value are not the field's own
+        broken = " and ".join(f"{_SIGNS[name]} {bound:g}" for name, bound in context.items())
+        return bounds(field) or broken if field is not None else broken
+    fixed = {
+        "finite_number": "a finite number",
+        "float_type": "a number",
+        "int_type": "a whole number",
+        "string_type": "a text in quotes",
+        "list_type": "a list",
+        "tuple_type": "a list",
+        "dict_type": "a table",
+        "model_type": "a table",
+        "string_too_short": "a text that is not empty",
+        "string_too_long": f"at most {context.get('max_length')} characters long",
+        "too_short": f"a list of at least {context.get('min_length')}",
+        "too_long": f"a list of at most {context.get('max_length')}",
+        "literal_error": str(context.get("expected")).replace("'", '"'),
+    }
+    return fixed.get(kind, str(error["msg"]).removeprefix("must be "))

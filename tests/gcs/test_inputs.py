@@ -1,0 +1,99 @@
+"""What a flight is started with: named wrongly it is refused by gcs itself, and nothing is started."""
+
+from __future__ import annotations
+
+import subprocess
+from importlib.resources import files
+
+import pytest
+from click.testing import CliRunner
+
+from autopilot.vehicle.file import VEHICLES
+from gcs.cli import gcs
+from gcs.errors import EXIT_DONE, EXIT_ERROR
+from gcs.workflows.flight_inputs import check_flight_inputs
+from sitl.sensors.shipped import PROFILES
+
+BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
+# what is wrong, the text put for another in bebop.toml, and the beginning of what is said
+WRONG_VEHICLES = [
+    ("no masses", ("quad_mass_kg = 0.4", "# "), "quad_mass_kg is missing (mass of the vehicle without"),
+    ("a negative mass", ("load_mass_kg = 0.1", "load_mass_kg = -5"), "load_mass_kg = -5; must be >= 0.001"),
+    ("six rotors", ('name = "bebop"', "rotors = 6"), "rotors = 6; must be 4 (number of rotors"),
+]
+
+
+@pytest.fixture(autouse=True)
+def no_process(monkeypatch):
+    """Whoever starts a process fails."""
+
+    def refuse(*_args, **_kwargs):
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+
+
+def refused(*arguments):
+    """The one line on stderr."""
+    result = CliRunner().invoke(gcs, list(arguments), prog_name="gcs")
+    assert result.exit_code == EXIT_ERROR, result.output
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    return line
+
+
+@pytest.mark.parametrize("command", ["check", "fly", "upload"])
+@pytest.mark.parametrize(
+    ("change", "part"), [row[1:] for row in WRONG_VEHICLES], ids=[row[0] for row in WRONG_VEHICLES]
+)
+def test_a_vehicle_that_the_simulator_refuses_no_command_takes(command, change, part, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(BEBOP.replace(*change), encoding="utf-8")
+    assert refused(command, "hover", "--vehicle", str(path)).startswith(f"gcs: {path}: {part}")
+
+
+def test_a_vehicle_of_ones_own_can_be_checked(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(BEBOP, encoding="utf-8")
+    result = CliRunner().invoke(gcs, ["check", "hover", "--vehicle", str(path)])
+    assert result.exit_code == EXIT_DONE
+    assert f"hover: vehicle {path} can fly it" in result.stdout
+
+
+def test_a_forced_flight_needs_a_vehicle_too():
+    assert "unknown vehicle 'saucer'" in refused("fly", "hover", "--vehicle", "saucer", "--force")
+
+
+def test_unknown_vehicles_and_sensors_get_the_names_there_are():
+    for option, files_of_a_kind in (("--vehicle", VEHICLES), ("--sensors", PROFILES)):
+        line = refused("fly", "hover", option, "saucer")
+        names = ", ".join(files_of_a_kind.names())
+        assert line == (
+            f"gcs: unknown {files_of_a_kind.kind} 'saucer'; shipped: {names}; or the path of a file"
+        )
+
+
+@pytest.mark.parametrize(
+    ("setting", "part"),
+    [
+        ("SIM_WINDE=3", "--set SIM_WINDE: no such parameter; did you mean SIM_WIND_E? there are SIM_"),
+        ("SIM_BRIGHT=3", "--set SIM_BRIGHT: no such parameter; there are SIM_ACT_DELAY_MS, SIM_CABLE_LEN, "),
+        ("NGC_KXX=3", "--set NGC_KXX: no such parameter; did you mean NGC_KX? there are NGC_EPSILON, "),
+        ("WIND=3", "--set WIND: no such parameter; names begin with one of BAT_, COM_, "),
+        ("SIM_WIND_E=300", "--set SIM_WIND_E = 300.0 m/s; must be -50 ... 50"),
+        ("SIM_LOSS_PCT=101", "--set SIM_LOSS_PCT = 101.0 %; must be 0 ... 100"),
+        ("CTL_LAW=1.5", "--set CTL_LAW = 1.5; must be a whole number"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_refused_with_what_there_is(setting, part):
+    assert refused("fly", "hover", "--set", setting).startswith(f"gcs: {part}")
+
+
+def test_settings_of_both_programs_are_taken():
+    check_flight_inputs("thesis", "ideal", [("SIM_WIND_E", 3.0), ("SIM_LOSS_PCT", 5.0), ("NGC_KX", 5.0)])
+
+
+@pytest.mark.parametrize("command", ["fly", "check", "upload", "sweep"])
+def test_help_names_the_shipped_vehicles(command):
+    text = " ".join(CliRunner().invoke(gcs, [command, "--help"]).stdout.split())
+    assert ", ".join(VEHICLES.names()) in text
