@@ -10,6 +10,8 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from autopilot.control.linear_model import load_state_space
+
 ROOT = Path(__file__).parents[2]
 LINEAR = 1e-7  # central differences with step 1e-5 of equations whose third derivatives are of order 100
 
@@ -27,7 +29,7 @@ def tool() -> ModuleType:
 
 def test_linear_model_is_that_of_the_equations(tool: ModuleType, model: SimpleNamespace) -> None:
     vehicle, h = tool.BEBOP, 1e-5
-    A, B = tool.plant(vehicle)
+    A, B = load_state_space(vehicle)
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def rates(motion: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -73,5 +75,5 @@ def test_margin_ends_where_the_loop_is_lost(tool: ModuleType) -> None:
     left = tool.margin(settings).delay
     law = tool.linearised_law(settings, tool.BEBOP)
     for delay, holds in ((left, True), (left + 2e-4, False)):
-        closed = tool.joined(tool.sampled_plant(settings, tool.BEBOP, delay), law, np.ones(4))
+        closed = tool.joined(tool.plant_of(settings, tool.BEBOP, delay), law, np.ones(4))
         assert (tool.radius(closed) < tool.LOST) is holds
