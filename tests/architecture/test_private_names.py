@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -113,6 +114,7 @@ def product_sources(root: Path) -> frozenset[str]:
     return frozenset(str(p.relative_to(root)) for room in ROOMS for p in (root / room).rglob("[!_]*.py"))
 
 
+@cache
 def offences(root: Path) -> list[tuple[str, int, str]]:
     """(file, line, name) of all that the tests should not know."""
     sources, found = product_sources(root), []

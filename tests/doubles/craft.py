@@ -17,7 +17,7 @@ from autopilot.supervisor.requests import ACCEPTED as ACCEPTANCE
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import encode_steps, located_steps
+from autopilot.wire.mission_items import encode_steps
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator
@@ -49,7 +49,7 @@ class Craft:
     ) -> None:
         conditions = Conditions(sensors=sensors, seed=seed, settings=settings_)
         items = encode_steps(steps, Home()) if steps else ()
-        mission = StoredMission(items, located_steps(items, Home()))
+        mission = StoredMission(items)
         self.onboard: Onboard = build_onboard(conditions, Home(), mission)
         if not clock_waits:
             table = self.onboard.parameters
