@@ -37,9 +37,6 @@ KNOWN = {
     ("tests/doubles/insides.py", "_log_sample"),
     ("tests/doubles/insides.py", "_core"),
     ("tests/doubles/insides.py", "_parameters"),
-    ("tests/geometry/test_kernels.py", "_ROOT"),
-    ("tests/geometry/test_kernels.py", "_imported"),
-    ("tests/geometry/test_kernels.py", "_source"),
     ("tests/services/test_identity.py", "_MODES"),
 }
 LOADERS = {"spec_from_file_location", "SourceFileLoader", "run_path"}
