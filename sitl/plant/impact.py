@@ -7,7 +7,7 @@
 | m_Q, m_L | quad_mass, load_mass | kg | |
 
 Linear momentum stays and the ends part no more: x_L' loses m_Q / (m_Q + m_L) v_c along q, x_Q' gains
-m_L / (m_Q + m_L) v_c. So the impulse of the snap is mu v_c with mu = m_Q m_L / (m_Q + m_L), and energy is lost.
+m_L / (m_Q + m_L) v_c. The impulse of the snap is mu v_c with mu = m_Q m_L / (m_Q + m_L); energy is lost.
 """
 
 from __future__ import annotations
