@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.supervisor.flight import Phase
-
+from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import PENDING
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import fields
+from math import inf
 
 import pytest
 
-from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.file import VEHICLES, load_vehicle
+from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import (
     DEFAULT_LAW,
     LAWS,
@@ -38,7 +39,7 @@ def test_the_constants_of_shaping_are_its_values():
     assert (never, with_plumbline, always) == ("never", "with the law plumbline", "always")
 
 
-@pytest.mark.parametrize("name", shipped_vehicles())
+@pytest.mark.parametrize("name", VEHICLES.names())
 def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     belief = load_vehicle(name)
     table = autopilot_parameters(belief)
@@ -54,21 +55,47 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     assert world.describe("SIM_QUAD_MASS").high == truth.quad_mass * 100.0
 
 
-def test_every_number_of_the_vehicle_has_a_parameter():
-    """Each field of the belief, moved, moves a default."""
-    belief = load_vehicle("heavy")
-    before = autopilot_parameters(belief).values()
-    for field in fields(Belief):
-        value = getattr(belief, field.name)
-        moved = tuple(1.5 * v for v in value) if isinstance(value, tuple) else not value
-        if isinstance(value, float):
-            moved = 1.5 * value + 1e-3
-        after = autopilot_parameters(Belief(**{**vars(belief), field.name: moved})).values()
-        assert after != before, field.name
+# keys of a vehicle file of which the autopilot makes nothing: names, and what only the plant knows
+OF_THE_WORLD_ALONE = {
+    *("name", "rotors"),
+    *("spin_drag_n_m_s2", "load_drag_n_s_m", "load_drag_quadratic_n_s2_m2"),
+    *("gear_height_m", "gear_spread_m", "rotor_reach_m", "rotor_height_m", "load_radius_m"),
+    *("contact_frequency_rad_s", "contact_damping_ratio", "friction", "slip_rate_1_s"),
+}
+BELIEVED = tuple(key for key in Vehicle.model_fields if key not in OF_THE_WORLD_ALONE)
+
+
+@pytest.mark.parametrize("key", BELIEVED)
+def test_every_number_of_the_vehicle_has_a_parameter(key):
+    """Each number that is believed, moved, moves a default; of three numbers each does."""
+    vehicle = load_vehicle("heavy")
+    before = autopilot_parameters(vehicle).values()
+    value = getattr(vehicle, key)
+    if isinstance(value, tuple):
+        moves = [tuple(v * (1.5 if i == k else 1.0) for i, v in enumerate(value)) for k in range(len(value))]
+    else:
+        moves = [1.5 * value + 1e-3]
+    for moved in moves:
+        assert autopilot_parameters(vehicle.model_copy(update={key: moved})).values() != before
+
+
+def test_rotors_without_limits_have_a_parameter():
+    vehicle = load_vehicle("heavy")
+    unlimited = autopilot_parameters(vehicle.model_copy(update={"rotor_max_n": inf}))
+    assert autopilot_parameters(vehicle)["VEH_ROTOR_LIM"] == 1.0
+    assert unlimited["VEH_ROTOR_LIM"] == 0.0
+
+
+def test_what_only_the_plant_knows_moves_no_parameter():
+    vehicle = load_vehicle("heavy")
+    numbers = {key: 1.5 * getattr(vehicle, key) + 1e-3 for key in OF_THE_WORLD_ALONE - {"name", "rotors"}}
+    moved = vehicle.model_copy(update=numbers)
+    assert autopilot_parameters(moved).values() == autopilot_parameters(vehicle).values()
 
 
 def test_parameters_are_no_vehicle():
-    assert shipped_vehicles() == ("bebop", "heavy", "thesis")
+    """The files of parameters lie beside the folder of vehicles and are not shipped as one."""
+    assert VEHICLES.names() == ("bebop", "heavy", "thesis")
 
 
 def test_what_is_measured_on_the_bench_has_a_parameter_on_either_side():
