@@ -213,7 +213,7 @@ def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:
 
 
 def _timeline(mission: Mission, limits: VehicleLimits) -> Iterator[TimelineEntry]:
-    start = MissionState(cable_m=limits.cable_length_m, speed_m_s=limits.speed_m_s)
+    start = MissionState(cable_m=limits.vehicle.cable_length_m, speed_m_s=limits.speed_m_s)
     return timeline(mission.steps, start, accel_m_s2=limits.accel_m_s2)
 
 

@@ -17,7 +17,7 @@ from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home, hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
 from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.mission_items import WireItem, located_steps
+from autopilot.wire.items import WireItem, located_steps
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, ReturnHome, Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase

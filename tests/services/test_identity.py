@@ -19,8 +19,8 @@ from autopilot.services.identity import (
     available_modes_messages,
     identity_of,
 )
-from autopilot.vehicle.file import load_vehicle
 from autopilot.supervisor.requests.modes import MODES
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink
 

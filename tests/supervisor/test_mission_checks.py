@@ -7,8 +7,8 @@ from itertools import accumulate
 from typing import Any
 
 import pytest
-
 from autopilot.core.winch import cable_now
+
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.services.requests import Arm, Pause, ReplaceMission, Reposition, SetCurrent, StartMission
 from autopilot.supervisor.mission import with_plan
@@ -17,7 +17,7 @@ from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.timeline import MissionState, state_after, timeline
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Fence, Polygon
-from autopilot.wire.mission_items import LocatedStep
+from autopilot.wire.items import LocatedStep
 from missions.model import (
     AttitudeRun,
     Delay,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from math import inf
 
 import pytest
 
@@ -19,7 +18,9 @@ from autopilot.vehicle.parameters import (
     SHAPE_WITH_PLUMBLINE,
     autopilot_parameters,
     definitions,
+    vehicle_values,
 )
+from autopilot.wire.convert import ROTOR_FMAX
 from sitl.vehicles.sim_parameters import definitions as sim_definitions
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
@@ -79,13 +80,6 @@ def test_every_number_of_the_vehicle_has_a_parameter(key):
         assert autopilot_parameters(vehicle.model_copy(update={key: moved})).values() != before
 
 
-def test_rotors_without_limits_have_a_parameter():
-    vehicle = load_vehicle("heavy")
-    unlimited = autopilot_parameters(vehicle.model_copy(update={"rotor_max_n": inf}))
-    assert autopilot_parameters(vehicle)["VEH_ROTOR_LIM"] == 1.0
-    assert unlimited["VEH_ROTOR_LIM"] == 0.0
-
-
 def test_what_only_the_plant_knows_moves_no_parameter():
     vehicle = load_vehicle("heavy")
     numbers = {key: 1.5 * getattr(vehicle, key) + 1e-3 for key in OF_THE_WORLD_ALONE - {"name", "rotors"}}
@@ -93,9 +87,14 @@ def test_what_only_the_plant_knows_moves_no_parameter():
     assert autopilot_parameters(moved).values() == autopilot_parameters(vehicle).values()
 
 
-def test_parameters_are_no_vehicle():
-    """The files of parameters lie beside the folder of vehicles and are not shipped as one."""
-    assert VEHICLES.names() == ("bebop", "heavy", "thesis")
+def test_every_number_that_is_taken_from_the_vehicle_is_a_default():
+    taken = [spec.vehicle_keys for spec in definitions().parameters.values()]
+    assert frozenset().union(*taken) == vehicle_values(load_vehicle("bebop")).keys()
+
+
+def test_without_a_rotor_limit_the_forces_are_those_of_the_wire():
+    table = autopilot_parameters(load_vehicle("thesis"))
+    assert (table["VEH_ROTOR_LIM"], table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]) == (0.0, 0.0, ROTOR_FMAX)
 
 
 def test_what_is_measured_on_the_bench_has_a_parameter_on_either_side():
