@@ -33,7 +33,6 @@ KNOWN = {
     ("tests/geometry/test_kernels.py", "_ROOT"),
     ("tests/geometry/test_kernels.py", "_imported"),
     ("tests/geometry/test_kernels.py", "_source"),
-    ("tests/services/test_identity.py", "_MODES"),
 }
 LOADERS = {"spec_from_file_location", "SourceFileLoader", "run_path"}
 BY_STRING = {"getattr", "setattr", "delattr", "hasattr", "object", "patch"}  # also of monkeypatch and mock

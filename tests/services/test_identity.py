@@ -19,7 +19,7 @@ from autopilot.services.identity import (
     available_modes_messages,
     identity_of,
 )
-from autopilot.supervisor import requests as decisions
+from autopilot.supervisor.requests.modes import MODES
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as mavlink
@@ -66,7 +66,7 @@ def test_the_modes_told_are_those_that_are_flown(flavour):
 
 
 def test_what_is_called_flown_is_what_the_supervisor_flies():
-    assert set(FLOWN) == set(decisions._MODES)
+    assert set(FLOWN) == set(MODES)
 
 
 def test_the_parameters_choose_the_identity():

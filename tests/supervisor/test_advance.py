@@ -1,10 +1,9 @@
-"""The supervisor's table entry by entry, and whole flights in a world that does as it is told."""
+"""The supervisor from tick to tick: whole flights in a world that does as it is told, and what ends one."""
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise, product
-from pathlib import Path
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -16,75 +15,24 @@ from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, 
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.machine import _enter as enter
-from autopilot.supervisor.machine import happen
 from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
     ON_GROUND,
-    Event,
     Flight,
     MissionPlan,
     MissionProgress,
     Phase,
     Setpoints,
 )
-from autopilot.supervisor.table import TRANSITIONS, markdown
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "architecture.md"
 STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), model.Land())
 # m: setpoints on both sides of a join; a tick of 20 ms at 1.5 m/s is 30 mm
 CONTINUOUS = 1e-9
 JUMP_PER_TICK = 0.05
-
-
-def table() -> dict[tuple[Phase, Event], Phase]:
-    """The table as the document has it."""
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in documented().splitlines()]
-    phases = [Phase[name.replace(" ", "_").upper()] for name in rows[0][1:]]
-    written = {}
-    for event, *cells in rows[2:]:
-        for phase, after in zip(phases, cells, strict=True):
-            if after:
-                written[(phase, Event(event))] = Phase[after.replace(" ", "_").upper()]
-    return written
-
-
-def documented() -> str:
-    text = DOCUMENT.read_text()
-    begin = text.index("| event |")
-    return text[begin : text.index("\n\n", begin) + 1]
-
-
-def test_the_document_shows_the_table() -> None:
-    assert documented() == markdown()
-
-
-@pytest.mark.parametrize(("phase", "event"), list(product(Phase, Event)))
-def test_each_entry_of_the_table_and_each_that_is_not_there(phase: Phase, event: Event) -> None:
-    expected = table().get((phase, event))
-    assert TRANSITIONS.get((phase, event)) == expected
-    flight = Flight(
-        phase=phase,
-        mission=MissionProgress(plan=MissionPlan(STEPS, (0, 1, 2), 3), takeoff_altitude_m=2.0, speed_m_s=1.0),
-    )
-    after = happen(flight, event, hanging(5_000_000), SETTINGS)
-    if expected is None:
-        assert after is None
-    else:
-        assert after is not None
-        assert (after.phase, after.phase_start_us) == (expected, 5_000_000)
-        assert bool(after.legs) == (expected in IN_AIR), (
-            "there is something to fly in the air, and only there"
-        )
-
-
-def test_every_phase_can_be_left_and_reached() -> None:
-    assert {phase for phase, _ in TRANSITIONS} == set(Phase)
-    assert set(TRANSITIONS.values()) == set(Phase)
-
 
 # ---- whole missions
 

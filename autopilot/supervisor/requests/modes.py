@@ -65,7 +65,7 @@ def _mode_takeoff(flight: Flight, request: Any, view: View, settings: Settings) 
     return takeoff(flight, Takeoff(None), view, settings)
 
 
-_MODES: dict[tuple[int, int], Handler] = {
+MODES: dict[tuple[int, int], Handler] = {
     (identity.AUTO, identity.AUTO_TAKEOFF): _mode_takeoff,
     (identity.AUTO, identity.AUTO_LOITER): hold,
     (identity.AUTO, identity.AUTO_MISSION): continue_mission,
@@ -81,7 +81,7 @@ def set_mode(flight: Flight, request: SetMode, view: View, settings: Settings) -
     main, sub_mode = request.main, request.sub
     if (main, sub_mode) == (identity.AUTO, 0):
         sub_mode = identity.AUTO_MISSION
-    handler = _MODES.get((main, sub_mode))
+    handler = MODES.get((main, sub_mode))
     if handler is None:
         return flight, denied(f"Mode {main}/{sub_mode} denied: not flown by this vehicle")
     heeds = request.number in (None, identity.ARDUPILOT_GUIDED) or handler is not hold
