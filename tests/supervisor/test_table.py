@@ -17,7 +17,7 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services import requests as R
 from autopilot.supervisor import machine
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import begin_legs, happen
+from autopilot.supervisor.machine import happen
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import (
     CARRYING,
@@ -34,7 +34,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.table import TRANSITIONS, markdown
 from missions.model import Land, Step, Takeoff, Waypoint
-from tests.doubles.sky import ACCEPTED, SETTINGS, hanging, view
+from tests.doubles.sky import ACCEPTED, SETTINGS, entered, hanging, view
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT = ROOT / "docs" / "architecture.md"
@@ -89,7 +89,7 @@ def test_every_phase_can_be_left_and_reached() -> None:
 
 
 def test_who_disarms_selects_nothing_and_rewinds_the_mission() -> None:
-    flight = enter(on_mission(*STEPS, step=1), Phase.SET_DOWN)
+    flight = entered(on_mission(*STEPS, step=1), Phase.SET_DOWN, hanging(), SETTINGS)
     after = happen(flight, Event.VEHICLE_DOWN, view(SECOND), SETTINGS)
     assert after is not None
     assert (after.mission.active, after.mission.step, after.legs) == (False, 0, ())
@@ -124,18 +124,13 @@ def on_mission(*steps: Step, step: int = 0) -> Flight:
     )
 
 
-def enter(flight: Flight, phase: Phase) -> Flight:
-    """The flight that begins a phase over (1, 0, 2)."""
-    return begin_legs(replace(flight, phase=phase), hanging(x=HERE), SETTINGS)
-
-
 def under_way(phase: Phase, *steps: Step, step: int = 0, active: bool = False) -> Flight:
     """A flight that has just entered a phase, over (1, 0, 2)."""
     flight = on_mission(*(steps or STEPS), step=step)
     if phase not in IN_AIR:
         return off_mission(replace(flight, phase=phase))
-    entered = enter(flight, phase)
-    return entered if active or phase == Phase.MISSION else off_mission(entered)
+    begun = entered(flight, phase, hanging(x=HERE), SETTINGS)
+    return begun if active or phase == Phase.MISSION else off_mission(begun)
 
 
 def asked(flight: Flight, request: Any, seen: View | None = None) -> Flight:
@@ -223,7 +218,7 @@ def vehicle_down(phase: Phase) -> Flight:
     if phase == Phase.SET_DOWN:
         return landed(under_way(phase))
     alone = replace(on_mission(*STEPS), cable=CableState(released=True))
-    return landed(off_mission(enter(alone, phase)))
+    return landed(off_mission(entered(alone, phase, hanging(x=HERE), SETTINGS)))
 
 
 CAUSES: dict[Event, Callable[[Phase], Flight]] = {
