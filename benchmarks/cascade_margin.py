@@ -30,7 +30,7 @@ from typing import Any
 import control
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_lyapunov
+from scipy.linalg import solve_discrete_lyapunov
 
 from autopilot.control import plumbline_cascade as plumbline
 from autopilot.control import thesis_cascade as thesis
@@ -40,16 +40,18 @@ from autopilot.control.actuators.rotor_model import Actuation, actuation_constan
 from autopilot.control.command_filter import FilterState
 from autopilot.control.design import Timing, Wanted, design
 from autopilot.control.laws.plumbline import PlumblineConstants, load_position_tick
+from autopilot.control.linear_model import LOAD_STATES, hover_thrust, load_state_space
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
-from autopilot.control.records import Reference, State, Vehicle
+from autopilot.control.records import Reference, Vehicle
+from gcs.sweep.margin import sampled_plant, state_at
 
 Array = NDArray[np.float64]
 
 # Table 4-1; torque ratio and limits play no part in a linear model
 BEBOP = Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
 ZERO = (0.0, 0.0, 0.0)
-HOVER = 0.25 * (BEBOP.quad_mass + BEBOP.load_mass) * BEBOP.gravity  # N, each rotor
+HOVER = 0.25 * hover_thrust(BEBOP)  # N, each rotor
 HEADING = (1.0, 0.0, 0.0)
 # central differences: truncation and rounding both below 1e-9
 STEP = 1e-5
@@ -73,8 +75,7 @@ GREATEST_DELAY = 0.2  # s; more is reported as this
 GREATEST_GAIN = 101.0
 LOST = 1.0 + 1e-9  # spectral radius
 
-# coordinates of the motion about hover: x_L, v_L, q_x, q_y, their rates, rotation vector, Omega
-MOTION = 16
+MOTION = LOAD_STATES  # x_L, v_L, q_x, q_y, their rates, rotation vector, Omega
 ROTATION = slice(10, 16)
 ROLL = 1  # of the inputs f, M_x, M_y, M_z
 # name, coordinates, standard deviation: what an estimator over motion capture may leave
@@ -117,48 +118,6 @@ class Margin:
         return self.radius < LOST
 
 
-def plant(vehicle: Vehicle) -> tuple[Array, Array]:
-    """(A, B) of (2-30)-(2-35) at hover in the coordinates MOTION, inputs f, M: linearised by hand.
-
-    With q = (q_x, q_y, -1) and R e3 = (theta, -phi, 1) to first order and f = (m_Q + m_L) g:
-    x_L'' = -g (q_x, q_y) across, f/(m_Q + m_L) - g up; m_Q L q'' = -(f R e3 - (f R e3 . q) q) across.
-    """
-    m_Q, L, g = vehicle.quad_mass, vehicle.cable_length, vehicle.gravity
-    m = m_Q + vehicle.load_mass
-    A, B = np.zeros((MOTION, MOTION)), np.zeros((MOTION, 4))
-    A[0:3, 3:6] = np.eye(3)
-    A[3, 6] = A[4, 7] = -g
-    B[5, 0] = 1.0 / m
-    A[6:8, 8:10] = np.eye(2)
-    A[8, 6] = A[9, 7] = -m * g / (m_Q * L)
-    A[8, 11] = -m * g / (m_Q * L)
-    A[9, 10] = m * g / (m_Q * L)
-    A[10:13, 13:16] = np.eye(3)
-    B[13:16, 1:4] = np.diag(1.0 / np.array(vehicle.inertia))
-    return A, B
-
-
-def state_at(motion: Array, vehicle: Vehicle) -> State:
-    """The state near hover with these coordinates, on its manifolds to second order."""
-    q_x, q_y = float(motion[6]), float(motion[7])
-    q_z = -math.sqrt(1.0 - q_x * q_x - q_y * q_y)
-    q = np.array([q_x, q_y, q_z])
-    q_dot = np.array([motion[8], motion[9], -(q_x * motion[8] + q_y * motion[9]) / q_z])
-    a, b, c = motion[10:13]
-    R = expm(np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]]))
-    x, v, L = motion[0:3], motion[3:6], vehicle.cable_length
-    return State(
-        _vec(x),
-        _vec(v),
-        _vec(q),
-        _vec(q_dot),
-        _vec(x - L * q),
-        _vec(v - L * q_dot),
-        (_vec(R[0]), _vec(R[1]), _vec(R[2])),
-        _vec(motion[13:16]),
-    )
-
-
 def _vec(a: Any) -> tuple[float, float, float]:
     return (float(a[0]), float(a[1]), float(a[2]))
 
@@ -179,7 +138,7 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     above = (0.0, 0.0, vehicle.cable_length)
     vehicle_reference = Reference((above, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), HEADING)
     level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    weight = hover_thrust(vehicle)
 
     def tick(numbers: Array) -> Array:
         memory, state = _memory(numbers[:-MOTION]), state_at(numbers[-MOTION:], vehicle)
@@ -245,7 +204,7 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
     reference = Reference((ZERO,) * 7, HEADING)
     observed = aloft(vehicle)
     rows = constants.actuation.whole + 1
-    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    weight = hover_thrust(vehicle)
 
     def tick(numbers: Array) -> Array:
         state = state_at(numbers[-MOTION:], vehicle)
@@ -296,48 +255,16 @@ def linearised_law(settings: Settings, vehicle: Vehicle) -> tuple[Array, Array, 
     return jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
 
 
-def sampled_plant(settings: Settings, vehicle: Vehicle, delay: float) -> tuple[Array, Array, Array]:
-    """(A, B, C) from one tick to the next: motion, rotors and the commands on their way; exact for held
-    commands.
-
-    A command of tick k works from t_k + delay until that of tick k + 1 does.
-    """
-    A, B = plant(vehicle)
-    if settings.loop == "attitude":
-        keep = np.r_[ROTATION]
-        A, B = A[np.ix_(keep, keep)], B[keep]
-    n = len(A)
-    if settings.rotor_tau > 0.0:
-        A = np.block([[A, B], [np.zeros((4, n)), -np.eye(4) / settings.rotor_tau]])
-        B = np.vstack([np.zeros((n, 4)), np.eye(4) / settings.rotor_tau])
-    whole = math.floor(delay / settings.period + 1e-9)
-    late = max(0.0, delay - whole * settings.period)
-
-    def hold(duration: float) -> tuple[Array, Array]:
-        E = expm(np.block([[A, B], [np.zeros((4, len(A) + 4))]]) * duration)
-        return E[: len(A), : len(A)], E[: len(A), len(A) :]
-
-    Phi, _ = hold(settings.period)
-    Phi_new, Gamma_new = hold(settings.period - late)
-    _, Gamma_old = hold(late)
-    Gamma_old = Phi_new @ Gamma_old
-    # commands on their way, oldest first: u_{k-whole-1} ... u_{k-1}
-    m, queue = len(A), whole + 1
-    size = m + 4 * queue
-    A_d, B_d = np.zeros((size, size)), np.zeros((size, 4))
-    A_d[:m, :m] = Phi
-    A_d[:m, m : m + 4] = Gamma_old
-    if whole == 0:
-        B_d[:m] = Gamma_new
-    else:
-        A_d[:m, m + 4 : m + 8] = Gamma_new
-    for i in range(queue - 1):
-        A_d[m + 4 * i : m + 4 * i + 4, m + 4 * i + 4 : m + 4 * i + 8] = np.eye(4)
-    B_d[size - 4 :] = np.eye(4)
-    C_d = np.zeros((MOTION, size))
-    rows = ROTATION if settings.loop == "attitude" else slice(0, MOTION)
-    C_d[rows, :n] = np.eye(n)
-    return A_d, B_d, C_d
+def plant_of(settings: Settings, vehicle: Vehicle, delay: float) -> tuple[Array, Array, Array]:
+    """(A, B, C) of the vehicle from one tick to the next; of its attitude alone for the innermost loop."""
+    A, B = load_state_space(vehicle)
+    if settings.loop != "attitude":
+        return sampled_plant(A, B, settings.rotor_tau, delay, settings.period)
+    keep = np.r_[ROTATION]
+    A_d, B_d, C_d = sampled_plant(A[np.ix_(keep, keep)], B[keep], settings.rotor_tau, delay, settings.period)
+    C = np.zeros((MOTION, C_d.shape[1]))
+    C[keep] = C_d
+    return A_d, B_d, C
 
 
 def joined(plant_model: tuple[Array, ...], law_model: tuple[Array, ...], shut: Array) -> Array:
@@ -355,7 +282,7 @@ def radius(A: Array) -> float:
 def margin(settings: Settings, vehicle: Vehicle = BEBOP) -> Margin:
     """Margins of one setting."""
     law_model = linearised_law(settings, vehicle)
-    plant_model = sampled_plant(settings, vehicle, settings.delay)
+    plant_model = plant_of(settings, vehicle, settings.delay)
     everything = np.ones(4)
     spectral = radius(joined(plant_model, law_model, everything))
 
@@ -378,7 +305,7 @@ def margin(settings: Settings, vehicle: Vehicle = BEBOP) -> Margin:
         return radius(joined(plant_model, law_model, shut)) < LOST
 
     def delayed(extra: float) -> bool:
-        late = sampled_plant(settings, vehicle, settings.delay + extra)
+        late = plant_of(settings, vehicle, settings.delay + extra)
         return radius(joined(late, law_model, everything)) < LOST
 
     stable = spectral < LOST
@@ -414,7 +341,7 @@ def rotor_noise(settings: Settings, vehicle: Vehicle = BEBOP) -> list[tuple[str,
     The noise is drawn anew each tick, with the deviation given in NOISES on each coordinate: what an
     estimator leaves, not what a sensor gives. Assumes a stable loop.
     """
-    A_p, B_p, C_p = sampled_plant(settings, vehicle, settings.delay)
+    A_p, B_p, C_p = plant_of(settings, vehicle, settings.delay)
     A_c, B_c, C_c, D_c = linearised_law(settings, vehicle)
     A = joined((A_p, B_p, C_p), (A_c, B_c, C_c, D_c), np.ones(4))
     arm, ratio = 2.0 * vehicle.arm, 4.0 * vehicle.torque_ratio

@@ -65,3 +65,26 @@ def state_space(vehicle: Vehicle) -> tuple[Matrix, Matrix]:
     A[8:, :8] = -np.linalg.solve(M1, M2)
     B[8:, :] = np.linalg.solve(M1, M3)
     return A, B
+
+
+LOAD_STATES = 16  # x_L, v_L (3 each), q_x, q_y, their rates (2 each), rotation vector, Omega (3 each)
+
+
+def load_state_space(vehicle: Vehicle) -> tuple[Matrix, Matrix]:
+    """A (16 x 16), B (16 x 4) of the same model in the states of the load cascade, LOAD_STATES.
+
+    To first order x_L = x_Q + L (theta_L, phi_L, -1) and q = (theta_L, phi_L, -1).
+    """
+    L = vehicle.cable_length
+    to_load = np.eye(8)  # (x_L, y_L, z_L, phi, theta, psi, q_y, q_x) of the eight coordinates
+    to_load[X, THETA_L] = to_load[Y, PHI_L] = L
+    from_load = 2.0 * np.eye(8) - to_load  # its inverse: to_load - I squared is zero
+    A, B = state_space(vehicle)
+    stiffness, input_gain = to_load @ A[8:, :8] @ from_load, to_load @ B[8:]
+    # places of (x_L ... q_x) and of their rates among the states
+    position, velocity = np.r_[0:3, 10:13, 7, 6], np.r_[3:6, 13:16, 9, 8]
+    A_L, B_L = np.zeros((LOAD_STATES, LOAD_STATES)), np.zeros((LOAD_STATES, 4))
+    A_L[position, velocity] = 1.0
+    A_L[np.ix_(velocity, position)] = stiffness
+    B_L[velocity] = input_gain
+    return A_L, B_L

@@ -38,19 +38,19 @@ def _source(path: Path) -> bytes:
 
 
 @cache
-def _packages(path: Path) -> tuple[Path, ...]:
-    """The files that make `path`, or what it lies in, packages of this project."""
-    inside = [parent for parent in (path, *path.parents) if parent.is_relative_to(_ROOT)]
+def _packages(path: Path, root: Path) -> tuple[Path, ...]:
+    """The files that make `path`, or what it lies in, packages of the project at `root`."""
+    inside = [parent for parent in (path, *path.parents) if parent.is_relative_to(root)]
     return tuple(file for file in (parent / "__init__.py" for parent in inside) if file.is_file())
 
 
 @cache
-def _imported(path: Path) -> frozenset[Path]:
-    """Files of this project that the file imports itself."""
+def _imported(path: Path, root: Path) -> frozenset[Path]:
+    """Files below `root` that the file imports itself."""
     found: set[Path] = set()
     for module, names in _IMPORT.findall(_source(path)):
-        base = _ROOT.joinpath(*module.decode().split("."))
-        found.update(_packages(base))
+        base = root.joinpath(*module.decode().split("."))
+        found.update(_packages(base, root))
         if base.is_dir():
             parts = (base / name.decode() for name in _NAME.findall(names))
             found.update(p for q in parts for p in (q.with_suffix(".py"), q / "__init__.py") if p.is_file())
@@ -62,15 +62,15 @@ def _imported(path: Path) -> frozenset[Path]:
 
 
 @cache
-def sources_hash(path: Path) -> str:
-    """Hash of a source file and of all files of this project that it imports, directly or not."""
+def sources_hash(path: Path, root: Path = _ROOT) -> str:
+    """Hash of a source file and of all files of the project at `root` that it imports, directly or not."""
     seen, ahead = {path}, [path]
     while ahead:
-        fresh = _imported(ahead.pop()) - seen
+        fresh = _imported(ahead.pop(), root) - seen
         seen |= fresh
         ahead += fresh
     digest = hashlib.sha256()
-    for name, file in sorted((os.path.relpath(file, _ROOT), file) for file in seen):
+    for name, file in sorted((os.path.relpath(file, root), file) for file in seen):
         digest.update(name.encode() + b"\0" + _source(file) + b"\0")
     return digest.hexdigest()[:16]
 

@@ -12,16 +12,10 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import (
     Mat3,
     Vec3,
-    apply,
-    apply_transposed,
-    axpy,
-    cross,
     dot,
-    from_columns,
     mul_transposed,
     norm,
     scale,
-    sub,
     trace,
 )
 
@@ -153,17 +147,6 @@ def log(R: Mat3) -> Vec3:
 
 
 @kernel
-def orthonormalise(A: Mat3) -> Mat3:
-    """A rotation near A, by Gram-Schmidt on the columns, the third (thrust axis) first."""
-    b3 = (A[0][2], A[1][2], A[2][2])
-    b3 = scale(1.0 / norm(b3), b3)
-    b1 = (A[0][0], A[1][0], A[2][0])
-    b1 = axpy(-dot(b1, b3), b3, b1)
-    b1 = scale(1.0 / norm(b1), b1)
-    return from_columns(b1, cross(b3, b1), b3)
-
-
-@kernel
 def psi_attitude(R: Mat3, R_d: Mat3) -> float:
     """Psi_R = tr(I - R_d^T R) / 2 in 0 ... 2, (3-1)."""
     return 0.5 * (3.0 - trace(mul_transposed(R_d, R)))
@@ -173,12 +156,6 @@ def psi_attitude(R: Mat3, R_d: Mat3) -> float:
 def attitude_error(R: Mat3, R_d: Mat3) -> Vec3:
     """e_R = (R_d^T R - R^T R_d)^vee / 2, (3-3): `vee` takes the skew part."""
     return vee(mul_transposed(R_d, R))
-
-
-@kernel
-def rate_error(R: Mat3, R_d: Mat3, omega_body: Vec3, omega_body_d: Vec3) -> Vec3:
-    """e_Omega = Omega - R^T R_d Omega_d, (3-6)."""
-    return sub(omega_body, apply_transposed(R, apply(R_d, omega_body_d)))
 
 
 @kernel

@@ -23,6 +23,7 @@ from autopilot.core.scheduler import RateError, divider
 from autopilot.core.sensor_inbox import Tick, fill, read_tick
 from autopilot.core.warmup import rehearse
 from autopilot.estimation.filter import estimator_tuning
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
@@ -43,7 +44,7 @@ from autopilot.services.records import (
     Verdict,
     WorldSaved,
 )
-from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters
+from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
 from autopilot.services.snapshot import Snapshot
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
@@ -56,7 +57,7 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
-from missions.model import Step, Waypoint
+from missions.model import ReturnHome, Step, Waypoint
 
 GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
@@ -73,10 +74,11 @@ class Work(NamedTuple):
     steps: tuple[Step, ...]
     sequence: tuple[int, ...]
     limits: Limits
+    home: Vec3 = ZERO  # where a return leads
 
     def done(self) -> Prepared:
         """What comes of it; takes from a millisecond to some seconds."""
-        return prepare(self.steps, self.sequence, self.limits)
+        return prepare(self.steps, self.sequence, self.limits, self.home)
 
 
 def build_setup(table: ParameterTable, control_every: int) -> Setup:
@@ -95,11 +97,12 @@ def build_setup(table: ParameterTable, control_every: int) -> Setup:
     )
 
 
-def plan_of(mission: StoredMission, home: Home, limits: Limits | None) -> MissionPlan:
-    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet."""
-    steps = located_steps(mission.items, home)
+def plan_of(mission: StoredMission, home: Home, limits: Limits | None, return_to: Vec3 = ZERO) -> MissionPlan:
+    """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet. A
+    return leads to `return_to`."""
+    steps = located_steps(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
-    prepared = PENDING if limits is None else prepare(flown, sequence, limits)
+    prepared = PENDING if limits is None else prepare(flown, sequence, limits, return_to)
     return MissionPlan(flown, sequence, len(mission.items), prepared)
 
 
@@ -353,7 +356,27 @@ class Onboard:
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
-        return self.core.ask(request, self.now_us)
+        home = self.core.flight.area.home
+        verdict = self.core.ask(request, self.now_us)
+        if isinstance(request, SetHome) and self.core.flight.area.home != home:
+            self._follow_home()
+        return verdict
+
+    def _follow_home(self) -> None:
+        """Read and prepare the mission anew where it returns to another home; one under way keeps its paths,
+        as it does when a parameter is changed."""
+        flight = self.core.flight
+        mission = flight.mission
+        if mission.active or not any(isinstance(step, ReturnHome) for step in mission.plan.steps):
+            return
+        plan = plan_of(self.endpoint.mission, self._options.home, None, flight.area.home)
+        current, item = mission.step, mission.plan.sequence[mission.step]
+        if len(plan.steps) != len(mission.plan.steps):
+            # to land at a place of its own may be two steps by now
+            current = plan.sequence.index(item)
+        mission = replace(mission, plan=plan, step=current)
+        self.core.change(replace(flight, mission=mission))
+        self._prepare()
 
     def take_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Another fence, other rally points."""
@@ -366,7 +389,7 @@ class Onboard:
         self.core.change(replace(flight, area=area))
 
     def _take_plan(self, mission: StoredMission) -> None:
-        plan = plan_of(mission, self._options.home, None)
+        plan = plan_of(mission, self._options.home, None, self.core.flight.area.home)
         self.core.change(with_plan(self.core.flight, plan))
         self._prepare()
         kept = unflown(mission.items)
@@ -378,7 +401,7 @@ class Onboard:
         """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
         plan, limits = self.core.flight.mission.plan, self.core.setup.settings.limits
         self._prepared_for = limits
-        self.work = Work(plan.steps, plan.sequence, limits)
+        self.work = Work(plan.steps, plan.sequence, limits, self.core.flight.area.home)
         self._have_prepared(PENDING)
         short = self.core.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
         if self._options.clock_waits or short:

@@ -127,11 +127,6 @@ class FtpService:
         # the last replies by client: request to reply and when it was made
         self._replies: OrderedDict[Peer, OrderedDict[bytes, tuple[Packet, int]]] = OrderedDict()
 
-    @property
-    def open_sessions(self) -> int:
-        """How many sessions are open, of all clients."""
-        return len(self._sessions)
-
     def receive(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Do what a client asks, and answer it."""
         payload = bytes(message.payload)

@@ -19,7 +19,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 COMPLAIN_US = 5_000_000
 STEEPEST_DEG = 60.0  # lean of an attitude setpoint
-_POSITION_BITS, _VELOCITY_BITS, _ACCEL_BITS, _FORCE = 0x7, 0x38, 0x1C0, 0x200
+_POSITION_BITS, _VELOCITY_BITS, _FORCE = 0x7, 0x38, 0x200
 _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_THRUST = mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _NO_STICK = 32767  # INT16_MAX: the axis is not there

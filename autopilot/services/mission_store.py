@@ -13,7 +13,7 @@ import zlib
 from dataclasses import dataclass
 
 from autopilot.wire.convert import Home
-from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
+from autopilot.wire.items import MissionItemError, WireItem, located_steps
 
 MAX_ITEMS = 2000
 
@@ -26,10 +26,9 @@ _CHECK = struct.Struct("<I")
 
 @dataclass(frozen=True, slots=True)
 class StoredMission:
-    """The items as they were uploaded, and the steps they mean."""
+    """An accepted mission: the items as they were uploaded."""
 
     items: tuple[WireItem, ...] = ()
-    steps: tuple[LocatedStep, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +74,10 @@ def deserialise(data: bytes, home: Home) -> StoredMission | CorruptMission:
     if isinstance(items, CorruptMission):
         return items
     try:
-        return StoredMission(items, located_steps(items, home))
+        located_steps(items, home)
     except MissionItemError as error:
         return CorruptMission(str(error))
+    return StoredMission(items)
 
 
 def deserialise_items(data: bytes) -> tuple[WireItem, ...] | CorruptMission:

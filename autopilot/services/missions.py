@@ -243,7 +243,7 @@ class MissionService:
             self._end(mavlink.MAV_MISSION_DENIED, now_us)
             return refused
         self._end(_ACCEPTED, now_us)
-        return [*self._replaced(StoredMission(items, steps)), self._accepted(upload.peer, kind)]
+        return [*self._replaced(StoredMission(items)), self._accepted(upload.peer, kind)]
 
     def _accepted(self, peer: Peer, kind: int) -> Output:
         """The acknowledgement of a plan that is in force by now."""

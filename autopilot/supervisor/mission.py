@@ -20,7 +20,8 @@ from autopilot.supervisor.state import (
     Selected,
     View,
 )
-from autopilot.supervisor.step_legs import borrowed, following_legs, made, step_legs
+from autopilot.supervisor.step_legs import borrowed, destination, following_legs, made, step_legs
+from autopilot.trajectory.timeline import MissionState, state_after
 from autopilot.trajectory.waypoint_path import Passage
 from missions.model import AttitudeRun, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint, Winch
 
@@ -58,7 +59,8 @@ def begin_step(flight: Flight, event: Event, view: View, settings: Settings) -> 
         return must_happen(flight, event, view, settings)
     if isinstance(step, Winch) and flight.cable.reel_to_m is None:
         here = stop(flight, view, settings)[1]
-        reel_to = length_at(flight, here, settings) + step.length_m
+        hanging = MissionState(here, cable_m=length_at(flight, here, settings))
+        reel_to = state_after(step, hanging).cable_m
         flight = replace(flight, cable=replace(flight.cable, reel_to_m=reel_to))
     if isinstance(step, Release) and not flight.cable.released:
         flight = replace(flight, cable=replace(flight.cable, released=True, slack_since_us=-1), legs=())
@@ -118,7 +120,7 @@ def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings
         assert isinstance(step, Waypoint)
         legs: tuple[Leg, ...] = (replace(leg, path=ahead),)
         if step.hold_s > 0.0:
-            there = (step.east_m, step.north_m, step.altitude_m)
+            there = destination(step, leg.path.start, flight)
             legs += (Hold(there, max(step.hold_s - borrowed(flight), 0.0)),)
         passed = flight.leg_start_us + round(leg.duration_s * 1e6)
         gone = replace(flight, legs=as_flown(flight, legs), leg_start_us=passed)

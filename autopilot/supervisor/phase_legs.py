@@ -6,7 +6,6 @@ Everything is a function of the flight, the view and the settings.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import dist
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, transfer_leg
@@ -16,6 +15,7 @@ from autopilot.supervisor.motion import AT_REST, asked_motion, carry, position_m
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Phase, View, leg_time_s, pace_of, setpoint
 from autopilot.supervisor.step_legs import step_legs
+from autopilot.trajectory.timeline import return_place
 from missions.model import AttitudeRun, Signals
 
 P = Phase
@@ -65,7 +65,7 @@ def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = _raised(flight, view, settings)
-    goal = min((flight.area.home, *flight.area.rally), key=lambda place: dist(place[:2], here[:2]))
+    goal = return_place(here, flight.area.home, flight.area.rally)
     return (*legs, carry(here, (goal[0], goal[1], here[2]), flight.mission.speed_m_s, settings))
 
 

@@ -21,6 +21,7 @@ from autopilot.supervisor.motion import AT_REST, carry, length_at
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Phase
 from autopilot.trajectory.shaping import Shaped, unshaped
+from autopilot.trajectory.timeline import RELEASE_S, MissionState, state_after
 from autopilot.trajectory.waypoint_path import Passage
 from missions.model import (
     AttitudeRun,
@@ -36,18 +37,25 @@ from missions.model import (
     Winch,
 )
 
-RELEASE_S = 2.0  # hold of a mission after the load was released: the vehicle jumps up and comes back
 LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
 NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
+
+
+def destination(step: Step, here: Vec3, flight: Flight) -> Vec3:
+    """Where a step leads that begins with load or vehicle at rest at `here`."""
+    there = state_after(step, MissionState(here), flight.area.home).expected
+    assert there is not None, "from a known place"
+    return there
 
 
 def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tuple[Leg, ...]:
     """The legs of a mission step that begins with the load at rest at `here`."""
     match step:
-        case Takeoff(altitude_m=altitude):
-            return (carry(here, (here[0], here[1], altitude), settings.motion.lift_speed_m_s, settings),)
-        case Waypoint(east_m=east, north_m=north, altitude_m=altitude, hold_s=hold):
-            there = (east, north, altitude)
+        case Takeoff():
+            up = destination(step, here, flight)
+            return (carry(here, up, settings.motion.lift_speed_m_s, settings),)
+        case Waypoint(hold_s=hold):
+            there = destination(step, here, flight)
             path = made(flight, flight.mission.step)
             go: Leg
             if isinstance(path, Passage) and path.begin_s == 0.0 and norm(sub(here, path.start)) < NEAR_START:
@@ -59,7 +67,7 @@ def step_legs(step: Step, here: Vec3, flight: Flight, settings: Settings) -> tup
         case Delay(duration_s=duration):
             return (Hold(here, max(duration - borrowed(flight), 0.0)),)
         case ReturnHome():
-            there = (flight.area.home[0], flight.area.home[1], here[2])
+            there = destination(step, here, flight)
             return (carry(here, there, flight.mission.speed_m_s, settings, _least_s(flight)),)
         case Signals():
             return (Run(here, _signals_of(flight, flight.mission.step) or unshaped(step)),)

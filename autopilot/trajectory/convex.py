@@ -33,7 +33,6 @@ _ROW_PRICE = 1e5  # of one metre
 _HALVINGS = 7
 _SETTLED = 1e-3  # relative fall of the cost that ends the rounds
 _COS_SCALE, _TENSION_SCALE = 2.0, 1.0  # excess of cosine and tension, as newtons of a rotor
-_TINY = 1e-9
 _NEAR_ENOUGH_N = 0.05  # excess at which the rounds may begin
 _SMOOTHER, _SMOOTHER_TRIES = 30.0, 8
 _AWAY_N = 0.6  # a bound from which the demand is so far away is left out of a round

@@ -31,7 +31,7 @@ from autopilot.trajectory.prepare import REFUSE, Limits, prepare, trouble_of
 from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.shaping import Shaped, path_jets, shape
 from autopilot.trajectory.signals import evaluate, joints, signal_table
-from autopilot.trajectory.timeline import Leg, legs
+from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import Passage, passage_jets
 from autopilot.vehicle.model import Vehicle
 from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint, Winch
@@ -143,32 +143,34 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
     `shaped`: signals are flown by an autopilot that shapes them; what it can fly near the asked path passes.
     """
     found: list[Violation] = []
-    for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2):
-        if isinstance(leg.step, Takeoff | Waypoint) and leg.end[2] < LEAST_HEIGHT_M:
+    for entry in _timeline(mission, limits):
+        if isinstance(entry.step, Takeoff | Waypoint) and entry.end[2] < LEAST_HEIGHT_M:
             text = (
-                f"items[{leg.item}] ({_kind(leg)}): the load would be carried {leg.end[2]:.2f} m above the "
-                f"ground; it must be at least {LEAST_HEIGHT_M:g} m: raise altitude_m"
+                f"items[{entry.item}] ({_kind(entry)}): the load would be carried {entry.end[2]:.2f} m above "
+                f"the ground; it must be at least {LEAST_HEIGHT_M:g} m: raise altitude_m"
             )
-            found.append(Violation(leg.item, "height", leg.end[2], LEAST_HEIGHT_M, leg.transfer_s, text))
-        if isinstance(leg.step, Signals):
-            jumps = list(_jumps(leg.item, leg.step))
+            found.append(
+                Violation(entry.item, "height", entry.end[2], LEAST_HEIGHT_M, entry.transfer_s, text)
+            )
+        if isinstance(entry.step, Signals):
+            jumps = list(_jumps(entry.item, entry.step))
             found += jumps
             if shaped and not jumps:
-                along = _survey(leg, limits)
+                along = _survey(entry, limits)
                 assert along is not None
-                trouble = trouble_of(shape(leg.step, limits.body, limits.shaping.bounds), limits.shaping)
-                low = list(_judge(leg, along, limits))
+                trouble = trouble_of(shape(entry.step, limits.body, limits.shaping.bounds), limits.shaping)
+                low = list(_judge(entry, along, limits))
                 if not trouble:
                     found += [v for v in low if v.quantity == "height"]
                 elif low:
                     found += low
                 else:
-                    text = f"items[{leg.item}] (signals): {trouble}"
-                    found.append(Violation(leg.item, "shaping", inf, SHAPING_M, 0.0, text))
+                    text = f"items[{entry.item}] (signals): {trouble}"
+                    found.append(Violation(entry.item, "shaping", inf, SHAPING_M, 0.0, text))
                 continue
-        along = _survey(leg, limits)
+        along = _survey(entry, limits)
         if along is not None:
-            found += _judge(leg, along, limits)
+            found += _judge(entry, along, limits)
     return found
 
 
@@ -206,32 +208,37 @@ def paths(mission: Mission, limits: VehicleLimits) -> list[PathReport]:
 
 def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:
     """The extremes along each step that moves the load, by item number."""
-    surveys = {leg.item: _survey(leg, limits) for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2)}
+    surveys = {entry.item: _survey(entry, limits) for entry in _timeline(mission, limits)}
     return {item: along for item, along in surveys.items() if along is not None}
 
 
-def _survey(leg: Leg, limits: VehicleLimits) -> Peaks | None:
-    if isinstance(leg.step, Signals):
-        return survey_signals(leg.step, leg.begin, limits.body)
-    if isinstance(leg.step, AttitudeRun):
-        return survey_attitude(leg.step, leg.begin[2], limits.body)
-    if leg.transfer_s > 0.0:
-        return survey_transfer(leg.begin, leg.end, leg.transfer_s, limits.body)
+def _timeline(mission: Mission, limits: VehicleLimits) -> Iterator[TimelineEntry]:
+    start = MissionState(cable_m=limits.vehicle.cable_length_m, speed_m_s=limits.speed_m_s)
+    return timeline(mission.steps, start, accel_m_s2=limits.accel_m_s2)
+
+
+def _survey(entry: TimelineEntry, limits: VehicleLimits) -> Peaks | None:
+    if isinstance(entry.step, Signals):
+        return survey_signals(entry.step, entry.begin, limits.body)
+    if isinstance(entry.step, AttitudeRun):
+        return survey_attitude(entry.step, entry.begin[2], limits.body)
+    if entry.transfer_s > 0.0:
+        return survey_transfer(entry.begin, entry.end, entry.transfer_s, limits.body)
     return None
 
 
-def _judge(leg: Leg, along: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
+def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
     def violation(quantity: str, worst: Extreme, limit: float, says: str, advice: str = "") -> Violation:
-        advice = advice or _advice(leg, worst.time_s)
-        text = f"items[{leg.item}] ({_kind(leg)}): at {worst.time_s:.1f} s {says}; {advice}"
-        return Violation(leg.item, quantity, worst.value, limit, worst.time_s, text)
+        advice = advice or _advice(entry, worst.time_s)
+        text = f"items[{entry.item}] ({_kind(entry)}): at {worst.time_s:.1f} s {says}; {advice}"
+        return Violation(entry.item, quantity, worst.value, limit, worst.time_s, text)
 
     fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
     vehicle = limits.vehicle
     gravity, full = vehicle.gravity_m_s2, vehicle.rotors * vehicle.rotor_max_n
     usable = full * (1.0 - limits.thrust_reserve)
-    # a leg that begins under the ground has been told of at the one that led there
-    if along.height_low.value < min(leg.begin[2], 0.0) - _GROUND_M:
+    # a step that begins under the ground has been told of at the one that led there
+    if along.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
         says = f"the load would be {-along.height_low.value:.2f} m under the ground"
         advice = "begin higher (altitude_m) or lower amplitude_m of z"
         yield violation("height", along.height_low, 0.0, says, advice)
@@ -305,7 +312,7 @@ def _end(term: Term) -> float:
     return term.start_s + term.rise_s + term.hold_s + term.fall_s
 
 
-def _kind(leg: Leg) -> str:
+def _kind(entry: TimelineEntry) -> str:
     names = {
         Signals: "signals",
         AttitudeRun: "attitude",
@@ -315,16 +322,16 @@ def _kind(leg: Leg) -> str:
         Land: "land",
         Winch: "winch",
     }
-    return names[type(leg.step)]
+    return names[type(entry.step)]
 
 
 def _excess(value: float, limit: float) -> str:
     return f"{100.0 * (value / limit - 1.0):.0f} % over" if limit > 0.0 else f"{value - limit:.2f} over"
 
 
-def _advice(leg: Leg, time: float) -> str:
+def _advice(entry: TimelineEntry, time: float) -> str:
     """What to change: for signals the axis that accelerates most at that time."""
-    step = leg.step
+    step = entry.step
     if isinstance(step, AttitudeRun):
         return "lower the tilt or lengthen duration_s"
     if not isinstance(step, Signals):

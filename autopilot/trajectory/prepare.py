@@ -12,26 +12,13 @@ from dataclasses import dataclass, replace
 from math import cos, dist
 from typing import NamedTuple
 
-from autopilot.geometry.linear import Vec3, add
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.peaks import Body, Peaks, survey_transfer
 from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.shaping import Shaped, shape, unshaped
-from autopilot.trajectory.signals import evaluate, signal_table
-from autopilot.trajectory.timeline import legs
+from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import MOST_POINTS, NEAREST_M, Passage, passage
-from missions.model import (
-    Delay,
-    Land,
-    Mission,
-    ReturnHome,
-    Signals,
-    Sine,
-    Speed,
-    Step,
-    Takeoff,
-    Term,
-    Waypoint,
-)
+from missions.model import ReturnHome, Signals, Sine, Step, Term, Waypoint
 
 AS_ASKED, SLOW_DOWN, REFUSE = 0, 1, 2
 SLOWEST = 4.0  # times as long as asked
@@ -68,12 +55,15 @@ UNPREPARED = Prepared()
 PENDING = Prepared(pending=True)
 
 
-def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits) -> Prepared:
-    """The steps made ready; `sequence` has the mission item of each, by which the notes name it."""
+def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits, home: Vec3 = ZERO) -> Prepared:
+    """The steps made ready; `sequence` has the mission item of each, by which the notes name it, and `home`
+    is where a return leads."""
     made: list[Shaped | Passage | None] = []
     notes: list[str] = []
     refusal = ""
-    chains = _passages(steps, limits)
+    start = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
+    entries = tuple(timeline(steps, start, home, limits.accel_m_s2))
+    chains = _passages(entries, limits)
     for index, (step, item) in enumerate(zip(steps, sequence, strict=True)):
         if not isinstance(step, Signals):
             made.append(chains.get(index))
@@ -94,23 +84,22 @@ def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits) -> P
             notes.append(f"Item {item}: {trouble}")
             found = unshaped(step)
         made.append(found)
-    least = tuple(_transfer_times(steps, limits)) if limits.shaped else ()
+    least = tuple(_transfer_times(entries, limits)) if limits.shaped else ()
     return Prepared(tuple(made), tuple(notes), refusal, least_s=least)
 
 
-def _transfer_times(steps: Sequence[Step], limits: Limits) -> Iterator[float]:
+def _transfer_times(entries: Sequence[TimelineEntry], limits: Limits) -> Iterator[float]:
     """For each step the least time (s) of its transfer within the bounds; 0 where these do not bind."""
-    mission = Mission("", "", "", (), tuple(steps))
-    for leg in legs(mission, limits.speed_m_s, limits.accel_m_s2):
-        duration = leg.transfer_s
-        if not isinstance(leg.step, Waypoint | ReturnHome) or duration == 0.0:
+    for entry in entries:
+        duration = entry.transfer_s
+        if not isinstance(entry.step, Waypoint | ReturnHome) or duration == 0.0:
             yield 0.0
             continue
         for _ in range(_LONGER_TRIES):
-            if _transfer_fits(survey_transfer(leg.begin, leg.end, duration, limits.body), limits.bounds):
+            if _transfer_fits(survey_transfer(entry.begin, entry.end, duration, limits.body), limits.bounds):
                 break
             duration *= _LONGER
-        yield 0.0 if duration == leg.transfer_s else duration
+        yield 0.0 if duration == entry.transfer_s else duration
 
 
 def _transfer_fits(along: Peaks, bounds: Bounds) -> bool:
@@ -122,13 +111,13 @@ def _transfer_fits(along: Peaks, bounds: Bounds) -> bool:
     )
 
 
-def _passages(steps: Sequence[Step], limits: Limits) -> dict[int, Passage]:
+def _passages(entries: Sequence[TimelineEntry], limits: Limits) -> dict[int, Passage]:
     """The stretch of a passage for each step that is a waypoint of one, by its index.
 
-    A passage is of waypoints in a row, all but the last without a hold.
+    A passage is of waypoints in a row, all but the last without a hold. It begins where the setpoint is known
+    to be at rest.
     """
     found: dict[int, Passage] = {}
-    here: Vec3 | None = None
     speed = limits.speed_m_s
     points: list[Vec3] = []
     first = 0
@@ -144,35 +133,20 @@ def _passages(steps: Sequence[Step], limits: Limits) -> dict[int, Passage]:
                     found[first + i] = Passage(table, float(times[i]), float(times[i + 1]), points[0])
         points.clear()
 
-    for index, step in enumerate(steps):
-        if isinstance(step, Waypoint) and here is not None:
-            there = (step.east_m, step.north_m, step.altitude_m)
-            if points and (dist(points[-1], there) < NEAREST_M or len(points) > MOST_POINTS):
-                close()
-            if not points and dist(here, there) >= NEAREST_M:
-                points, first = [here], index
-            if points:
-                points.append(there)
-            if step.hold_s > 0.0:
-                close()
-            here = there
+    for index, entry in enumerate(entries):
+        here, there = entry.before.position, entry.end
+        if not isinstance(entry.step, Waypoint) or here is None:
+            close()
             continue
-        close()
-        match step:
-            case Takeoff(altitude_m=altitude):
-                here = (0.0, 0.0, altitude)
-            case Speed(speed_m_s=given):
-                speed = given
-            case ReturnHome():
-                here = None if here is None else (0.0, 0.0, here[2])
-            case Signals(duration_s=duration, terms=terms):
-                here = None if here is None else add(here, evaluate(signal_table(terms), duration)[0])
-            case Waypoint(east_m=east, north_m=north, altitude_m=altitude):
-                here = (east, north, altitude)
-            case Delay() | Land():
-                pass
-            case _:
-                here = None  # an attitude run leaves the load where nobody knows
+        speed = entry.before.speed_m_s
+        if points and (dist(points[-1], there) < NEAREST_M or len(points) > MOST_POINTS):
+            close()
+        if not points and dist(here, there) >= NEAREST_M:
+            points, first = [here], index
+        if points:
+            points.append(there)
+        if entry.step.hold_s > 0.0:
+            close()
     close()
     return found
 

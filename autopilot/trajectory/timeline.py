@@ -1,12 +1,18 @@
-"""Where each step of a mission begins and ends, and how long it takes."""
+"""Where the load is after each step of a mission, how long its cable is, and how long the step takes.
+
+The one interpreter of steps: upload checks, fence and winch checks before flight, preparation of paths,
+feasibility and the legs of the flight all ask here where a step leads, so that they cannot differ.
+
+Positions are m, ENU. They are the load's until it is released and the vehicle's afterwards.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from math import dist
 
-from autopilot.geometry.linear import ZERO, Vec3, add
+from autopilot.geometry.linear import ZERO, Vec3, add, dot
 from autopilot.trajectory.signals import evaluate, signal_table
 from autopilot.trajectory.transfer import transfer_duration
 from missions.model import (
@@ -30,63 +36,146 @@ TAUTEN_S = 10.0
 SET_DOWN_S = 10.0
 VERTICAL_SPEED_M_S = 0.8
 REEL_M_S = 0.3  # of a winch as delivered
-RELEASE_S = 2.0  # held when the load is released
+RELEASE_S = 2.0  # hold after the load was released: the vehicle jumps up and comes back
 # of transfers, for a vehicle as delivered (MIS_SPEED, MIS_ACCEL)
 SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
+AT_REST_M2_S2 = 1e-4  # squared speed at which signals that end count as at rest
 
 
 @dataclass(frozen=True, slots=True)
-class Leg:
-    """A step with the load's setpoint at its two ends (m, ENU from home), and its expected duration.
+class MissionState:
+    """The state that the steps of a mission change, between two steps.
+
+    `expected` is the best guess of the position; None: the mission may be begun anywhere. `known` says that
+    it is where a setpoint comes to rest, and not only a guess: after an attitude run nobody knows how far the
+    load has drifted, and a released load leaves the vehicle about a cable length above where it hung.
+    """
+
+    expected: Vec3 | None = ZERO
+    known: bool = True
+    cable_m: float | None = None  # None: not told
+    released: bool = False
+    speed_m_s: float = SPEED_M_S  # peak speed of transfers
+
+    @property
+    def position(self) -> Vec3 | None:
+        """Where the setpoint is; None where that is unknown."""
+        return self.expected if self.known else None
+
+
+AT_ORIGIN = MissionState()
+ANYWHERE = MissionState(expected=None, known=False)
+
+
+@dataclass(frozen=True, slots=True)
+class TimelineEntry:
+    """A step with the states before and after it, and its expected duration.
 
     `transfer_s` is the part of the duration in which the load travels from rest to rest; 0 if it does not.
+    `home` is the place to which a return leads, None for other steps.
     """
 
     item: int
     step: Step
-    begin: Vec3
-    end: Vec3
+    before: MissionState
+    after: MissionState
     transfer_s: float
     duration_s: float
+    home: Vec3 | None = None
+
+    @property
+    def begin(self) -> Vec3:
+        """The expected position before the step; the origin where nothing is known."""
+        return self.before.expected or ZERO
+
+    @property
+    def end(self) -> Vec3:
+        """The expected position after the step; the origin where nothing is known."""
+        return self.after.expected or ZERO
 
 
-def legs(mission: Mission, speed: float, accel: float) -> Iterator[Leg]:
-    """The steps in order. Transfers peak at `speed` (m/s, until the mission sets one) and `accel` (m/s^2).
+def timeline(
+    steps: Iterable[Step],
+    start: MissionState = AT_ORIGIN,
+    home: Vec3 = ZERO,
+    accel_m_s2: float = ACCEL_M_S2,
+) -> Iterator[TimelineEntry]:
+    """The steps in order, from `start`. A return leads to `home`; transfers peak at `accel_m_s2`."""
+    before = start
+    for item, step in enumerate(steps):
+        after = state_after(step, before, home)
+        moving, waiting = _seconds(step, before, after, accel_m_s2)
+        place = home if isinstance(step, ReturnHome) else None
+        yield TimelineEntry(item, step, before, after, moving, moving + waiting, place)
+        before = after
 
-    Attitude runs leave the setpoint where it was.
-    """
-    here = ZERO
-    for item, step in enumerate(mission.steps):
-        end, moving, waiting, pace = here, 0.0, 0.0, speed
-        match step:
-            case Takeoff():
-                end = (here[0], here[1], step.altitude_m)
-                waiting, pace = TAUTEN_S, min(speed, VERTICAL_SPEED_M_S)
-            case Waypoint():
-                end, waiting = (step.east_m, step.north_m, step.altitude_m), step.hold_s
-            case ReturnHome():
-                end = (0.0, 0.0, here[2])
-            case Land():
-                end = (here[0], here[1], 0.0)
-                waiting, pace = SET_DOWN_S, min(speed, VERTICAL_SPEED_M_S)
-            case Speed():
-                speed = step.speed_m_s
-            case Winch():
-                end = (here[0], here[1], here[2] - step.length_m)
-                pace = min(speed, step.speed_m_s or REEL_M_S)
-            case Release():
-                waiting = RELEASE_S
-            case Delay() | AttitudeRun():
-                waiting = step.duration_s
-            case Signals():
-                waiting = step.duration_s
-                end = add(here, evaluate(signal_table(step.terms), step.duration_s)[0])
-        if not isinstance(step, Signals):
-            moving = transfer_duration(dist(here, end), pace, accel)
-        yield Leg(item, step, here, end, moving, moving + waiting)
-        here = end
+
+def state_after(step: Step, before: MissionState, home: Vec3 = ZERO) -> MissionState:
+    """The state after a step. A take-off from an unknown place is taken to be from the origin."""
+    here = before.expected
+    match step:
+        case Takeoff(altitude_m=altitude):
+            if here is None:
+                return replace(before, expected=(0.0, 0.0, altitude), known=True)
+            return replace(before, expected=(here[0], here[1], altitude))
+        case Waypoint(east_m=east, north_m=north, altitude_m=altitude):
+            return replace(before, expected=(east, north, altitude), known=True)
+        case ReturnHome():
+            return before if here is None else replace(before, expected=(home[0], home[1], here[2]))
+        case Land():
+            # without a load the vehicle may land beside the load that lies there
+            known = before.known and not before.released
+            return before if here is None else replace(before, expected=(here[0], here[1], 0.0), known=known)
+        case Speed(speed_m_s=speed):
+            return replace(before, speed_m_s=speed)
+        case Winch(length_m=longer):
+            low = None if here is None else (here[0], here[1], here[2] - longer)
+            cable = None if before.cable_m is None else before.cable_m + longer
+            return replace(before, expected=low, cable_m=cable)
+        case Release():
+            if before.released:
+                return before
+            over = here if here is None else (here[0], here[1], here[2] + (before.cable_m or 0.0))
+            return replace(before, expected=over, known=False, released=True)
+        case Signals(duration_s=duration, terms=terms):
+            x, v, *_ = evaluate(signal_table(terms), duration)
+            known = before.known and dot(v, v) <= AT_REST_M2_S2
+            return replace(before, expected=None if here is None else add(here, x), known=known)
+        case AttitudeRun():
+            return replace(before, known=False)
+        case Delay():
+            return before
+    raise AssertionError(step)
+
+
+def return_place(here: Vec3, home: Vec3, rally: Iterable[Vec3]) -> Vec3:
+    """Where a return that is ordered by mode leads: home, or the rally point that is nearer, by the level
+    distance. A return among the steps of a mission leads home."""
+    return min((home, *rally), key=lambda place: dist(place[:2], here[:2]))
+
+
+def _seconds(step: Step, before: MissionState, after: MissionState, accel: float) -> tuple[float, float]:
+    """Time (s) in which the load travels, and in which it does not."""
+    speed, waiting = before.speed_m_s, 0.0
+    match step:
+        case Takeoff():
+            waiting, speed = TAUTEN_S, min(speed, VERTICAL_SPEED_M_S)
+        case Land():
+            waiting, speed = SET_DOWN_S, min(speed, VERTICAL_SPEED_M_S)
+        case Waypoint(hold_s=hold):
+            waiting = hold
+        case Winch(speed_m_s=rate):
+            speed = min(speed, rate or REEL_M_S)
+        case Release():
+            return 0.0, RELEASE_S
+        case Delay(duration_s=duration) | AttitudeRun(duration_s=duration) | Signals(duration_s=duration):
+            return 0.0, duration
+    if before.expected is None or after.expected is None:
+        return 0.0, waiting
+    return transfer_duration(dist(before.expected, after.expected), speed, accel), waiting
 
 
 def expected_duration_s(mission: Mission, speed: float = SPEED_M_S, accel: float = ACCEL_M_S2) -> float:
-    """Expected seconds from arming to the end of the mission: the sum over its legs."""
-    return sum(leg.duration_s for leg in legs(mission, speed, accel))
+    """Expected seconds from arming to the end of the mission: the sum over its steps."""
+    entries = timeline(mission.steps, MissionState(speed_m_s=speed), accel_m_s2=accel)
+    return sum(entry.duration_s for entry in entries)

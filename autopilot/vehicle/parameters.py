@@ -73,10 +73,10 @@ def definitions() -> ParameterFile:
 
 def autopilot_parameters(belief: Vehicle) -> ParameterTable:
     """The table, with the vehicle's numbers taken from `belief`."""
-    return ParameterTable(definitions().definitions(_vehicle_values(belief)))
+    return ParameterTable(definitions().definitions(vehicle_values(belief)))
 
 
-def _vehicle_values(belief: Vehicle) -> dict[str, float]:
+def vehicle_values(belief: Vehicle) -> dict[str, float]:
     """The numbers of the vehicle by the names that `from_vehicle` and `proportional_to` use."""
     from autopilot.wire.convert import ROTOR_FMAX
 

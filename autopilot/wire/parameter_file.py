@@ -7,22 +7,22 @@ A file of wrong keys or values raises ParameterError.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from autopilot.wire.parameter_table import Parameter, ParameterError
+from missions.toml_files import problems
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 Names = Annotated[dict[str, str], Field(min_length=2)]  # whole number: what it stands for
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-
-class ParameterSpec(_Strict):
+class ParameterSpec(BaseModel):
     """One table of the file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     text: str = Field(min_length=1)
     unit: str = ""
@@ -86,18 +86,12 @@ class ParameterSpec(_Strict):
         return 0.0, max(numbers) if self.bits is None else sum(numbers)
 
 
-class ParameterFile(_Strict):
+@dataclass(frozen=True)
+class ParameterFile:
     """A whole file: the title of each group of names, and the parameters in the order of the file."""
 
-    groups: dict[str, str]
-    parameters: dict[str, ParameterSpec]
-
-    @model_validator(mode="after")
-    def _grouped(self) -> ParameterFile:
-        for name in self.parameters:
-            if group_of(name) not in self.groups:
-                raise ValueError(f"{name} has no group; must begin with one of {', '.join(self.groups)}")
-        return self
+    groups: Mapping[str, str]
+    parameters: Mapping[str, ParameterSpec]
 
     def definitions(self, vehicle: Mapping[str, float]) -> list[Parameter]:
         """All parameters, with the defaults that this vehicle gives; ParameterError if one does not fit."""
@@ -115,17 +109,21 @@ def group_of(name: str) -> str:
 
 def parameter_file(document: Mapping[str, Any], where: str) -> ParameterFile:
     """The definitions in a TOML document: the table `groups`, and a table for each parameter."""
-    parameters = {name: table for name, table in document.items() if name != "groups"}
-    try:
-        return ParameterFile.model_validate({"groups": document.get("groups", {}), "parameters": parameters})
-    except ValidationError as error:
-        found = "; ".join(_problem(finding["loc"], finding["msg"]) for finding in error.errors())
-        raise ParameterError(f"{where}: {found}") from None
-
-
-def _problem(location: tuple[str | int, ...], message: str) -> str:
-    place = ".".join(str(part) for part in location if part != "parameters")
-    return f"{place}: {message.removeprefix('Value error, ')}" if place else message
+    groups: dict[str, str] = document["groups"]
+    parameters: dict[str, ParameterSpec] = {}
+    wrong: list[str] = []
+    for name, table in document.items():
+        if name == "groups":
+            continue
+        if group_of(name) not in groups:
+            wrong.append(f"{where}: {name} has no group; must begin with one of {', '.join(groups)}")
+        try:
+            parameters[name] = ParameterSpec.model_validate(table)
+        except ValidationError as error:
+            wrong += problems(error, ParameterSpec, where, name)
+    if wrong:
+        raise ParameterError("; ".join(wrong))
+    return ParameterFile(groups, parameters)
 
 
 def _exactly_one(spec: ParameterSpec, *keys: str) -> None:

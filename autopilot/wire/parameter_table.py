@@ -183,16 +183,6 @@ class ParameterTable:
         return ParameterError(f"{name}: no such parameter{hint}")
 
 
-def save_text(table: ParameterTable) -> str:
-    """All values as `NAME value` lines, each number with the digits that restore it exactly."""
-    lines = []
-    for name in table.names:
-        value = table[name]
-        text = str(int(value)) if table.describe(name).integer else repr(value)
-        lines.append(f"{name:<{NAME_LENGTH}} {text}\n")
-    return "".join(lines)
-
-
 def parse_text(text: str) -> dict[str, float]:
     """Names and numbers of a parameter file, unchecked against any table.
 
@@ -212,13 +202,3 @@ def parse_text(text: str) -> dict[str, float]:
         except ValueError:
             raise ParameterError(f"line {number}: {line.strip()[:60]!r}; must be NAME value") from None
     return found
-
-
-def load_text(table: ParameterTable, text: str) -> tuple[str, ...]:
-    """Set what `text` holds, all of it or nothing; returns the names set."""
-    found = parse_text(text)
-    for name, value in found.items():
-        table.check(name, value)
-    for name, value in found.items():
-        table.set(name, value)
-    return tuple(found)

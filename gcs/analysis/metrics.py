@@ -1,7 +1,7 @@
 """Numbers of a flight. Each function gives some keys of the record; None stands for what cannot be known.
 
 The mission window (`gcs.analysis.samples.in_window`) is taken at the time stamps of the true load state, or
-of the quantity itself for what the autopilot sends. `gcs.analysis.record` says what every key means.
+of the quantity itself for what the autopilot sends. `metrics.toml` says what every key means.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from gcs.analysis.definitions import METRICS
 from gcs.analysis.record import Record
 from gcs.experiments.plan import CASE_NAMES, CASES, LAW_NAMES, VEHICLE_SHORT, VEHICLES
 from gcs.experiments.results import ERROR_FUNCTIONS
@@ -180,11 +181,12 @@ def comparison_table(records: Sequence[Record]) -> Table:
 
 
 def better(ngc: Record, lqr: Record, key: str) -> str:
-    """Whose number is less; a flight that was lost is worse than any number."""
+    """Whose number is better; a flight that was lost is worse than any number."""
+    sign = -1.0 if METRICS[key].better == "more" else 1.0
 
     def cost(record: Record) -> float:
         value = record[key]
-        return float("inf") if value is None or record["outcome"] != "completed" else float(value)
+        return float("inf") if value is None or record["outcome"] != "completed" else sign * float(value)
 
     if cost(ngc) == cost(lqr):
         return NONE

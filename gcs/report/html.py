@@ -8,33 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.wire.dialect import plumbline as mavlink
-from gcs.analysis.record import GROUPS, KEY, FlightMeta, Record, shown
+from gcs.analysis.definitions import GROUPS, HEADLINE, METRICS, Metric
+from gcs.analysis.record import FlightMeta, Record
 from gcs.analysis.tracks import StatusText
 from gcs.report.plots import PICTURES, headline
 
 _TEMPLATE = "report.html"
-_FIRST = (
-    "load_error_max_m",
-    "load_error_rms_m",
-    "rise_time_90_s",
-    "overshoot_pct",
-    "settling_time_5pct_s",
-    "tilt_max_deg",
-    "saturated_fraction",
-    "slack_events",
-    "flight_s",
-)
-_FIRST_LABELS = {
-    "load_error_max_m": "greatest load error",
-    "load_error_rms_m": "RMS load error",
-    "rise_time_90_s": "rise to 90 %",
-    "overshoot_pct": "overshoot",
-    "settling_time_5pct_s": "settling to 5 %",
-    "tilt_max_deg": "greatest tilt",
-    "saturated_fraction": "rotors saturated",
-    "slack_events": "times slack",
-    "flight_s": "of flight",
-}
 _MOODS = {"completed": "good", "diverged": "bad", "lost": "bad"}
 _LEVELS = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
 
@@ -54,7 +33,7 @@ def render_page(record: Record, meta: FlightMeta, texts: tuple[StatusText, ...],
         reason=meta.reason,
         subtitle=_subtitle(record),
         figures=_figures(record),
-        groups=[{"title": group.title, "rows": _rows(group.keys, record)} for group in GROUPS],
+        groups=[{"title": group.title, "rows": _rows(metrics, record)} for group, metrics in GROUPS],
         settings=sorted(meta.settings.items()),
         pictures=[_picture(directory, picture.file, picture.caption) for picture in PICTURES],
         texts=[_text(text) for text in texts],
@@ -70,16 +49,16 @@ def _subtitle(record: Record) -> str:
 
 def _figures(record: Record) -> list[dict[str, str]]:
     return [
-        {"label": _FIRST_LABELS[name], "value": shown(KEY[name], record)}
-        for name in _FIRST
+        {"label": label, "value": METRICS[name].read(record)}
+        for name, label in HEADLINE.items()
         if record[name] is not None
     ]
 
 
-def _rows(keys: Any, record: Record) -> list[dict[str, str]]:
+def _rows(metrics: tuple[Metric, ...], record: Record) -> list[dict[str, str]]:
     return [
-        {"label": key.label, "value": shown(key, record), "definition": f"{key.name}: {key.definition}"}
-        for key in keys
+        {"label": metric.label, "value": metric.read(record), "definition": f"{metric.name}: {metric.text}"}
+        for metric in metrics
     ]
 
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
-from gcs.analysis.record import KEY, FlightMeta, Record, shown
+from gcs.analysis.definitions import METRICS
+from gcs.analysis.record import FlightMeta, Record
 from gcs.analysis.samples import CARRIED, Samples
 from gcs.analysis.tracks import Telemetry
 from gcs.report.style import (
@@ -340,7 +341,7 @@ def summary_line(record: Record) -> str:
     """The flight in one line."""
     parts = [str(record["outcome"])]
     parts += [f"{name} {record[name]}" for name in ("law", "sensors", "seed") if record[name] is not None]
-    worst, rms = (shown(KEY[name], record) for name in ("load_error_max_m", "load_error_rms_m"))
+    worst, rms = (METRICS[name].read(record) for name in ("load_error_max_m", "load_error_rms_m"))
     if record["load_error_max_m"] is not None:
         parts.append(f"load error max {worst}, RMS {rms}")
     if record["saturated_fraction"] is not None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gcs.analysis.record import GROUPS, Record, shown
+from gcs.analysis.definitions import GROUPS
+from gcs.analysis.record import Record
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -22,12 +23,12 @@ def record_table(record: Record) -> Table:
     table.add_column(style="dim")
     table.add_column()
     table.add_column(justify="right")
-    for group in GROUPS:
-        known = [key for key in group.keys if record.get(key.name) is not None]
-        for i, key in enumerate(known):
+    for group, metrics in GROUPS:
+        known = [metric for metric in metrics if record.get(metric.name) is not None]
+        for i, metric in enumerate(known):
             # values are data, not markup: a mission path may hold brackets
-            value = Text(shown(key, record))
-            if key.name == "outcome":
-                value.stylize(_OUTCOME_STYLES.get(str(record[key.name]), "bold yellow"))
-            table.add_row(group.title if i == 0 else "", key.label, value, end_section=i == len(known) - 1)
+            value = Text(metric.read(record))
+            if metric.name == "outcome":
+                value.stylize(_OUTCOME_STYLES.get(str(record[metric.name]), "bold yellow"))
+            table.add_row(group.title if i == 0 else "", metric.label, value, end_section=i == len(known) - 1)
     return table

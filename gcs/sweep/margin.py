@@ -18,6 +18,7 @@ from scipy.linalg import expm
 from autopilot.control.actuators.disturbance_observer import aloft
 from autopilot.control.actuators.rotor_model import Actuation, advance, rows_of, steady
 from autopilot.control.laws.interface import kernels_of
+from autopilot.control.linear_model import LOAD_STATES, hover_thrust, load_state_space
 from autopilot.control.records import Cable, Reference, State, Vehicle
 from autopilot.core.flight_core import Setup
 from autopilot.geometry.linear import E1, ZERO, Vec3
@@ -36,28 +37,16 @@ LOST = 1.0 + 1e-7  # spectral radius; what the law carries but does not use has 
 STRIDES = 12  # on the way from the value delivered to the end of the search
 HALVINGS = 6
 SETTLE_TICKS = 500  # in which the memory of a law comes to rest while hovering
-MOTION = 16  # x_L, v_L, q_x, q_y, their rates, rotation vector, Omega
 
 
-def plant(vehicle: Vehicle) -> tuple[Floats, Floats]:
-    """(A, B) of (2-30)-(2-35) at hover in the coordinates of MOTION, inputs f and M: linearised by hand."""
-    m_Q, L, g = vehicle.quad_mass, vehicle.cable_length, vehicle.gravity
-    m = m_Q + vehicle.load_mass
-    A, B = np.zeros((MOTION, MOTION)), np.zeros((MOTION, 4))
-    A[0:3, 3:6] = np.eye(3)
-    A[3, 6] = A[4, 7] = -g
-    B[5, 0] = 1.0 / m
-    A[6:8, 8:10] = np.eye(2)
-    A[8, 6] = A[9, 7] = A[8, 11] = -m * g / (m_Q * L)
-    A[9, 10] = m * g / (m_Q * L)
-    A[10:13, 13:16] = np.eye(3)
-    B[13:16, 1:4] = np.diag(1.0 / np.array(vehicle.inertia))
-    return A, B
+def sampled_plant(
+    A: Floats, B: Floats, tau: float, delay: float, period: float
+) -> tuple[Floats, Floats, Floats]:
+    """(A, B, C) from one tick to the next of x' = A x + B u with held commands u = (f, M): exact.
 
-
-def sampled_plant(vehicle: Vehicle, tau: float, delay: float, period: float) -> tuple[Floats, Floats, Floats]:
-    """(A, B, C) from tick to tick: motion, rotors of lag `tau`, commands on their way for `delay` (s)."""
-    A, B = plant(vehicle)
+    States are x (n), the rotors if their lag `tau` is not zero, and the commands on their way, oldest first;
+    C gives x. A command of tick k works from t_k + `delay` until that of tick k + 1 does. Times in seconds.
+    """
     n = len(A)
     if tau > 0.0:
         A = np.block([[A, B], [np.zeros((4, n)), -np.eye(4) / tau]])
@@ -72,7 +61,6 @@ def sampled_plant(vehicle: Vehicle, tau: float, delay: float, period: float) -> 
     Phi, _ = hold(period)
     Phi_new, Gamma_new = hold(period - late)
     Gamma_old = Phi_new @ hold(late)[1]
-    # commands on their way, oldest first
     m, queue = len(A), whole + 1
     size = m + 4 * queue
     A_d, B_d = np.zeros((size, size)), np.zeros((size, 4))
@@ -84,13 +72,13 @@ def sampled_plant(vehicle: Vehicle, tau: float, delay: float, period: float) -> 
         A_d[:m, m + 4 : m + 8] = Gamma_new
     A_d[m : size - 4, m + 4 :] = np.eye(4 * (queue - 1))
     B_d[size - 4 :] = np.eye(4)
-    C_d = np.zeros((MOTION, size))
-    C_d[:, :MOTION] = np.eye(MOTION)
+    C_d = np.zeros((n, size))
+    C_d[:, :n] = np.eye(n)
     return A_d, B_d, C_d
 
 
 def state_at(motion: Floats, vehicle: Vehicle) -> State:
-    """The state near hover with these coordinates, on its manifolds to second order."""
+    """The state near hover with these LOAD_STATES, on its manifolds to second order."""
     q_x, q_y = float(motion[6]), float(motion[7])
     q_z = -math.sqrt(1.0 - q_x * q_x - q_y * q_y)
     q = np.array([q_x, q_y, q_z])
@@ -138,11 +126,10 @@ def _like(record: Any, numbers: Iterator[float]) -> Any:
 def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
     """(A, B, C, D) of the law at hover: memory and motion in, memory and (f, M) out."""
     vehicle, law = setup.vehicle, setup.law
-    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
     observed = aloft(vehicle)
     kernels, cable = kernels_of(law), Cable(vehicle.cable_length)
-    hover = np.zeros(MOTION)
+    hover = np.zeros(LOAD_STATES)
 
     def tick(memory: Any, actuation: Actuation, motion: Floats) -> tuple[Any, Actuation, Floats]:
         state = state_at(motion, vehicle)
@@ -150,7 +137,7 @@ def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
         after = advance(actuation, command.thrust, command.moment, setup.actuation)
         return memory, after, np.array([command.thrust, *command.moment])
 
-    actuation = steady(weight, rows_of(setup.actuation))
+    actuation = steady(hover_thrust(vehicle), rows_of(setup.actuation))
     memory = kernels.start(law, state_at(hover, vehicle), ZERO, ZERO)
     for _ in range(SETTLE_TICKS):
         memory, actuation, _ = tick(memory, actuation, hover)
@@ -164,9 +151,9 @@ def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
         return np.array([*_numbers((after, moved)), *command])
 
     at = np.concatenate([rest, hover])
-    jacobian = np.empty((n + 4, n + MOTION))
-    for j in range(n + MOTION):
-        shift = np.zeros(n + MOTION)
+    jacobian = np.empty((n + 4, n + LOAD_STATES))
+    for j in range(n + LOAD_STATES):
+        shift = np.zeros(n + LOAD_STATES)
         shift[j] = STEP
         jacobian[:, j] = (step(at + shift) - step(at - shift)) / (2.0 * STEP)
     return jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
@@ -192,8 +179,8 @@ def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
         gravity=true.gravity,
     )
     delay = settings_of(sim_table).actuator_delay_us * 1e-6
-    A, B, C = sampled_plant(really, true.rotor_tau, delay, period)
-    world = control.ss(A, B, C, np.zeros((MOTION, 4)), period)
+    A, B, C = sampled_plant(*load_state_space(really), true.rotor_tau, delay, period)
+    world = control.ss(A, B, C, np.zeros((LOAD_STATES, 4)), period)
     law = control.ss(*linearised_law(setup), period)
     # the law's own sign closes the loop
     return sorted(np.abs(control.feedback(world, law, sign=1).poles()).tolist())

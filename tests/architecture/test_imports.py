@@ -1,10 +1,11 @@
 """Which room may import which, and who may touch the world.
 
-Missions and geometry stand alone; trajectory and wire on both; the vehicle on the wire; services, laws,
-estimator and guidance on those; the supervisor on guidance and services; the core of the flight on everything
-below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths and the definitions of
-parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. What a vehicle is and how a TOML file is
-read are leaves that every program shares. Sockets, clocks, threads and logging belong to the shells alone.
+Missions and geometry stand alone; trajectory on both, the wire on these; the vehicle on the wire; services,
+laws, estimator and guidance on those; the supervisor on guidance and services; the core of the flight on
+everything below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths and the
+definitions of parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. What a vehicle is and how
+a TOML file is read are leaves that every program shares. Sockets, clocks, threads and logging belong to the
+shells alone.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ GCS = (
     "autopilot.wire",
     "autopilot.shell.options",
     *VEHICLE,
+    "autopilot.vehicle.parameters",
     "sitl.sensors.shipped",
     "missions",
 )
@@ -36,7 +38,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.geometry": (),
     "autopilot.vehicle.model": (),
     "autopilot.trajectory": ("autopilot.geometry", "autopilot.vehicle.model", "missions"),
-    "autopilot.wire": ("autopilot.geometry", "missions"),
+    "autopilot.wire": ("autopilot.geometry", "autopilot.trajectory", "missions"),
     "autopilot.vehicle": ("autopilot.geometry", "missions", "autopilot.wire"),
     "autopilot.services": LEAVES,
     "autopilot.control": LEAVES,
@@ -74,7 +76,6 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "gcs.workflows.flight_inputs": (
         *GCS,
         "gcs",
-        "autopilot.vehicle.parameters",
         "sitl.sensors.files",
         "sitl.vehicles",
     ),
@@ -227,10 +228,9 @@ BAD = {
     "sitl/sensors/imu.py": "from gcs.analysis import align",
     "sitl/vehicles/loader.py": "from sitl.__main__ import main",
     "gcs/clients/flight.py": "from autopilot.core.tick import step",
-    "gcs/analysis/axes.py": "from autopilot.vehicle.parameters import LAWS",
     "gcs/analysis/align.py": "from sitl.plant.records import Truth",
     "gcs/commands/fly.py": "from sitl.sensors.files import load_profile",
-    "gcs/workflows/fly.py": "from autopilot.vehicle.parameters import LAWS",
+    "gcs/workflows/fly.py": "from sitl.vehicles.sim_parameters import sim_parameters",
     "gcs/clients/link.py": "from asyncio import sleep",
     "gcs/report/page.py": "import logging.handlers",
 }

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from autopilot.control.linear_model import LOAD_STATES, load_state_space
 from benchmarks import cascade_margin
 
 LINEAR = 1e-7  # central differences with step 1e-5 of equations whose third derivatives are of order 100
@@ -14,7 +15,7 @@ LINEAR = 1e-7  # central differences with step 1e-5 of equations whose third der
 
 def test_linear_model_is_that_of_the_equations(model: SimpleNamespace) -> None:
     vehicle, h = cascade_margin.BEBOP, 1e-5
-    A, B = cascade_margin.plant(vehicle)
+    A, B = load_state_space(vehicle)
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
 
     def rates(motion: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -25,11 +26,11 @@ def test_linear_model_is_that_of_the_equations(model: SimpleNamespace) -> None:
         return np.concatenate([d[0:6], d[6:8], q_ddot[0:2], motion[13:16], d[21:24]])
 
     u0 = np.array([weight, 0.0, 0.0, 0.0])
-    for j in range(cascade_margin.MOTION):
-        step = h * np.eye(cascade_margin.MOTION)[j]
+    for j in range(LOAD_STATES):
+        step = h * np.eye(LOAD_STATES)[j]
         column = (rates(step, u0) - rates(-step, u0)) / (2 * h)
         np.testing.assert_allclose(A[:, j], column, atol=LINEAR * 100)
-    zero = np.zeros(cascade_margin.MOTION)
+    zero = np.zeros(LOAD_STATES)
     for j in range(4):
         step = h * np.eye(4)[j]
         np.testing.assert_allclose(
@@ -61,6 +62,6 @@ def test_margin_ends_where_the_loop_is_lost() -> None:
     law = cascade_margin.linearised_law(settings, cascade_margin.BEBOP)
     for delay, holds in ((left, True), (left + 2e-4, False)):
         closed = cascade_margin.joined(
-            cascade_margin.sampled_plant(settings, cascade_margin.BEBOP, delay), law, np.ones(4)
+            cascade_margin.plant_of(settings, cascade_margin.BEBOP, delay), law, np.ones(4)
         )
         assert (cascade_margin.radius(closed) < cascade_margin.LOST) is holds

@@ -17,7 +17,7 @@ from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import encode_steps, located_steps
+from autopilot.wire.items import encode_steps
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator
@@ -48,7 +48,7 @@ class Craft:
     ) -> None:
         conditions = Conditions(sensors=sensors, seed=seed, settings=settings_)
         items = encode_steps(steps, Home()) if steps else ()
-        mission = StoredMission(items, located_steps(items, Home()))
+        mission = StoredMission(items)
         self.onboard: Onboard = build_onboard(conditions, Home(), mission)
         if not clock_waits:
             table = self.onboard.parameters

@@ -21,9 +21,9 @@ def test_turns() -> None:
         WireItem(2, m.MAV_CMD_DO_CHANGE_SPEED, 0, 1, 1.0, 1.0, -1.0, 0.0, 0, 0, 0.0),
         WireItem(6, m.MAV_CMD_NAV_LOITER_TURNS, 0, 1, 1.0, 0.0, 1.5, 0.0, lat, lon, 2.0),
     )
-    mission = StoredMission(items, located_steps(items, Home()))
+    mission = StoredMission(items)
     assert not plan_of(mission, Home(), SETTINGS.limits).prepared.refusal
-    craft = Craft(*(located.step for located in mission.steps))
+    craft = Craft(*(located.step for located in located_steps(items, Home())))
     craft.begin()
     widest = 0.0
 

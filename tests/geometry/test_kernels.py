@@ -79,7 +79,7 @@ def test_kernels_are_found() -> None:
     ],
 )
 def test_machine_code_is_stale_after_a_change_in_whatever_it_can_reach(
-    changed: str, stale: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    changed: str, stale: bool, tmp_path: Path
 ) -> None:
     files = {
         "autopilot/law.py": "from autopilot.middle import (\n    f,\n)\n",
@@ -89,16 +89,14 @@ def test_machine_code_is_stale_after_a_change_in_whatever_it_can_reach(
         "missions/path.py": "LENGTH = 1.0\n",
         "sitl/other.py": "from autopilot.law import g\n",
     }
-    monkeypatch.setattr(kernel, "_ROOT", tmp_path)
 
-    def hashed() -> str:
+    def hashed(root: Path) -> str:
         for name, text in files.items():
-            (tmp_path / name).parent.mkdir(exist_ok=True)
-            (tmp_path / name).write_text(text)
-        for kept in (kernel.sources_hash, kernel._imported, kernel._source):
-            kept.cache_clear()
-        return kernel.sources_hash(tmp_path / "autopilot/law.py")
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text)
+        return kernel.sources_hash(root / "autopilot/law.py", root)
 
-    before = hashed()
+    before = hashed(tmp_path / "before")
+    assert hashed(tmp_path / "copy") == before
     files[changed] += "# changed\n"
-    assert (hashed() != before) is stale
+    assert (hashed(tmp_path / "after") != before) is stale

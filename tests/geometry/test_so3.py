@@ -158,18 +158,6 @@ def test_the_quaternion_derivative_is_the_turning_of_the_body(seed: int, rate: V
     assert near(so3.quat_derivative(q, omega), difference, DIFFERENCE)  # type: ignore[arg-type]
 
 
-@given(seeds, st.lists(st.floats(-1e-3, 1e-3), min_size=9, max_size=9))
-@many
-def test_orthonormalisation(seed: int, error: list[float]) -> None:
-    R = rotation(seed).as_matrix()
-    out = so3.orthonormalise(rows(R + np.reshape(error, (3, 3))))
-    assert near(np.transpose(out) @ np.array(out), IDENTITY)
-    assert np.linalg.det(out) == pytest.approx(1.0, abs=ROUNDING)
-    # Gram-Schmidt moves a matrix by no more than a few times its distance from the group
-    assert near(out, R, 1e-2)
-    assert near(so3.orthonormalise(rows(R)), R)
-
-
 @given(seeds, seeds)
 @many
 def test_the_attitude_error_function(a: int, b: int) -> None:
@@ -192,24 +180,6 @@ def test_the_attitude_error_is_the_gradient_of_the_error_function(a: int, b: int
     ]
     slope = (turned[0] - turned[1]) / (2.0 * STEP)
     assert float(np.dot(so3.attitude_error(R, R_d), omega)) == pytest.approx(slope, abs=DIFFERENCE)
-
-
-@given(seeds, seeds, vectors, vectors)
-@many
-def test_the_rate_error(a: int, b: int, rate: Vec3, rate_d: Vec3) -> None:
-    """e_Omega is the rate of R_d^T R: d/dt (R_d^T R) = (R_d^T R) hat(e_Omega)."""
-    omega, omega_d = np.multiply(1e-3, rate), np.multiply(1e-3, rate_d)
-    r, r_d = rotation(a), rotation(b)
-    e = np.array(so3.rate_error(mat(r), mat(r_d), tuple(omega), tuple(omega_d)))
-
-    def relative(t: float) -> NDArray[np.float64]:
-        R_t = r.as_matrix() @ Rotation.from_rotvec(t * omega).as_matrix()
-        R_d_t = r_d.as_matrix() @ Rotation.from_rotvec(t * omega_d).as_matrix()
-        out: NDArray[np.float64] = R_d_t.T @ R_t
-        return out
-
-    slope = (relative(STEP) - relative(-STEP)) / (2.0 * STEP)
-    assert near(relative(0.0) @ np.array(so3.hat(tuple(e))), slope, DIFFERENCE)
 
 
 @given(seeds)

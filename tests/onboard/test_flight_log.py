@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +147,7 @@ def test_texts_before_arming_begin_the_log_and_a_changed_parameter_is_in_it(
 ) -> None:
     table = autopilot_parameters(load_vehicle("bebop"))
     log = FlightLog(table, "0.1.0", BOOT_US)
-    sample = partial(log_sample_of, flown.onboard)
+    sample = flown.onboard.log_sample
     log.say(10, 4, "not ready")
     log.step(1000, True, 50.0, set, sample)
     table.set("NGC_KX", 7.0)

@@ -11,12 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.onboard.onboard import Onboard
+from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Phase
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home, hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
+from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem, located_steps
 from gcs.closed_loop import Conditions, build_onboard
-from missions.model import Delay, Land, Takeoff, Waypoint
+from missions.model import Delay, Land, ReturnHome, Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
 from tests.doubles.motion import TICK_S
 
@@ -211,6 +214,35 @@ def test_a_mission_is_not_uploaded_over_the_one_being_flown() -> None:
     assert acks
     assert acks[-1] != mavlink.MAV_MISSION_ACCEPTED
     assert craft.flight.mission.plan is plan
+
+
+def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it() -> None:
+    """A height change behind a return stays over the home to which the return leads."""
+    home = Home()
+    up, back, low = (
+        WireItem(6, 22, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 4.0),
+        WireItem(2, 20, 0, 1, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0),
+        WireItem(2, 186, 0, 1, 2.0, 3.0, 0.0, 0.0, 0, 0, 0.0),
+    )
+    items = (up, back, low)
+    stored = StoredMission(items, located_steps(items, home))
+    autopilot = build_onboard(Conditions(), home, stored)
+    autopilot.add_link(GCS)
+    autopilot.receive_sensors(sensors(0))
+    plan = autopilot._state.flight.mission.plan
+    assert plan.steps[-1] == Waypoint(0.0, 0.0, 2.0)
+    east, north = 3.0, 1.0
+    latitude, longitude, _ = geodetic_from_enu((east, north, 0.0), home)
+    place = mavlink.MAVLink_command_int_message(
+        1, 1, 6, 179, 0, 0, 0.0, 0.0, 0.0, 0.0, latitude, longitude, 0.0
+    )
+    autopilot.receive_ground(FrameWriter(255, 190).frame(place), GCS)
+    flight = autopilot._state.flight
+    assert flight.area.home[:2] == pytest.approx((east, north), abs=0.01)
+    plan = flight.mission.plan
+    assert plan.steps == (Takeoff(4.0), ReturnHome(), Waypoint(flight.area.home[0], flight.area.home[1], 2.0))
+    assert len(plan.prepared.made) == 3
+    assert not plan.prepared.pending
 
 
 def test_the_same_sensors_give_the_same_answers_and_the_same_telemetry() -> None:

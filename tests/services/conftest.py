@@ -16,7 +16,7 @@ from autopilot.services.snapshot import Snapshot
 from autopilot.wire.codec import FrameWriter, Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, encode_steps, located_steps
+from autopilot.wire.items import WireItem, encode_steps
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from missions.model import Takeoff, Waypoint
 
@@ -141,7 +141,7 @@ STREAMED = [
 
 def make_rig(mission: tuple[WireItem, ...] = (), identity: Identity | None = None) -> Rig:
     table = make_table()
-    stored = StoredMission(mission, located_steps(mission, HOME))
+    stored = StoredMission(mission)
     rig = Rig(VehicleEndpoint(identity or Identity(), HOME, table, stored), table)
     rig.endpoint.add_link("gcs")
     return rig

@@ -13,8 +13,9 @@ from autopilot.services.mission_store import MAX_ITEMS
 from autopilot.services.missions import ASK_US, ECHO_US, ECHOES, INT_ASKS, LATE_US, MAX_ASKS
 from autopilot.services.records import MissionChanged, Verdict
 from autopilot.services.requests import ReplaceMission
+from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.items import WireItem
+from autopilot.wire.items import WireItem, located_steps
 
 ACK, INT, REQUEST = "MISSION_ACK", "MISSION_REQUEST_INT", "MISSION_REQUEST"
 
@@ -342,7 +343,7 @@ def test_for_clients_of_ardupilot_there_is_always_home(rig_with, as_message, as_
     sent = (home, *items(2))
     assert upload(rig, sent, as_message) == [(ACK, m.MAV_MISSION_ACCEPTED)]
     assert rig.endpoint.mission.items == sent
-    assert [step.first for step in rig.endpoint.mission.steps] == [1, 2]
+    assert [step.first for step in located_steps(rig.endpoint.mission.items, Home())] == [1, 2]
     assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1))) == [("MISSION_COUNT", 3)]
 
 

@@ -20,7 +20,7 @@ from autopilot.shell.storage import (
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
-from autopilot.wire.items import encode_steps, located_steps
+from autopilot.wire.items import encode_steps
 from autopilot.wire.parameter_table import ParameterTable
 from missions.fileformat import load_mission, shipped
 
@@ -33,7 +33,7 @@ def table() -> ParameterTable:
 
 def stored(name: str) -> StoredMission:
     items = encode_steps(load_mission(name).steps, HOME)
-    return StoredMission(items, located_steps(items, HOME))
+    return StoredMission(items)
 
 
 @pytest.mark.parametrize("name", shipped())

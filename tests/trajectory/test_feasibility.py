@@ -9,7 +9,7 @@ from math import cos, inf, pi, radians, sqrt
 import pytest
 
 from autopilot.trajectory.feasibility import VehicleLimits, check, peaks
-from autopilot.trajectory.timeline import SET_DOWN_S, TAUTEN_S, expected_duration_s, legs
+from autopilot.trajectory.timeline import SET_DOWN_S, TAUTEN_S, MissionState, expected_duration_s, timeline
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import load_vehicle
 from missions.fileformat import load_mission, shipped
@@ -151,10 +151,10 @@ def test_an_attitude_run_of_the_vehicle_carries_the_weight_on_a_slope() -> None:
     assert along.thrust.value == pytest.approx(0.5 * 9.81 / cos(radians(20.0)), rel=1e-6)
 
 
-def test_legs_follow_the_load() -> None:
+def test_the_timeline_follows_the_load() -> None:
     push = Signals(5.0, (Term("x", 3.0, 0.0, 4.0, None, 0.0), Term("y", 1.0, 0.0, 1.0, 1.0, 1.0)))
     plan = mission(Waypoint(1.0, 2.0, 3.0, 4.0), push, Delay(2.0), ReturnHome())
-    found = list(legs(plan, 2.0, 1.0))
+    found = list(timeline(plan.steps, MissionState(speed_m_s=2.0), accel_m_s2=1.0))
     assert [leg.end for leg in found] == [
         (0.0, 0.0, 2.0),
         (1.0, 2.0, 3.0),

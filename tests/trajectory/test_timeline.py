@@ -1,11 +1,172 @@
-"""How long a mission should take."""
+"""Where the load is after each step of a mission, where nobody can say, and how long it should take."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
-from autopilot.trajectory.timeline import expected_duration_s
-from missions.model import Delay, Land, Mission, Signals, Speed, Takeoff, Term, Waypoint
+from autopilot.trajectory.feasibility import VehicleLimits
+from autopilot.trajectory.peaks import survey_transfer
+from autopilot.trajectory.prepare import prepare
+from autopilot.trajectory.timeline import (
+    ANYWHERE,
+    RELEASE_S,
+    MissionState,
+    expected_duration_s,
+    return_place,
+    state_after,
+    timeline,
+)
+from autopilot.trajectory.transfer import transfer_duration
+from autopilot.trajectory.waypoint_path import Passage
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    Mission,
+    Release,
+    ReturnHome,
+    Signals,
+    Speed,
+    Step,
+    Takeoff,
+    Term,
+    Waypoint,
+    Winch,
+)
+
+HOME = (4.0, -3.0, 0.0)
+HERE = MissionState(expected=(1.0, 2.0, 3.0), cable_m=0.7, speed_m_s=1.0)
+AWAY = Signals(5.0, (Term("x", 2.0, 0.0, 4.0, None, 0.0), Term("z", 0.5, 0.0, 1.0, 1.0, 1.0)))
+UNFINISHED = Signals(2.0, AWAY.terms)  # cut off halfway, at full speed
+RUN = AttitudeRun("load", 0.1, 0.0, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("step", "position"),
+    [
+        (Takeoff(5.0), (1.0, 2.0, 5.0)),
+        (Waypoint(7.0, 8.0, 9.0, 1.0), (7.0, 8.0, 9.0)),
+        (Delay(3.0), (1.0, 2.0, 3.0)),
+        (Speed(2.0), (1.0, 2.0, 3.0)),
+        (ReturnHome(), (4.0, -3.0, 3.0)),
+        (AWAY, (3.0, 2.0, 3.0)),
+        (Winch(0.5), (1.0, 2.0, 2.5)),
+        (Winch(-0.25), (1.0, 2.0, 3.25)),
+        (Land(), (1.0, 2.0, 0.0)),
+        (RUN, None),
+        (UNFINISHED, None),
+        (Release(), None),
+    ],
+)
+def test_where_a_step_leaves_the_load(step: Step, position: tuple[float, float, float] | None) -> None:
+    assert state_after(step, HERE, HOME).position == position
+
+
+def test_what_else_a_step_changes() -> None:
+    assert state_after(Speed(2.0), HERE).speed_m_s == 2.0
+    assert state_after(Winch(0.5), HERE).cable_m == pytest.approx(1.2)
+    assert state_after(Winch(0.5), ANYWHERE).cable_m is None, "a length that was not told stays untold"
+    assert [state_after(step, HERE).released for step in (Release(), Winch(0.5), Land())] == [
+        True,
+        False,
+        False,
+    ]
+
+
+def test_a_release_leaves_the_vehicle_a_cable_length_above_the_load() -> None:
+    steps = (Takeoff(2.0), Winch(0.5), Release(), Delay(1.0), ReturnHome(), Waypoint(5.0, 0.0, 4.0), Land())
+    found = list(timeline(steps, MissionState(cable_m=0.7), HOME))
+    let_go = found[2].after
+    assert let_go.expected == pytest.approx((0.0, 0.0, 1.5 + 1.2))
+    assert let_go.position is None, "a setpoint leads nowhere yet"
+    assert (found[2].transfer_s, found[2].duration_s) == (0.0, RELEASE_S)
+    assert found[4].end == pytest.approx((4.0, -3.0, 2.7))
+    assert found[4].after.position is None, "at the height that it has"
+    assert found[5].after.position == (5.0, 0.0, 4.0)
+    assert found[6].after.position is None, "beside the load, if that lies there"
+
+
+def test_the_drift_of_an_attitude_run_ends_at_the_next_waypoint() -> None:
+    steps = (
+        Takeoff(2.0),
+        RUN,
+        Delay(1.0),
+        Takeoff(3.0),
+        ReturnHome(),
+        AWAY,
+        Waypoint(1.0, 1.0, 2.0),
+        Delay(1.0),
+    )
+    found = list(timeline(steps, MissionState(), HOME))
+    assert [entry.after.position is None for entry in found] == [False, *[True] * 5, False, False]
+    assert found[5].end == pytest.approx((6.0, -3.0, 3.0)), "what is expected goes on"
+
+
+def test_from_an_unknown_place_only_what_names_a_place_is_known() -> None:
+    for step in (ReturnHome(), Delay(1.0), AWAY, Winch(0.2), Land(), Release()):
+        assert state_after(step, ANYWHERE, HOME).expected is None
+    assert state_after(Takeoff(2.0), ANYWHERE, HOME).position == (0.0, 0.0, 2.0)
+    assert state_after(Waypoint(1.0, 2.0, 3.0), ANYWHERE).position == (1.0, 2.0, 3.0)
+    (entry,) = timeline((Waypoint(100.0, 0.0, 2.0, 4.0),), ANYWHERE)
+    assert (entry.transfer_s, entry.duration_s) == (0.0, 4.0), "nobody knows how far it is"
+
+
+def test_states_join_and_a_return_says_where_it_leads() -> None:
+    steps = (Takeoff(2.0), Speed(0.5), Waypoint(4.0, 0.0, 2.0), ReturnHome(), Land())
+    found = list(timeline(steps, MissionState(), HOME, 1.0))
+    assert [entry.item for entry in found] == [0, 1, 2, 3, 4]
+    assert all(a.after == b.before for a, b in pairwise(found))
+    assert [entry.home for entry in found] == [None, None, None, HOME, None]
+    assert found[2].transfer_s == transfer_duration(4.0, 0.5, 1.0)
+    assert found[3].transfer_s == transfer_duration(3.0, 0.5, 1.0)
+
+
+def test_a_return_by_mode_leads_to_the_nearest_of_home_and_rally_points() -> None:
+    rally = ((10.0, 0.0, 0.0), (0.0, 9.0, 0.0))
+    assert return_place((8.0, 1.0, 500.0), HOME, rally) == rally[0], "heights do not count"
+    assert return_place((4.0, 0.0, 2.0), HOME, rally) == HOME
+    assert return_place((8.0, 1.0, 2.0), HOME, ()) == HOME
+
+
+# ---- the paths that are prepared
+
+LIMITS = VehicleLimits().shaping
+CORNERS = (Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0))
+
+
+def passages(*steps: Step, home: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> list[Passage | None]:
+    made = prepare(steps, range(len(steps)), LIMITS, home).made
+    return [one if isinstance(one, Passage) else None for one in made]
+
+
+def test_a_path_through_waypoints_begins_at_the_home_that_is_set() -> None:
+    found = passages(Takeoff(2.0), ReturnHome(), *CORNERS, home=HOME)
+    assert found[2] is not None and found[2].start == (4.0, -3.0, 2.0)
+
+
+def test_a_path_through_waypoints_begins_where_the_winch_left_the_load() -> None:
+    found = passages(Takeoff(2.0), Winch(0.5), *CORNERS)
+    assert found[2] is not None and found[2].start == (0.0, 0.0, 1.5)
+
+
+@pytest.mark.parametrize("step", [RUN, Release()])
+def test_a_path_through_waypoints_does_not_begin_where_nobody_knows(step: Step) -> None:
+    assert passages(Takeoff(2.0), step, *CORNERS) == [None] * 4
+
+
+def test_the_least_time_of_a_return_is_that_of_the_way_to_the_home_that_is_set() -> None:
+    weak = LIMITS._replace(bounds=LIMITS.bounds._replace(rotor_high=1.24), accel_m_s2=2.5, speed_m_s=15.0)
+    far = (20.0, 0.0, 0.0)
+    least = prepare((Takeoff(5.0), ReturnHome()), range(2), weak, far).least_s[1]
+    assert least > transfer_duration(20.0, 15.0, 2.5)
+    along = survey_transfer((0.0, 0.0, 5.0), (20.0, 0.0, 5.0), least, weak.body)
+    assert along.rotor_high.value <= 1.24
+    assert prepare((Takeoff(5.0), ReturnHome()), range(2), weak).least_s[1] == 0.0, "there is no way to go"
+
+
+# ---- how long it takes
 
 
 def seconds(*steps):

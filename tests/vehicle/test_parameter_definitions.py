@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import fields
 
 import pytest
 
-from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.file import VEHICLES, load_vehicle
 from autopilot.vehicle.parameters import (
     DEFAULT_LAW,
     LAWS,
@@ -18,7 +17,9 @@ from autopilot.vehicle.parameters import (
     SHAPE_WITH_PLUMBLINE,
     autopilot_parameters,
     definitions,
+    vehicle_values,
 )
+from autopilot.wire.convert import ROTOR_FMAX
 from sitl.vehicles.sim_parameters import definitions as sim_definitions
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
@@ -38,7 +39,7 @@ def test_the_constants_of_shaping_are_its_values():
     assert (never, with_plumbline, always) == ("never", "with the law plumbline", "always")
 
 
-@pytest.mark.parametrize("name", shipped_vehicles())
+@pytest.mark.parametrize("name", VEHICLES.names())
 def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     belief = load_vehicle(name)
     table = autopilot_parameters(belief)
@@ -54,21 +55,14 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     assert world.describe("SIM_QUAD_MASS").high == truth.quad_mass * 100.0
 
 
-def test_every_number_of_the_vehicle_has_a_parameter():
-    """Each field of the belief, moved, moves a default."""
-    belief = load_vehicle("heavy")
-    before = autopilot_parameters(belief).values()
-    for field in fields(Belief):
-        value = getattr(belief, field.name)
-        moved = tuple(1.5 * v for v in value) if isinstance(value, tuple) else not value
-        if isinstance(value, float):
-            moved = 1.5 * value + 1e-3
-        after = autopilot_parameters(Belief(**{**vars(belief), field.name: moved})).values()
-        assert after != before, field.name
+def test_every_number_that_is_taken_from_the_vehicle_is_a_default():
+    taken = [spec.vehicle_keys for spec in definitions().parameters.values()]
+    assert frozenset().union(*taken) == vehicle_values(load_vehicle("bebop")).keys()
 
 
-def test_parameters_are_no_vehicle():
-    assert shipped_vehicles() == ("bebop", "heavy", "thesis")
+def test_without_a_rotor_limit_the_forces_are_those_of_the_wire():
+    table = autopilot_parameters(load_vehicle("thesis"))
+    assert (table["VEH_ROTOR_LIM"], table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]) == (0.0, 0.0, ROTOR_FMAX)
 
 
 def test_what_is_measured_on_the_bench_has_a_parameter_on_either_side():

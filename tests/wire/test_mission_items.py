@@ -339,6 +339,30 @@ def test_a_landing_elsewhere_is_a_transfer_first() -> None:
     assert decode_items([item(22, frame=6, z=4.0), item(21, frame=6)], HOME) == (Takeoff(4.0), Land())
 
 
+def test_places_that_other_items_lead_to_are_known() -> None:
+    """Where the flight will be: the end of signals, straight above where it is, the home that is set."""
+    latitude, longitude, _ = geodetic_from_enu((30.0, 40.0, 0.0), HOME)
+    there = {"frame": 6, "x": latitude, "y": longitude}
+    up, low = item(22, frame=6, z=4.0), item(186, 2.0, 3.0)
+    away = encode_steps([Takeoff(1.0), Signals(5.0, (Term("x", 2.0, 0.0, 4.0, None, 0.0),))], HOME)[1:]
+    assert decode_items([up, *away, low], HOME)[-1] == Waypoint(2.0, 0.0, 2.0)
+    *_, go, down = decode_items([up, *away, item(21, **there)], HOME)
+    assert isinstance(go, Waypoint) and down == Land()
+    assert (go.east_m, go.north_m, go.altitude_m) == pytest.approx((30.0, 40.0, 4.0), abs=PLACE_M)
+    go, higher, lower = decode_items([item(16, z=4.0, **there), item(22, frame=6, z=9.0), low], HOME)
+    assert isinstance(go, Waypoint) and higher == Takeoff(9.0)
+    assert lower == Waypoint(go.east_m, go.north_m, 2.0)
+    for home, place in (((0.0, 0.0, 0.0), (0.0, 0.0)), ((7.0, -5.0, 0.0), (7.0, -5.0))):
+        located = located_steps([up, item(16, z=4.0, **there), item(20), low], HOME, home)
+        assert located[-1].step == Waypoint(*place, 2.0)
+
+
+@pytest.mark.parametrize("unknown", [item(31013, 1.0, 0.1, x=1500), item(211, 1.0, 0.0)])
+def test_after_what_leaves_no_known_place_a_height_alone_is_refused(unknown: WireItem) -> None:
+    with pytest.raises(MissionItemError, match="nothing before it says where the load hangs"):
+        decode_items([item(22, frame=6, z=4.0), unknown, item(186, 2.0, 3.0)], HOME)
+
+
 def test_commands_for_other_things_are_kept_and_not_flown() -> None:
     assert (
         decode_items(

@@ -56,14 +56,14 @@ def test_defaults_of_the_vehicle():
 
 
 WRONG = {
-    '[AB_C]\ntext = "A"\nrange = [0, 1]\n': "AB_C: has none of default, from_vehicle; must have one of them",
+    '[AB_C]\ntext = "A"\nrange = [0, 1]\n': "AB_C has none of default, from_vehicle; must have one of them",
     '[AB_C]\ntext = "A"\ndefault = 1\nfrom_vehicle = "m"\nrange = [0, 1]\n': "has default and from_vehicle",
-    '[AB_C]\ntext = "A"\ndefault = 1\n': "AB_C: has none of range, range_factor, values, bits",
-    '[AB_C]\ntext = "A"\ndefault = 1\nrange = [0]\n': "AB_C.range: List should have at least 2 items",
-    '[AB_C]\ntext = "A"\ndefault = 1\nrange = [0, inf]\n': "AB_C.range.1: Input should be a finite number",
-    '[AB_C]\ntext = "A"\ndefault = "1"\nrange = [0, 1]\n': "AB_C.default: Input should be a valid number",
-    "[AB_C]\ndefault = 1\nrange = [0, 1]\n": "AB_C.text: Field required",
-    '[AB_C]\ntext = "A"\ndefault = 1\nrange = [0, 1]\nunits = "m"\n': "AB_C.units: Extra inputs are not",
+    '[AB_C]\ntext = "A"\ndefault = 1\n': "AB_C has none of range, range_factor, values, bits",
+    '[AB_C]\ntext = "A"\ndefault = 1\nrange = [0]\n': "AB_C.range = [0]; must be a list of at least 2",
+    '[AB_C]\ntext = "A"\ndefault = 1\nrange = [0, inf]\n': "AB_C.range[1] = inf; must be a finite number",
+    '[AB_C]\ntext = "A"\ndefault = "1"\nrange = [0, 1]\n': 'AB_C.default = "1"; must be a number',
+    "[AB_C]\ndefault = 1\nrange = [0, 1]\n": "AB_C.text is missing",
+    '[AB_C]\ntext = "A"\ndefault = 1\nrange = [0, 1]\nunits = "m"\n': "AB_C.units: unknown key; write unit",
     '[AB_C]\ntext = "A"\ndefault = 1\nvalues = { 1 = "a", 2 = "b" }\n': "has values 1, 2; must count from 0",
     '[AB_C]\ntext = "A"\ndefault = 1\nbits = { 1 = "a", 3 = "b" }\n': "has bits 1, 3; must be 1, 2, 4 ...",
     '[AB_C]\ntext = "A"\nfrom_vehicle = "m"\nproportional_to = { m = 1 }\nrange = [0, 1]\n': "to without def",

@@ -14,9 +14,7 @@ from autopilot.wire.parameter_table import (
     ParameterError,
     ParameterTable,
     decimal_from_float32,
-    load_text,
     parse_text,
-    save_text,
 )
 
 quick = settings(max_examples=200, deadline=None, derandomize=True)
@@ -129,17 +127,6 @@ def test_the_decimal_is_the_same_float32(value: float) -> None:
     assert math.isnan(decimal) or float32(decimal) == value
 
 
-@given(st.floats(-50.0, 50.0), st.floats(0.1, 0.7), st.integers(100, 1000))
-@quick
-def test_a_file_restores_every_digit(wind: float, gain: float, rate: int) -> None:
-    saved, restored = table(), table()
-    saved.set("SIM_WIND_E", wind)
-    saved.set("LAW_GAIN", gain)
-    saved.set("SIM_RATE_HZ", rate)
-    assert set(load_text(restored, save_text(saved))) == set(saved.names)
-    assert restored.values() == saved.values()
-
-
 def test_other_tools_files_are_read() -> None:
     mavproxy = "# a comment\nSIM_WIND_E      3.500000\nLAW_GAIN 0.2 # why\n\n"
     planner = "SIM_WIND_E,3.5\nLAW_GAIN,0.2\n"
@@ -152,10 +139,3 @@ def test_other_tools_files_are_read() -> None:
 def test_a_malformed_file_names_its_line(text: str) -> None:
     with pytest.raises(ParameterError, match=r"^line 2: "):
         parse_text("LAW_GAIN 0.2\n" + text)
-
-
-def test_a_file_is_loaded_whole_or_not_at_all() -> None:
-    parameters = table()
-    with pytest.raises(ParameterError):
-        load_text(parameters, "SIM_WIND_E 3\nLAW_GAIN 99\n")
-    assert (parameters.changed(), parameters.version) == ({}, 0)

@@ -8,7 +8,7 @@ from typing import Any
 from autopilot.services.records import Verdict
 from autopilot.services.requests import ReplaceMission, SetCurrent, StartMission
 from autopilot.supervisor.mission import at_step, begin_step, step_event
-from autopilot.supervisor.requests.mission_checks import leaves_fence, needs_load, reels_too_far
+from autopilot.supervisor.requests.mission_checks import lift_altitude_m, mission_trouble, upload_trouble
 from autopilot.supervisor.requests.takeoff import take_off
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
@@ -25,12 +25,9 @@ def begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         return flight, denied("Mission denied: there is none")
     if plan.prepared.pending:
         return flight, Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "Mission begins when its paths are prepared")
-    beyond = leaves_fence(flight, plan.steps, plan.sequence, settings)
-    if beyond:
-        return flight, denied(f"Mission denied: {beyond}")
-    without = needs_load(flight) or reels_too_far(flight, settings)
-    if without:
-        return flight, denied(f"Mission denied: {without}")
+    trouble = mission_trouble(flight, view, settings)
+    if trouble:
+        return flight, denied(f"Mission denied: {trouble}")
     if plan.prepared.refusal:
         return flight, denied(f"Mission denied: {plan.prepared.refusal}")
     if flight.phase == Phase.DISARMED:
@@ -39,8 +36,7 @@ def begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         flight, mission=replace(flight.mission, active=True, done=False), selected=Selected.MISSION
     )
     if flight.phase == Phase.ARMED:
-        first = next((s for s in plan.steps if isinstance(s, model.Takeoff)), None)
-        altitude = settings.motion.takeoff_altitude_m if first is None else first.altitude_m
+        altitude = lift_altitude_m(plan, settings)
         flight = replace(flight, mission=replace(flight.mission, takeoff_altitude_m=altitude))
         return take_off(flight, view, settings), ACCEPTED
     event = Event.LAND if isinstance(plan.steps[flight.mission.step], model.Land) else Event.MISSION
@@ -79,6 +75,9 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
     if flight.mission.active and flight.phase == Phase.SET_DOWN:
         return flight, wrong_phase(flight, f"Mission item {request.seq}")
     if flight.mission.active and flight.phase in (Phase.MISSION, Phase.LOWER):
+        trouble = mission_trouble(moved, view, settings)
+        if trouble:
+            return flight, denied(f"Mission item {request.seq} denied: {trouble}")
         return begin_step(moved, step_event(moved), view, settings), ACCEPTED
     return moved, ACCEPTED
 
@@ -88,7 +87,8 @@ def replace_mission(flight: Flight, request: ReplaceMission, view: View, setting
     if flight.mission.active and flight.phase not in ON_GROUND:
         return flight, denied("Mission denied: the present one is being flown; pause it first")
     steps = tuple(located.step for located in request.steps)
-    beyond = leaves_fence(flight, steps, tuple(located.first for located in request.steps), settings)
+    sequence = tuple(located.first for located in request.steps)
+    beyond = upload_trouble(flight, steps, sequence, view, settings)
     if beyond:
         return flight, denied(f"Mission denied: {beyond}")
     return flight, ACCEPTED

@@ -1,85 +1,147 @@
-"""What is looked at before a mission is flown: the fence, the load, the winch."""
+"""What a mission is refused for before it is flown: the fence, a load that is gone, the winch.
+
+Each check walks the timeline of the steps (`autopilot.trajectory.timeline`) from where the flight stands.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from autopilot.geometry.linear import Vec3, axpy, norm, sub
+from autopilot.supervisor.motion import length_at, stop
 from autopilot.supervisor.requests.limits import LEAST_ALTITUDE_M
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, forbidden
+from autopilot.supervisor.state import ON_GROUND, Flight, MissionPlan, View, below, forbidden
 from autopilot.supervisor.step_legs import LEAST_REEL_M
-from missions import model
+from autopilot.trajectory.timeline import ANYWHERE, MissionState, TimelineEntry, timeline
+from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
-WAY_M, MOST_PIECES = 0.25, 4000  # at which a way between waypoints is looked at
+WAY_M, MOST_PIECES = 0.25, 4000  # spacing of the places at which a way is looked at, and how many at most
+
+Ahead = list[tuple[int, TimelineEntry]]  # each with its mission item
 
 
-def leaves_fence(
-    flight: Flight, steps: tuple[model.Step, ...], sequence: tuple[int, ...], settings: Settings
+def mission_trouble(flight: Flight, view: View, settings: Settings) -> str:
+    """Which item that is still to be flown must not be flown from here, and why; an empty string: none."""
+    ahead = steps_ahead(flight, view, settings)
+    return leaves_fence(flight, ahead, settings) or needs_load(ahead) or reels_too_far(ahead, settings)
+
+
+def upload_trouble(
+    flight: Flight, steps: Sequence[Step], sequence: Sequence[int], view: View, settings: Settings
 ) -> str:
-    """Which item of a mission leads over the fence, and why; an empty string if none does.
+    """Which item of a mission that is uploaded leads over the fence, and why; an empty string: none.
 
-    Places and the straight ways between them are looked at; signals are watched in flight.
+    On the ground it begins where the load stands; in the air it may be begun anywhere.
+    """
+    start = replace(ANYWHERE, cable_m=settings.cable_length_m, released=flight.cable.released)
+    if flight.phase in ON_GROUND:
+        start = _on_ground(flight, view, settings)
+    ahead = list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
+    return leaves_fence(flight, ahead, settings)
+
+
+def steps_ahead(flight: Flight, view: View, settings: Settings) -> Ahead:
+    """The steps that are left of the mission, flown from where the load is or comes to rest."""
+    mission, cable = flight.mission, flight.cable
+    steps, sequence = mission.plan.steps[mission.step :], mission.plan.sequence[mission.step :]
+    if flight.phase in ON_GROUND:
+        start = _on_ground(flight, view, settings)
+        lift = Takeoff(lift_altitude_m(mission.plan, settings))
+        if isinstance(steps[0], Takeoff):
+            steps = (lift, *steps[1:])
+        else:  # lifted unasked
+            steps, sequence = (lift, *steps), (sequence[0], *sequence)
+    else:
+        here = stop(flight, view, settings)[1]
+        length = length_at(flight, here, settings)
+        if mission.step_anchor is not None and isinstance(steps[0], Signals | AttitudeRun):
+            here = mission.step_anchor  # begun anew, from where it began
+        if cable.reel_to_m is not None and isinstance(steps[0], Winch):  # taken up again
+            steps = (replace(steps[0], length_m=cable.reel_to_m - length), *steps[1:])
+        start = MissionState(here, cable_m=length, released=cable.released)
+    return list(zip(sequence, timeline(steps, start, flight.area.home), strict=True))
+
+
+def lift_altitude_m(plan: MissionPlan, settings: Settings) -> float:
+    """Height to which a mission that begins on the ground is lifted, whichever step it begins with."""
+    first = next((step for step in plan.steps if isinstance(step, Takeoff)), None)
+    return settings.motion.takeoff_altitude_m if first is None else first.altitude_m
+
+
+def _on_ground(flight: Flight, view: View, settings: Settings) -> MissionState:
+    """Where the load stands, or the vehicle without it; anywhere while the estimate is not fit for flight."""
+    released = flight.cable.released
+    here = view.x_quad if released else view.x_load
+    start = ANYWHERE if view.complaints else MissionState(here)
+    return replace(start, cable_m=settings.cable_length_m, released=released)
+
+
+def leaves_fence(flight: Flight, ahead: Ahead, settings: Settings) -> str:
+    """Which item leads over the fence, and why; an empty string if none does.
+
+    Looked at are the straight ways to take-off height, to waypoints and home, and the places at which signals
+    and the winch leave the load; signals and curves between waypoints are watched in flight.
     """
     if not settings.fence.action:
         return ""
-    here: Vec3 | None = None
-    for step, seq in zip(steps, sequence, strict=True):
-        match step:
-            case model.Takeoff(altitude_m=height):
-                places: list[Vec3] = [(0.0, 0.0, height)]
-            case model.Waypoint(east_m=east, north_m=north, altitude_m=height):
-                there = (east, north, height)
-                before = there if here is None else here
-                pieces = min(max(1, math.ceil(norm(sub(there, before)) / WAY_M)), MOST_PIECES)
-                places = [axpy((k + 1) / pieces, sub(there, before), before) for k in range(pieces)]
-            case _:
-                continue
-        here = places[-1]
-        why = next(filter(None, (forbidden(flight.area.fence, place, settings) for place in places)), "")
+    for seq, entry in ahead:
+        why = _why_forbidden(flight, entry, settings)
         if why:
             return f"item {seq} leads {why}"
     return ""
 
 
-def _ahead(flight: Flight) -> Iterator[tuple[model.Step, int]]:
-    """The steps that are still to be flown, each with the mission item it came from."""
-    first, plan = flight.mission.step, flight.mission.plan
-    return zip(plan.steps[first:], plan.sequence[first:], strict=True)
+def _why_forbidden(flight: Flight, entry: TimelineEntry, settings: Settings) -> str:
+    begin, end, cable = entry.before.expected, entry.after.expected, entry.after.cable_m
+    if end is None or not isinstance(entry.step, Takeoff | Waypoint | ReturnHome | Signals | Winch):
+        return ""
+    if cable is not None:
+        settings = replace(settings, cable_length_m=cable)
+
+    def why(place: Vec3) -> str:
+        load = below(place, settings) if entry.after.released else place
+        return forbidden(flight.area.fence, load, settings)
+
+    straight = not isinstance(entry.step, Signals | Winch)
+    # a way that begins over the fence leads back: only its end counts
+    if begin is None or not straight or why(begin):
+        return why(end)
+    return next(filter(None, map(why, _along(begin, end))), "")
 
 
-def needs_load(flight: Flight) -> str:
-    """Which item that is still to be flown swings a load that is released by then; an empty string: none."""
-    released = flight.cable.released
-    for step, seq in _ahead(flight):
-        if isinstance(step, model.Release):
-            released = True
-        elif released and isinstance(step, model.Signals | model.AttitudeRun):
+def _along(begin: Vec3, end: Vec3) -> Iterable[Vec3]:
+    """Places on a straight way, at most WAY_M apart, up to its end."""
+    way = sub(end, begin)
+    pieces = min(max(1, math.ceil(norm(way) / WAY_M)), MOST_PIECES)
+    return (axpy((k + 1) / pieces, way, begin) for k in range(pieces))
+
+
+def needs_load(ahead: Ahead) -> str:
+    """Which item swings a load that is released by then; an empty string: none."""
+    for seq, entry in ahead:
+        if entry.before.released and isinstance(entry.step, Signals | AttitudeRun):
             return f"item {seq} needs the load, which is released"
     return ""
 
 
-def reels_too_far(flight: Flight, settings: Settings) -> str:
-    """Which item that is still to be flown asks too much of the winch; an empty string: none."""
-    length = settings.cable_length_m
-    for step, seq in _ahead(flight):
-        if not isinstance(step, model.Winch):
+def reels_too_far(ahead: Ahead, settings: Settings) -> str:
+    """Which item asks too much of the winch; an empty string: none."""
+    for seq, entry in ahead:
+        step, left = entry.step, entry.after
+        if not isinstance(step, Winch):
             continue
         if not settings.winch.usable:
             return f"item {seq}: the law lqr flies one length of the cable"
-        if flight.cable.released:
+        if left.released:
             return f"item {seq} needs the load, which is released"
         if step.speed_m_s is not None and step.speed_m_s > settings.winch.speed_m_s:
             return f"item {seq}: {step.speed_m_s:g} m/s exceeds WNC_SPEED {settings.winch.speed_m_s:g}"
-        length += step.length_m
-        if flight.cable.reel_to_m is not None:  # taken up again
-            length, flight = (
-                flight.cable.reel_to_m,
-                replace(flight, cable=replace(flight.cable, reel_to_m=None)),
-            )
-        beyond = reel_trouble(length, math.inf, settings)
+        assert left.cable_m is not None, "a flight knows its cable"
+        height = math.inf if left.position is None else left.position[2]
+        beyond = reel_trouble(left.cable_m, height, settings)
         if beyond:
             return f"item {seq}: {beyond}"
     return ""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from autopilot.geometry.linear import Vec3
+from autopilot.trajectory.timeline import MissionState
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.fields import Field
@@ -30,15 +30,6 @@ class Fate(Enum):
     FLOWN = "flown"
     KEPT = "kept"  # stored and given back, and not flown
     REFUSED = "refused"
-
-
-@dataclass(frozen=True)
-class LoadState:
-    """What the steps so far have led to."""
-
-    left_at: Vec3 | None = None  # where the load hangs (the vehicle, once it is released), if that is known
-    released: bool = False
-    speed_m_s: float | None = None  # the last that was set
 
 
 @dataclass(frozen=True)
@@ -64,7 +55,7 @@ class Asked:
     seq: int
     item: WireItem
     home: Home
-    state: LoadState
+    state: MissionState
     command: Command
 
     def __getitem__(self, attribute: str) -> Any:

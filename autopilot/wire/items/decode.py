@@ -5,25 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.trajectory.timeline import ANYWHERE, state_after
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items.command import Asked, Command, Fate, LoadState
+from autopilot.wire.items.command import Asked, Command, Fate
 from autopilot.wire.items.fields import choice
 from autopilot.wire.items.limits import MOST_FACTORS, MOST_FLOWN, MOST_JUMPS, MOST_TERMS
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
 from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, fate
-from missions.model import (
-    AttitudeRun,
-    Release,
-    ReturnHome,
-    Signals,
-    Speed,
-    Step,
-    Takeoff,
-    Term,
-    Waypoint,
-    Winch,
-)
+from missions.model import Signals, Step, Term
 
 _TERM, _FACTOR, _RUN = (
     mavlink.PLUMBLINE_LOAD_SIGNAL_TERM,
@@ -37,9 +28,12 @@ def decode_items(items: Sequence[WireItem], home: Home) -> tuple[Step, ...]:
     return tuple(located.step for located in located_steps(items, home))
 
 
-def located_steps(items: Sequence[WireItem], home: Home) -> tuple[LocatedStep, ...]:
-    """As `decode_items`, each step with the items that MISSION_CURRENT and MISSION_ITEM_REACHED name."""
-    reader = _Reader(home)
+def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO) -> tuple[LocatedStep, ...]:
+    """As `decode_items`, each step with the items that MISSION_CURRENT and MISSION_ITEM_REACHED name.
+
+    Places are relative to `home`; a return leads to `return_to` (m, ENU), which DO_SET_HOME moves.
+    """
+    reader = _Reader(home, return_to)
     jumps: dict[int, int] = {}
     flown = seq = 0
     while seq < len(items):
@@ -70,12 +64,13 @@ def unflown(items: Sequence[WireItem]) -> tuple[int, ...]:
 class _Reader:
     """Goes through the items in order: terms gather until their run; the state of the load is followed."""
 
-    def __init__(self, home: Home) -> None:
+    def __init__(self, home: Home, return_to: Vec3) -> None:
         self.steps: list[LocatedStep] = []
         self._home = home
+        self._return_to = return_to
         self._terms: list[Term] = []
         self._first_term = 0
-        self._state = LoadState()
+        self._state = ANYWHERE  # after the steps so far
 
     def read(self, seq: int, item: WireItem) -> None:
         becomes = fate(item.command)
@@ -106,7 +101,7 @@ class _Reader:
 
     def _add(self, located: LocatedStep) -> None:
         self.steps.append(located)
-        self._state = _after(located.step, self._state)
+        self._state = state_after(located.step, self._state, self._return_to)
 
     def _term(self, asked: Asked) -> None:
         if len(self._terms) == MOST_TERMS:
@@ -134,7 +129,6 @@ class _Reader:
         signals = Signals(asked["duration_s"], tuple(self._terms))
         self._add(LocatedStep(self._first_term, asked.seq, signals))
         self._terms = []
-        self._state = replace(self._state, left_at=None)
 
 
 def _steps(asked: Asked, row: Command) -> Iterable[Step]:
@@ -142,27 +136,6 @@ def _steps(asked: Asked, row: Command) -> Iterable[Step]:
     if row.needs_load:
         asked.expect_load()
     return (asked.record(),) if row.reads is None else row.reads(asked)
-
-
-def _after(step: Step, before: LoadState) -> LoadState:
-    """The state after a step."""
-    at = before.left_at
-    match step:
-        case Takeoff(altitude_m):
-            return replace(before, left_at=(0.0, 0.0, altitude_m))
-        case Waypoint(east_m, north_m, altitude_m):
-            return replace(before, left_at=(east_m, north_m, altitude_m))
-        case ReturnHome() if at is not None:
-            return replace(before, left_at=(0.0, 0.0, at[2]))
-        case Winch(length_m) if at is not None:
-            return replace(before, left_at=(at[0], at[1], at[2] - length_m))
-        case Release():
-            return replace(before, left_at=None, released=True)
-        case AttitudeRun():
-            return replace(before, left_at=None)
-        case Speed(speed_m_s):
-            return replace(before, speed_m_s=speed_m_s)
-    return before
 
 
 def _why_refused(command: int) -> str:

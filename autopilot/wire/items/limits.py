@@ -13,7 +13,6 @@ SLOWEST_M_S, FASTEST_M_S = 0.01, 100.0
 MOST_JUMPS = 1000  # repetitions of one jump
 MOST_FLOWN = 4000  # items, those that jumps repeat counted again
 MOST_TURNS, MOST_RADIUS_M = 1000.0, 1000.0
-TURN_SPEED_M_S = 1.5  # of NAV_LOITER_TURNS where no speed was set before
 TURN_ACCEL_M_S2 = 1.0  # centripetal
 LONGEST_CABLE_M, FASTEST_REEL_M_S = 100.0, 1.0
 LEAST_REELED_M = 0.3  # height at which a winch leaves the load

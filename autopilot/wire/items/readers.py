@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from autopilot.trajectory.timeline import state_after
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.command import Asked
 from autopilot.wire.items.fields import check
@@ -16,7 +17,6 @@ from autopilot.wire.items.limits import (
     LOWEST_M,
     SHORTEST_PERIOD_S,
     TURN_ACCEL_M_S2,
-    TURN_SPEED_M_S,
 )
 from autopilot.wire.items.records import ABSOLUTE_FRAMES
 from missions.model import Axis, Land, Release, Signals, Sine, Speed, Step, Term, Waypoint, Winch
@@ -41,8 +41,7 @@ def turns(asked: Asked) -> Iterator[Step]:
     if radius == 0.0 or count == 0.0:
         return
     asked.expect_load()
-    fastest = asked.state.speed_m_s or TURN_SPEED_M_S
-    speed = min(fastest, math.sqrt(TURN_ACCEL_M_S2 * abs(radius)))
+    speed = min(asked.state.speed_m_s, math.sqrt(TURN_ACCEL_M_S2 * abs(radius)))
     period = max(2.0 * math.pi * abs(radius) / speed, SHORTEST_PERIOD_S)
     quarter = 0.5 * math.pi
     # clockwise seen from above for a positive radius: east as the sine, north as the cosine
@@ -56,7 +55,7 @@ def turns(asked: Asked) -> Iterator[Step]:
 
 def gate(asked: Asked) -> Iterator[Step]:
     """Where a ground station has a survey begin and end: flown to like a waypoint."""
-    left_at = asked.state.left_at
+    left_at = asked.state.position
     if asked.item.param2 != 0.0:
         height = asked["altitude_m"]
     elif left_at is not None:
@@ -71,9 +70,9 @@ def change_altitude(asked: Asked) -> Iterator[Step]:
     sea_level = asked.home.altitude_m if asked["frame"] in ABSOLUTE_FRAMES else 0.0
     height = asked.item.param1 - sea_level
     height = check(asked.seq, 1, "height above home", height, "m", LOWEST_M, FARTHEST_M)
-    if asked.state.left_at is None:
+    if asked.state.position is None:
         raise asked.refused("nothing before it says where the load hangs")
-    yield Waypoint(asked.state.left_at[0], asked.state.left_at[1], height)
+    yield Waypoint(asked.state.position[0], asked.state.position[1], height)
 
 
 def change_speed(asked: Asked) -> Iterator[Step]:
@@ -98,18 +97,18 @@ def winch(asked: Asked) -> Iterator[Step]:
     asked["winch"]
     asked["action"]
     step = Winch(asked["length_m"], asked["speed_m_s"])
-    if asked.state.left_at is None:
+    left_at = state_after(step, asked.state).position
+    if left_at is None:
         raise asked.refused("nothing before it says how high the load hangs")
-    height = asked.state.left_at[2] - step.length_m
-    if height < LEAST_REELED_M:
-        text = f"it would leave the load at {height:.2f} m; least {LEAST_REELED_M} m"
+    if left_at[2] < LEAST_REELED_M:
+        text = f"it would leave the load at {left_at[2]:.2f} m; least {LEAST_REELED_M} m"
         raise asked.refused(text, mavlink.MAV_MISSION_INVALID_PARAM3)
     yield step
 
 
 def land(asked: Asked) -> Iterator[Step]:
     """Down; at a place that is not where the load hangs, there first."""
-    left_at = asked.state.left_at
+    left_at = asked.state.position
     if asked.is_placed() and asked.state.released and left_at is None:
         text = "nothing between it and the release says how high the vehicle flies; put a waypoint there"
         raise asked.refused(text)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from autopilot.trajectory.timeline import SPEED_M_S
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import readers
 from autopilot.wire.items.command import Command, Fate
@@ -27,7 +28,6 @@ from autopilot.wire.items.limits import (
     SHORTEST_RUN_S,
     SLOWEST_M_S,
     TURN_ACCEL_M_S2,
-    TURN_SPEED_M_S,
 )
 from autopilot.wire.items.records import GLOBAL_FRAMES
 from missions.model import (
@@ -85,7 +85,7 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_NAV_LOITER_TURNS,
         "to the centre, out along a spiral of one turn, the turns (clockwise for a positive radius), back "
-        f"along another; at the last speed that was set ({TURN_SPEED_M_S:g} m/s before any), with at most "
+        f"along another; at the last speed that was set ({SPEED_M_S:g} m/s before any), with at most "
         f"{TURN_ACCEL_M_S2:g} m/s^2 inwards",
         (
             Number(1, "turns", "turns", "", 0.0, MOST_TURNS),
@@ -173,7 +173,7 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_NAV_RETURN_TO_LAUNCH,
-        "over home at the height it has; as the last item and down, as a return that is ordered by mode",
+        "over home (not a rally point) at the height it has; and down where it is the last item",
         (),
         ReturnHome,
         written=True,

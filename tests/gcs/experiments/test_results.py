@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from gcs.analysis.record import KEYS
+from gcs.analysis.definitions import METRICS
 from gcs.errors import GcsError
 from gcs.experiments import thesis
 from gcs.experiments.figures.canvas import Scene
@@ -59,7 +59,7 @@ def test_a_flight_that_is_lost_ends_where_it_is(scene):
 def test_a_record_has_case_law_vehicle_the_flight_record_and_the_printed_values(records):
     for r in records:
         assert list(r)[:2] == ["case", "law"]
-        assert {key.name for key in KEYS} < set(r)
+        assert METRICS.keys() < set(r)
         assert {"vehicle", "report_dir", "lost_after_s", "error_functions", "printed", "difference"} < set(r)
         assert set(r["error_functions"]) == set(ERROR_FUNCTIONS)
         for decay in r["error_functions"].values():

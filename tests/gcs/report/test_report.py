@@ -13,7 +13,8 @@ from PIL import Image
 from pyarrow import parquet
 from rich.console import Console
 
-from gcs.analysis.record import KEYS, FlightMeta, jsonable
+from gcs.analysis.definitions import METRICS
+from gcs.analysis.record import FlightMeta, jsonable
 from gcs.analysis.telemetry import load_telemetry
 from gcs.report import style
 from gcs.report.build import ReportError, build_report, load_meta
@@ -63,7 +64,7 @@ def test_all_files_are_there(built):
 
 def test_the_record_has_every_key_in_order(built):
     out, record, _ = built
-    assert list(record) == [*(key.name for key in KEYS), "report_dir"]
+    assert list(record) == [*METRICS, "report_dir"]
     assert strict((out / "summary.json").read_text()) == record
     assert record["outcome"] == "completed"
     assert record["report_dir"] == str(out)
@@ -152,8 +153,8 @@ def test_the_page_says_what_matters_and_escapes_what_it_was_given(page):
     text = " ".join(page.text)
     for part in (META.title, META.command, "completed", "SIM_WIND_E", "Rotor 2 at its limit <b>&amp;"):
         assert part in text
-    for key in KEYS:
-        assert key.label in text
+    for metric in METRICS.values():
+        assert metric.label in text
 
 
 def test_parquet_has_units_phases_and_the_record(built):

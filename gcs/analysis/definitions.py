@@ -1,0 +1,85 @@
+"""The figures of a flight record as `metrics.toml` defines them: their meaning, and how people read them."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.resources import files
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+FILE = "metrics.toml"
+UNKNOWN = "–"
+_ONE_METRE = 1.0  # lengths from here on are shown in metres and not in millimetres
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class Metric(_Strict):
+    """One key of the record."""
+
+    name: str
+    group: str
+    label: str = Field(min_length=1)
+    text: str = Field(min_length=1)
+    unit: str = ""
+    shown: str | None = None
+    scale: float = Field(1.0, gt=0.0)
+    decimals: int | None = Field(None, ge=0)
+    better: Literal["less", "more"] | None = None
+
+    def read(self, record: dict[str, Any]) -> str:
+        """The recorded value as people read it, with its unit; an en dash where it is not known."""
+        value = record.get(self.name)
+        if value is None:
+            return UNKNOWN
+        unit = self.unit if self.shown is None else self.shown
+        if unit == "mm" and abs(value) >= _ONE_METRE:
+            return f"{value:.2f} m"
+        text = f"{value * self.scale:.{self.decimals}f}" if self.decimals is not None else str(value)
+        return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
+
+
+class Group(_Strict):
+    """Figures that are shown together; `note` is for the documentation."""
+
+    title: str
+    note: str = ""
+
+
+class MetricFile(_Strict):
+    """The whole file."""
+
+    groups: dict[str, Group]
+    headline: dict[str, str]
+    metrics: dict[str, Metric]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, document: dict[str, Any]) -> dict[str, Any]:
+        metrics = {name: {"name": name, **table} for name, table in document["metrics"].items()}
+        return {**document, "metrics": metrics}
+
+    @model_validator(mode="after")
+    def _known(self) -> MetricFile:
+        for name, metric in self.metrics.items():
+            if metric.group not in self.groups:
+                raise ValueError(f"{name}.group = {metric.group}; must be one of {', '.join(self.groups)}")
+        for name in self.headline:
+            if name not in self.metrics:
+                raise ValueError(f"headline.{name}: no such metric")
+        return self
+
+    def of(self, group: str) -> tuple[Metric, ...]:
+        """The metrics of a group, in order."""
+        return tuple(metric for metric in self.metrics.values() if metric.group == group)
+
+
+_FILE = MetricFile.model_validate(tomllib.loads((files(__package__) / FILE).read_text(encoding="utf-8")))
+METRICS: dict[str, Metric] = _FILE.metrics  # by key, in the order of the record
+GROUPS: tuple[tuple[Group, tuple[Metric, ...]], ...] = tuple(
+    (group, _FILE.of(name)) for name, group in _FILE.groups.items()
+)
+HEADLINE: dict[str, str] = _FILE.headline  # key: label at the top of the report

@@ -1,0 +1,310 @@
+"""The timeline of a mission is what is flown, and a mission is refused for it before flight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import accumulate
+from typing import Any
+
+import pytest
+
+from autopilot.core.flight_core import with_cable_now
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.services.requests import Arm, Pause, ReplaceMission, Reposition, SetCurrent, StartMission
+from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.state import Phase
+from autopilot.trajectory.prepare import prepare
+from autopilot.trajectory.timeline import MissionState, state_after, timeline
+from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.fence import Disc, Fence, Polygon
+from autopilot.wire.items import LocatedStep
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    Release,
+    ReturnHome,
+    Signals,
+    Speed,
+    Step,
+    Takeoff,
+    Term,
+    Waypoint,
+    Winch,
+)
+from tests.doubles.sky import ACCEPTED, LOAD_RADIUS, SETTINGS, Sky
+
+DENIED = m.MAV_RESULT_DENIED
+HOME, RALLY = (2.0, -1.0, 0.0), ((3.0, 1.0, 0.0),)
+STOOD_AT = (0.5, 0.25, LOAD_RADIUS)
+AWAY = Signals(5.0, (Term("x", -1.5, 0.0, 4.0, None, 0.0),))
+RUN = AttitudeRun("load", 0.1, 0.0, 1.5)
+
+# ---- the timeline is what is flown
+
+FLOWN: dict[str, tuple[Step, ...]] = {
+    "waypoints and a return": (
+        Takeoff(2.0),
+        Waypoint(3.0, 0.0, 2.0, 1.0),
+        Speed(2.0),
+        Waypoint(3.0, 2.0, 3.0),
+        Waypoint(1.0, 3.0, 2.5),
+        Waypoint(0.0, 2.0, 2.0),
+        ReturnHome(),
+        Delay(0.5),
+        Land(),
+    ),
+    "signals that lead away": (
+        Takeoff(2.0),
+        Delay(1.0),
+        AWAY,
+        AWAY,
+        Waypoint(0.0, 0.0, 2.0),
+        AWAY,
+        ReturnHome(),
+    ),
+    "up in the air": (Takeoff(2.0), Waypoint(2.0, 0.0, 2.0), Takeoff(4.0), Delay(0.2), ReturnHome(), Land()),
+    "the winch": (
+        Takeoff(2.0),
+        Winch(0.5),
+        Waypoint(2.0, 0.0, 2.0),
+        Winch(0.3, 0.2),
+        ReturnHome(),
+        Winch(-0.6),
+        Land(),
+    ),
+    "a delivery": (
+        Takeoff(2.0),
+        Waypoint(2.0, 0.0, 2.0),
+        Winch(0.6),
+        Release(),
+        Delay(0.5),
+        ReturnHome(),
+        Waypoint(-1.0, 0.0, 3.0),
+        Land(),
+    ),
+    "attitude runs": (Takeoff(2.0), RUN, RUN, Waypoint(1.0, 0.0, 2.0), ReturnHome(), Land()),
+}
+
+
+def flown(sky: Sky) -> list[Vec3]:
+    """Where each step of a mission ends, by the legs of the flight."""
+    plan = sky.flight.mission.plan
+    found: list[Vec3] = []
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    while len(found) < len(plan.steps):
+        before = sky.flight
+        sky.tick()
+        sky.flight = with_cable_now(sky.flight, sky.now_us)
+        if sky.flight.cable.length_m is not None:
+            sky.settings = replace(sky.settings, cable_length_m=sky.flight.cable.length_m)
+        here = sky.view.x_quad if before.cable.released else sky.view.x_load
+        last = before.legs[-1] if before.legs else None
+        ended = here if last is None or last.duration_s > 1e6 else last.jet(last.duration_s)[0]
+        # all but the first of several that end in one tick take no time
+        found += [ended] * (len(sky.reached) - len(found))
+        assert sky.now_us < 400e6, (sky.flight.phase, sky.flight.mission.step)
+    return found
+
+
+@pytest.mark.parametrize("steps", FLOWN.values(), ids=FLOWN)
+def test_every_step_ends_where_the_timeline_says(steps: tuple[Step, ...]) -> None:
+    sky = Sky(*steps)
+    area = replace(sky.flight.area, home=HOME, rally=RALLY)
+    plan = sky.flight.mission.plan
+    prepared = prepare(plan.steps, plan.sequence, SETTINGS.limits, HOME)
+    sky.flight = replace(with_plan(sky.flight, replace(plan, prepared=prepared)), area=area)
+    sky.view = sky.view._replace(x_load=STOOD_AT)
+    start = MissionState(STOOD_AT, cable_m=SETTINGS.cable_length_m)
+    expected = list(timeline(plan.steps, start, HOME))
+    drifted = list(accumulate(isinstance(step, AttitudeRun) for step in plan.steps))
+    compared = 0
+    for entry, there, runs in zip(expected, flown(sky), drifted, strict=True):
+        if isinstance(entry.step, Land):
+            apart = 0.5 * SETTINGS.cable_length_m + 0.1 if entry.after.released else 1e-6
+            assert there[:2] == pytest.approx(entry.end[:2], abs=apart)
+        elif entry.after.position is not None or not runs:
+            assert there == pytest.approx(entry.end, abs=1e-6), entry
+            compared += 1
+    assert compared >= 3
+    if any(isinstance(step, Winch) for step in steps):
+        assert sky.settings.cable_length_m == pytest.approx(expected[-1].after.cable_m, abs=1e-9)
+
+
+# ---- the fence before flight
+
+# a square, and in it a disc to the north of home
+SQUARE = Polygon(True, ((-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)))
+FENCE = Fence((SQUARE, Disc(False, (0.0, 3.0), 1.0)))
+AROUND = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 4.5, 2.0), Waypoint(0.0, 4.5, 2.0))
+ZONE, OUTSIDE = "in an exclusion zone of the fence", "outside the fence"
+
+
+def fenced(*steps: Step, home: Vec3 = ZERO, fence: Fence = FENCE, **changes: Any) -> Sky:
+    settings = replace(SETTINGS, fence=replace(SETTINGS.fence, **changes))
+    sky = Sky(*steps, settings=settings)
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=fence, home=home))
+    return sky
+
+
+def uploaded(sky: Sky, *steps: Step) -> str | None:
+    """What an upload of the steps is answered."""
+    located = tuple(LocatedStep(i, i, step) for i, step in enumerate(steps))
+    return sky.ask(ReplaceMission(len(steps), located)).text
+
+
+@pytest.mark.parametrize(
+    ("home", "why"),
+    [
+        (ZERO, ZONE),  # straight through the disc
+        ((0.5, 2.5, 0.0), ZONE),  # into it
+        ((-8.0, 4.5, 0.0), OUTSIDE),
+        ((4.0, 4.0, 0.0), ""),
+    ],
+)
+def test_a_return_over_the_fence_is_refused_at_upload_and_at_start(home: Vec3, why: str) -> None:
+    for end in ((), (Land(),)):
+        sky = fenced(*AROUND, ReturnHome(), *end, home=home)
+        text = f"Mission denied: item 4 leads {why}" if why else None
+        assert (uploaded(sky, *AROUND, ReturnHome(), *end) or None) == text
+        sky.ask(Arm(True, False))
+        verdict = sky.ask(StartMission(None))
+        assert (verdict.result, verdict.text or None) == (DENIED if why else ACCEPTED, text)
+
+
+def test_a_return_among_the_steps_leads_home_past_a_nearer_rally_point() -> None:
+    """As it is flown: rally points are where a return by mode leads."""
+    sky = fenced(*AROUND, ReturnHome())
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, rally=((1.0, 4.5, 0.0),)))
+    assert uploaded(sky, *AROUND, ReturnHome()) == f"Mission denied: item 4 leads {ZONE}"
+
+
+def test_no_return_is_refused_where_no_fence_is_heeded() -> None:
+    sky = fenced(*AROUND, ReturnHome(), action=0)
+    assert not uploaded(sky, *AROUND, ReturnHome())
+
+
+def test_the_way_begins_where_the_load_stands() -> None:
+    steps = (Takeoff(2.0), Waypoint(-3.0, 3.0, 2.0), Land())
+    sky = fenced(*steps)
+    assert not uploaded(sky, *steps)
+    sky.view = sky.view._replace(x_load=(3.0, 3.0, LOAD_RADIUS), x_quad=(3.1, 3.0, 0.06))
+    assert uploaded(sky, *steps) == f"Mission denied: item 1 leads {ZONE}"
+    assert sky.ask(StartMission(None)).text == f"Mission denied: item 1 leads {ZONE}"
+    # an estimate that is not there yet says nothing
+    sky.view = sky.view._replace(complaints=("position not settled",))
+    assert not uploaded(sky, *steps)
+
+
+def test_the_end_of_signals_is_a_place_and_the_next_way_begins_there() -> None:
+    north = Signals(5.0, (Term("y", 6.0, 0.0, 4.0, None, 0.0),))
+    assert uploaded(fenced(), Takeoff(2.0), north, Land()) == f"Mission denied: item 1 leads {OUTSIDE}"
+    short = Signals(5.0, (Term("y", 4.5, 0.0, 4.0, None, 0.0),))
+    assert not uploaded(fenced(), Takeoff(2.0), short, Land())
+    text = uploaded(fenced(), Takeoff(2.0), short, Waypoint(0.0, 1.0, 2.0), Land())
+    assert text == f"Mission denied: item 2 leads {ZONE}"
+
+
+def test_a_longer_cable_needs_more_height_and_a_released_load_less() -> None:
+    """A fence of 3 m is one for the vehicle, 0.7 m above the load."""
+    high = Waypoint(1.0, 0.0, 2.2)
+    low = {"height_m": 3.0, "fence": Fence()}
+    assert not uploaded(fenced(**low), Takeoff(2.0), high, Land())
+    text = uploaded(fenced(**low), Takeoff(2.0), Winch(0.5), high, Land())
+    assert text == "Mission denied: item 2 leads higher than GF_MAX_VER_DIST 3 m"
+    alone = Waypoint(1.0, 0.0, 2.9)
+    assert uploaded(fenced(**low), Takeoff(2.0), alone) is not None
+    assert not uploaded(fenced(**low), Takeoff(2.0), Release(), alone, ReturnHome())
+    text = uploaded(fenced(**low), Takeoff(2.0), Release(), Waypoint(1.0, 0.0, 3.1))
+    assert text == "Mission denied: item 2 leads higher than GF_MAX_VER_DIST 3 m"
+
+
+def test_in_the_air_the_way_from_here_counts_at_the_start_and_not_at_the_upload() -> None:
+    steps = (Waypoint(0.0, 4.5, 2.0), Land())
+    sky = fenced(*steps).airborne()
+    assert not uploaded(sky, *steps)
+    before = sky.flight
+    assert sky.ask(StartMission(None)).text == f"Mission denied: item 0 leads {ZONE}"
+    assert sky.flight == before
+    assert sky.ask(Reposition(3.0, 0.0, 2.0, True)).result == ACCEPTED
+    sky.wait(8.0)
+    assert sky.ask(Reposition(3.0, 4.5, 2.0, True)).result == ACCEPTED
+    sky.wait(8.0)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+
+
+def test_a_mission_that_begins_outside_may_lead_back() -> None:
+    sky = fenced(Waypoint(1.0, 0.0, 2.0), Land()).airborne()
+    beyond = Fence((Disc(True, (4.0, 0.0), 3.5),))
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, fence=beyond))
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+
+
+def test_another_item_is_not_jumped_to_over_the_fence() -> None:
+    steps = (*AROUND, Waypoint(3.0, 4.5, 2.0), Waypoint(3.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0), Land())
+    sky = fenced(*steps)
+    sky.ask(StartMission(None))
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: s.flight.mission.step == 4)
+    before = sky.flight
+    verdict = sky.ask(SetCurrent(6))
+    assert (verdict.result, verdict.text) == (DENIED, f"Mission item 6 denied: item 6 leads {ZONE}")
+    assert sky.flight == before
+    assert sky.ask(SetCurrent(7)).result == ACCEPTED, "to land where it is"
+
+
+# ---- winch and release before flight
+
+
+def test_a_winch_that_would_leave_the_load_too_low_from_here_is_refused() -> None:
+    sky = Sky(Takeoff(2.0), Winch(1.2), Land()).airborne()
+    assert sky.ask(Reposition(None, None, 1.0, True)).result == ACCEPTED
+    sky.wait(8.0)
+    verdict = sky.ask(StartMission(1))
+    assert verdict.result == DENIED
+    assert verdict.text == "Mission denied: item 1: load height -0.20 m, least 0.3 m"
+    assert sky.ask(StartMission(0)).result == ACCEPTED, "the take-off lifts it again"
+
+
+def test_a_winch_that_is_taken_up_again_counts_with_what_is_left_of_it() -> None:
+    """Paused on the way from 0.7 m to 2.2 m; once more 1.5 m would be too long."""
+    sky = Sky(Takeoff(3.0), Winch(1.5), Land())
+    sky.ask(StartMission(None))
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+
+    def tick() -> None:
+        sky.tick()
+        sky.flight = with_cable_now(sky.flight, sky.now_us)
+        length = sky.flight.cable.length_m or SETTINGS.cable_length_m
+        sky.settings = replace(sky.settings, cable_length_m=length)
+
+    while sky.settings.cable_length_m < 1.8:
+        tick()
+    assert sky.ask(Pause()).result == ACCEPTED
+    for _ in range(250):
+        tick()
+    assert sky.flight.phase == Phase.HOLD
+    assert sky.settings.cable_length_m + 1.5 > sky.settings.winch.longest_m
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+
+
+def test_what_swings_a_load_that_a_step_before_it_releases_is_refused() -> None:
+    steps = (Takeoff(2.0), Release(), Winch(0.3), Land())
+    sky = Sky(Takeoff(2.0))
+    plan = sky.flight.mission.plan
+    for late, text in ((Winch(0.3), "item 2 needs the load"), (RUN, "item 2 needs the load")):
+        changed = (*steps[:2], late, steps[3])
+        sky.flight = with_plan(sky.flight, replace(plan, steps=changed, sequence=(0, 1, 2, 3), items=4))
+        assert text in str(sky.ask(StartMission(None)).text)
+
+
+def test_a_leg_asks_the_timeline_where_it_leads() -> None:
+    """Not the origin: the home in force."""
+    sky = Sky(Takeoff(2.0), ReturnHome())
+    sky.flight = replace(sky.flight, area=replace(sky.flight.area, home=HOME))
+    sky.ask(StartMission(None))
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: s.flight.mission.step == 1)
+    end = sky.flight.legs[-1].jet(1e3)[0]
+    assert end == state_after(ReturnHome(), MissionState((0.0, 0.0, 2.0)), HOME).expected
