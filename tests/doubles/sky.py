@@ -11,6 +11,7 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, Takeoff
 from autopilot.supervisor.advance import advance
+from autopilot.supervisor.machine import _enter
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
@@ -34,6 +35,11 @@ def view(now_us: int = 0, **changes: Any) -> View:
     """A vehicle that stands beside its load, all well."""
     seen = View(now_us, (0.1, 0.0, GEAR), ZERO, (0.0, 0.0, LOAD_RADIUS), ZERO, False, 0.0, ())
     return seen._replace(**changes)
+
+
+def enter(flight: Flight, phase: Phase, seen: View, settings: Settings) -> Flight:
+    """The flight in `phase`, as if an event had led there."""
+    return _enter(flight, phase, seen, settings)
 
 
 def hanging(now_us: int = 0, x: Vec3 = (0.0, 0.0, 2.0), v: Vec3 = ZERO, **changes: Any) -> View:

@@ -14,7 +14,6 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import _enter as enter
 from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
@@ -27,7 +26,7 @@ from autopilot.supervisor.state import (
 )
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
-from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, enter, hanging, view
 
 STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), model.Land())
 # m: setpoints on both sides of a join; a tick of 20 ms at 1.5 m/s is 30 mm

@@ -17,7 +17,6 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services import requests as R
 from autopilot.supervisor import machine
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import _enter as enter
 from autopilot.supervisor.machine import happen
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import (
@@ -35,7 +34,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.table import TRANSITIONS, markdown
 from missions.model import Land, Step, Takeoff, Waypoint
-from tests.doubles.sky import ACCEPTED, SETTINGS, hanging, view
+from tests.doubles.sky import ACCEPTED, SETTINGS, enter, hanging, view
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT = ROOT / "docs" / "architecture.md"
