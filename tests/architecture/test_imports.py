@@ -4,9 +4,9 @@ Missions and geometry stand alone; trajectory on both, the wire on these; the ve
 laws, estimator and guidance on those; the supervisor on guidance and services; the core of the flight on
 everything below. A law is known by its folder: nothing outside imports one by name. `sitl` knows of the
 autopilot its geometry and its wire, and is built like it: the plant on geometry, the sensors on the plant,
-the world's tick on both. `gcs` knows also the paths and the definitions of parameters; only `gcs/closed_loop.py`
-and `gcs/sweep` join the cores. What a vehicle is and how a TOML file is read are leaves that every program
-shares. Sockets, clocks, threads and logging belong to the shells alone.
+the world's tick on both. `gcs` knows also the paths and the definitions of parameters; only
+`gcs/closed_loop.py` and `gcs/sweep` join the cores. What a vehicle is and how a TOML file is read are leaves
+that every program shares. Sockets, clocks, threads and logging belong to the shells alone.
 """
 
 from __future__ import annotations
