@@ -37,10 +37,10 @@ from autopilot.services.requests import (
     StartMission,
     Terminate,
 )
+from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.services.requests import Winch as WinchRequest
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.quiescence import RESTING, Stretch, may_decide, next_stretch
-from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Phase, Report, View, setpoint
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import Disc, Fence
@@ -73,6 +73,8 @@ def moved(x: Vec3, *by: float) -> Vec3:
 
 DISTURBANCES: dict[str, Callable[[View], View]] = {
     "slack": lambda v: v._replace(taut=False),
+    "slack, not felt": lambda v: v._replace(taut=False, pull_n=math.nan),
+    "taut, not felt": lambda v: v._replace(taut=True, pull_n=math.nan),
     "taut and pulling": lambda v: v._replace(taut=True, pull_n=WEIGHT),
     "taut without a pull": lambda v: v._replace(taut=True, pull_n=-0.2 * WEIGHT),
     "shortened": lambda v: v._replace(x_quad=moved(v.x_quad, 0.0, 0.0, -0.02), pull_n=0.0),
@@ -104,8 +106,9 @@ DISTURBANCES: dict[str, Callable[[View], View]] = {
 class Watched(Sky):
     """A sky that is advanced at every tick, and notes at which of them nobody would have asked for that."""
 
-    def __init__(self, *steps: Step, settings: Settings = SETTINGS, rough: int | None = None) -> None:
-        super().__init__(*steps, settings=settings)
+    def __init__(self, *steps: Step, rough: int | None = None, tied: bool = True) -> None:
+        super().__init__(*steps)
+        self._tied = tied
         self.stretch: Stretch | None = None
         self.passed: Counter[Phase] = Counter()
         self.decided: Counter[Phase] = Counter()
@@ -118,7 +121,8 @@ class Watched(Sky):
 
     def obey(self) -> View:
         seen = super().obey()
-        seen = seen._replace(pull_n=WEIGHT if seen.taut else 0.0)
+        taut = seen.taut and self._tied
+        seen = seen._replace(taut=taut, pull_n=WEIGHT if taut else 0.0)
         if self._rough is None or not self.flight.legs:
             return seen
         chance = self._rough
@@ -293,6 +297,15 @@ def fenced() -> Watched:
     return landed(sky)
 
 
+def never_taut() -> Watched:
+    sky = Watched(tied=False)
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
+    ended(sky)
+    assert any("never taut" in text for text in sky.texts)
+    return sky
+
+
 def given_up() -> Watched:
     sky = after(Watched(), Terminate(), wait_s=4.0)
     assert sky.flight.phase == Phase.DISARMED
@@ -319,6 +332,7 @@ SKIES: dict[Callable[[], Watched], set[Phase]] = {
     attitudes: TO_GROUND | {Phase.HOLD},
     offboard_rise: {Phase.DISARMED, Phase.HOLD, Phase.LOWER, Phase.SET_DOWN},
     fenced: {Phase.DISARMED, Phase.TAUTEN, Phase.SET_DOWN},
+    never_taut: {Phase.TAUTEN, Phase.SET_DOWN, Phase.DISARMED},
     given_up: {Phase.FAILSAFE, Phase.HOLD, Phase.DISARMED},
     left_armed: {Phase.ARMED, Phase.DISARMED},
 }
@@ -338,6 +352,20 @@ def name_of(flight: object) -> str:
 def test_what_passes_would_not_have_been_decided(fly: Callable[[], Watched]) -> None:
     sky = fly()
     assert {phase for phase in SKIES[fly] if not sky.passed[phase]} == set()
+
+
+def test_a_tick_between_those_that_are_laid_out_is_decided_upon() -> None:
+    """There is no setpoint for it."""
+    sky = Watched().airborne()
+    stretch = next_stretch(sky.flight, sky.settings, sky.now_us, STEP_US, 0.0)
+    for late_us, asked in (
+        (STEP_US, False),
+        (STEP_US + 1, True),
+        (2 * STEP_US - 1, True),
+        (2 * STEP_US, False),
+    ):
+        seen = sky.view._replace(now_us=sky.now_us + late_us)
+        assert asks(sky.flight, stretch, seen) == asked, late_us
 
 
 def test_every_disturbance_is_one_that_the_supervisor_heeds() -> None:
@@ -511,6 +539,7 @@ def world_fence() -> Witness:
 
 def world_given_up() -> Witness:
     witness = held(1.0)
+    witness.craft.wait(1.0)
     assert witness.craft.command(mavlink.MAV_CMD_DO_FLIGHTTERMINATION, 1.0) == ACCEPTED
     witness.craft.run(at_phase(Phase.DISARMED))
     witness.craft.wait(1.0)
@@ -531,7 +560,7 @@ WORLDS: dict[Callable[[], Witness], set[Phase]] = {
     world_return: {Phase.HOLD, Phase.RETURN, Phase.LOWER, Phase.SET_DOWN},
     world_catch: WHOLE,
     world_winch: TO_GROUND | {Phase.HOLD},
-    world_fence: {Phase.DISARMED, Phase.ARMED},
+    world_fence: {Phase.DISARMED, Phase.TAUTEN},
     world_given_up: {Phase.HOLD, Phase.FAILSAFE, Phase.DISARMED},
     world_left_armed: {Phase.DISARMED, Phase.ARMED},
 }
