@@ -229,7 +229,7 @@ def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it(
     autopilot = build_onboard(Conditions(), home, stored)
     autopilot.add_link(GCS)
     autopilot.receive_sensors(sensors(0))
-    plan = autopilot._state.flight.mission.plan
+    plan = autopilot.core.flight.mission.plan
     assert plan.steps[-1] == Waypoint(0.0, 0.0, 2.0)
     east, north = 3.0, 1.0
     latitude, longitude, _ = geodetic_from_enu((east, north, 0.0), home)
@@ -237,7 +237,7 @@ def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it(
         1, 1, 6, 179, 0, 0, 0.0, 0.0, 0.0, 0.0, latitude, longitude, 0.0
     )
     autopilot.receive_ground(FrameWriter(255, 190).frame(place), GCS)
-    flight = autopilot._state.flight
+    flight = autopilot.core.flight
     assert flight.area.home[:2] == pytest.approx((east, north), abs=0.01)
     plan = flight.mission.plan
     assert plan.steps == (Takeoff(4.0), ReturnHome(), Waypoint(flight.area.home[0], flight.area.home[1], 2.0))

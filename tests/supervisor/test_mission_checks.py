@@ -7,8 +7,8 @@ from itertools import accumulate
 from typing import Any
 
 import pytest
-from autopilot.core.winch import cable_now
 
+from autopilot.core.flight_core import with_cable_now
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.services.requests import Arm, Pause, ReplaceMission, Reposition, SetCurrent, StartMission
 from autopilot.supervisor.mission import with_plan
@@ -96,7 +96,7 @@ def flown(sky: Sky) -> list[Vec3]:
     while len(found) < len(plan.steps):
         before = sky.flight
         sky.tick()
-        sky.flight = cable_now(sky.flight, sky.now_us)
+        sky.flight = with_cable_now(sky.flight, sky.now_us)
         if sky.flight.cable.length_m is not None:
             sky.settings = replace(sky.settings, cable_length_m=sky.flight.cable.length_m)
         here = sky.view.x_quad if before.cable.released else sky.view.x_load
@@ -275,7 +275,7 @@ def test_a_winch_that_is_taken_up_again_counts_with_what_is_left_of_it() -> None
 
     def tick() -> None:
         sky.tick()
-        sky.flight = cable_now(sky.flight, sky.now_us)
+        sky.flight = with_cable_now(sky.flight, sky.now_us)
         length = sky.flight.cable.length_m or SETTINGS.cable_length_m
         sky.settings = replace(sky.settings, cable_length_m=length)
 

@@ -20,6 +20,7 @@ from autopilot.trajectory.timeline import (
 )
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.trajectory.waypoint_path import Passage
+from autopilot.vehicle.file import load_vehicle
 from missions.model import (
     AttitudeRun,
     Delay,
@@ -132,7 +133,10 @@ def test_a_return_by_mode_leads_to_the_nearest_of_home_and_rally_points() -> Non
 
 # ---- the paths that are prepared
 
-LIMITS = VehicleLimits().shaping
+WITHOUT_DRAG = load_vehicle("bebop").model_copy(
+    update={"quad_drag_n_s_m": 0.0, "quad_drag_quadratic_n_s2_m2": 0.0}
+)
+LIMITS = VehicleLimits(WITHOUT_DRAG).shaping
 CORNERS = (Waypoint(3.0, 0.0, 2.0), Waypoint(3.0, 3.0, 2.0))
 
 
