@@ -1,7 +1,12 @@
 """For all tests: examples of hypothesis have no deadline, for the first one may compile a kernel; a failed
-assertion in the shared doubles is explained like one of a test."""
+assertion in the shared doubles is explained like one of a test. Small matrices are no work for several threads,
+which on a busy machine wait for each other: linear algebra keeps to one."""
 
 from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read as numpy is imported
 
 import pytest
 from hypothesis import settings

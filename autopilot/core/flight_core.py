@@ -1,10 +1,8 @@
-"""The flight software around its compiled tick: the supervisor where it may have something to decide,
-requests.
+"""The flight software around its compiled tick: the supervisor where it may have something to decide.
 
-`FlightCore` is driven by the simulator link in the processes and by the loop of a sweep: `step` runs one
-tick,
+`FlightCore` is driven by the simulator link in the processes and by the loop of a sweep: `step` runs a tick,
 `decide` finishes one whose estimate a sweep's loop has made already. The cable as the winch has it enters the
-tick as `Winch`; what is flown and until when as `Stretch`, with its setpoints laid out.
+tick as `Winch`, what is flown and until when as `Stretch` with its setpoints laid out.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def _imported(path: Path, root: Path) -> frozenset[Path]:
         if base.is_dir():
             parts = (base / name.decode() for name in _NAME.findall(names))
             found.update(p for q in parts for p in (q.with_suffix(".py"), q / "__init__.py") if p.is_file())
-        else:
+        elif base.with_suffix(".py").is_file():
             found.add(base.with_suffix(".py"))
     if b"iter_modules(__path__)" in _source(path):  # a package that finds its modules by itself
         found.update(path.parent.glob("*.py"))

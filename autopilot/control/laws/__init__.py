@@ -21,7 +21,7 @@ def _found() -> dict[int, Law]:
         told = ", ".join(f"{law.name} {law.number}" for law in laws)
         read = ", ".join(f"{name} {number}" for number, name in named.items())
         raise ValueError(f'laws are {told}, their files say {read}; write LAW = Law(name="...", number=...,')
-    return found
+    return {number: found[number] for number in named}
 
 
 LAWS = _found()  # by the number of CTL_LAW
