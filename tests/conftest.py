@@ -1,6 +1,7 @@
 """For all tests: examples of hypothesis have no deadline, for the first one may compile a kernel; a failed
-assertion in the shared doubles is explained like one of a test. Small matrices are no work for several threads,
-which on a busy machine wait for each other: linear algebra keeps to one."""
+assertion in the shared doubles is explained like one of a test; linear algebra keeps to one thread, for on a
+busy machine several of them wait for each other.
+"""
 
 from __future__ import annotations
 
