@@ -7,7 +7,9 @@ import math
 import pytest
 
 from autopilot.wire.parameter_table import ParameterError
+from sitl.plant.records import Truth
 from sitl.vehicles.sim_parameters import apply, sim_parameters
+from sitl.vehicles.truth import KEYS
 
 
 def test_bebop_is_table_4_1(bebop):
@@ -78,3 +80,9 @@ def test_names_kept(bebop):
 def test_parameter_out_of_range(bebop):
     with pytest.raises(ParameterError, match="SIM_LOAD_MASS"):
         sim_parameters(bebop).set("SIM_LOAD_MASS", -0.1)
+
+
+def test_every_number_of_the_plant_is_one_key_of_the_file():
+    assert set(Truth._fields) - KEYS.keys() == Truth._field_defaults.keys()
+    assert len(set(KEYS.values())) == len(KEYS)
+    assert KEYS["quad_drag"] == "quad_drag_n_s_m"  # and not the quadratic one
