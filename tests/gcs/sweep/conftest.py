@@ -44,6 +44,58 @@ def delivery(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(path)
 
 
+WINCH = """
+[[items]]
+type = "winch"
+length_m = 0.3
+
+[[items]]
+type = "waypoint"
+east_m = 0.4
+north_m = 0.2
+altitude_m = 0.9
+
+[[items]]
+type = "winch"
+length_m = -0.4
+speed_m_s = 0.3
+
+"""
+
+
+@pytest.fixture(scope="session")
+def winched(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The cable made longer and shorter again."""
+    path: Path = tmp_path_factory.mktemp("missions") / "winched.toml"
+    land = '[[items]]\ntype = "land"\n'
+    path.write_text(SHORT.replace(land, WINCH.lstrip() + land), encoding="utf-8")
+    return str(path)
+
+
+SWING = """
+[[items]]
+type = "signals"
+duration_s = 5.0
+
+[[items.terms]]
+axis = "y"
+amplitude_m = 0.4
+rise_s = 1.5
+hold_s = 1.0
+fall_s = 1.5
+
+"""
+
+
+@pytest.fixture(scope="session")
+def swung(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """0.4 m to the north and back: a way that no check before the flight looks at."""
+    path: Path = tmp_path_factory.mktemp("missions") / "swung.toml"
+    waypoint = SHORT[SHORT.index('[[items]]\ntype = "waypoint"') : SHORT.index('[[items]]\ntype = "land"')]
+    path.write_text(SHORT.replace(waypoint, SWING.lstrip()), encoding="utf-8")
+    return str(path)
+
+
 @pytest.fixture
 def plan(short: str) -> SweepPlan:
     """Six flights, of which those with the long delay are lost."""

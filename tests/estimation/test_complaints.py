@@ -1,0 +1,116 @@
+"""What keeps an estimate from being flown on: the limits, and the words for the operator."""
+
+from __future__ import annotations
+
+from math import inf, nan
+
+import pytest
+
+from autopilot.estimation.filter import complaints, load_complaint, vehicle_complaint
+from autopilot.estimation.records import (
+    CAMERA,
+    NOBODY,
+    RECEIVER,
+    TRACKER,
+    Doubt,
+    EstimatorState,
+    blank_state,
+)
+
+OLDEST_S = 0.5
+PROMISED = 0.1  # m, slow part of a receiver's error
+# with a receiver: 0.05 m and 1.2 times what it promises
+FIX_LEVEL = 0.05 + 1.2 * PROMISED
+NO_DOUBT = Doubt(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+VEHICLE_AGE, LOAD_AGE = "age of the vehicle", "age of the load"
+
+NO_POSE = "no vehicle pose from a tracker"
+NO_FIX = "no position from the receiver"
+POSITION = "vehicle position not settled"
+FIX = "vehicle position not settled, good to {:.1f} m"
+ATTITUDE = "vehicle attitude not settled"
+HEADING = "vehicle heading not settled"
+NO_LOAD = "no load position from a tracker"
+NO_SIGHT = "no direction to the load from the camera"
+LOAD = "load position not settled"
+
+
+def settled(source: float, load_source: float, part: str = "", value: float = 0.0) -> EstimatorState:
+    """An estimate without doubt, its load hanging, in which one part has this value: an age in s, or a
+    standard deviation in m or rad."""
+    state = blank_state()
+    doubts = {part: value} if part in Doubt._fields else {}
+    vehicle_age_s = value if part == VEHICLE_AGE else 0.0
+    load_age_s = value if part == LOAD_AGE else 0.0
+    assert not part or doubts or part in (VEHICLE_AGE, LOAD_AGE)
+    return state._replace(
+        vehicle=state.vehicle._replace(source=source, age_s=vehicle_age_s),
+        load=state.load._replace(source=load_source, age_s=load_age_s, taut=1.0),
+        doubt=NO_DOUBT._replace(**doubts),
+        aids=state.aids._replace(horizontal_slow=PROMISED),
+    )
+
+
+# source of the vehicle, of the load, what is in doubt, the last value that may be flown on, the complaint
+LIMITS = [
+    (TRACKER, TRACKER, VEHICLE_AGE, OLDEST_S, NO_POSE),
+    (TRACKER, TRACKER, "horizontal", 0.05, POSITION),
+    (TRACKER, TRACKER, "vertical", 0.05, POSITION),
+    (TRACKER, TRACKER, "tilt", 0.05, ATTITUDE),
+    (TRACKER, TRACKER, "heading", 0.05, ATTITUDE),
+    (TRACKER, TRACKER, LOAD_AGE, OLDEST_S, NO_LOAD),
+    (TRACKER, TRACKER, "load", 0.05, LOAD),
+    (TRACKER, TRACKER, "relative", inf, ""),
+    (RECEIVER, CAMERA, VEHICLE_AGE, 2.0, NO_FIX),  # the inertial unit bridges so long
+    (RECEIVER, CAMERA, "horizontal", FIX_LEVEL, FIX),
+    (RECEIVER, CAMERA, "relative", FIX_LEVEL, FIX),
+    (RECEIVER, CAMERA, "vertical", inf, ""),
+    (RECEIVER, CAMERA, "tilt", 0.05, ATTITUDE),
+    (RECEIVER, CAMERA, "heading", 0.15, HEADING),
+    (RECEIVER, CAMERA, LOAD_AGE, OLDEST_S, NO_SIGHT),
+    (RECEIVER, CAMERA, "load", 0.1, LOAD),
+]
+ABOUT_THE_LOAD = (NO_LOAD, NO_SIGHT, LOAD)
+
+
+@pytest.mark.parametrize(("source", "load_source", "part", "last", "words"), LIMITS)
+def test_each_doubt_has_its_limit_and_its_words(
+    source: float, load_source: float, part: str, last: float, words: str
+) -> None:
+    assert complaints(settled(source, load_source, part, 0.999 * last), OLDEST_S) == ()
+    for value in (1.001 * last, inf, nan) if words else (inf, nan):
+        state = settled(source, load_source, part, value)
+        assert complaints(state, OLDEST_S) == ((words.format(state.doubt.horizontal),) if words else ())
+        about_the_load = words in ABOUT_THE_LOAD
+        assert bool(load_complaint(state, OLDEST_S)) == about_the_load
+        assert bool(vehicle_complaint(state, OLDEST_S)) == (bool(words) and not about_the_load)
+        if about_the_load:
+            assert complaints(state, OLDEST_S, carries=False) == ()
+
+
+@pytest.mark.parametrize(("load_source", "words"), [(TRACKER, (LOAD,)), (CAMERA, ())])
+def test_a_load_on_the_ground_is_where_it_was_laid_for_a_camera_alone(
+    load_source: float, words: tuple[str, ...]
+) -> None:
+    state = settled(TRACKER, load_source, "load", 1.0)
+    state = state._replace(load=state.load._replace(taut=0.0, age_s=0.4))
+    assert complaints(state, OLDEST_S) == words
+
+
+def test_the_first_complaint_of_each_is_told_vehicle_before_load() -> None:
+    blind = blank_state()
+    assert (blind.vehicle.source, blind.load.source) == (NOBODY, NOBODY)
+    assert complaints(blind, OLDEST_S) == (NO_POSE, NO_LOAD)
+    assert complaints(blind, OLDEST_S, carries=False) == (NO_POSE,)
+
+
+def test_a_fix_that_has_not_settled_says_how_good_it_is() -> None:
+    assert complaints(settled(RECEIVER, CAMERA, "horizontal", 2.345), OLDEST_S) == (
+        "vehicle position not settled, good to 2.3 m",
+    )
+
+
+def test_a_longer_limit_of_age_holds_for_the_receiver_too() -> None:
+    state = settled(RECEIVER, CAMERA, VEHICLE_AGE, 2.5)
+    assert complaints(state, OLDEST_S) == (NO_FIX,)
+    assert complaints(state, 3.0) == ()

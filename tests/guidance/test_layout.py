@@ -1,0 +1,75 @@
+"""Setpoints laid out tick by tick against the legs they are of, asked one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from autopilot.guidance.layout import jets, jets_ahead
+from autopilot.guidance.legs import (
+    LOAD_POSITION,
+    Brake,
+    Creep,
+    Hold,
+    Leg,
+    Pass,
+    Run,
+    Slow,
+    Transfer,
+    asked_jet,
+)
+from autopilot.supervisor.settings import limits_from
+from autopilot.supervisor.state import Flight, jet_ahead
+from autopilot.trajectory.prepare import prepare
+from autopilot.trajectory.shaping import Shaped, unshaped
+from autopilot.trajectory.waypoint_path import Passage
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
+from missions.model import Signals, Sine, Takeoff, Term, Waypoint
+
+# a half-cosine too steep for the vehicle, and a sine that dies away
+TERMS = (Term("y", 0.25, 1.0, 0.79, None, 0.0, ()), Term("x", 0.1, 0.0, 1.0, 2.0, 1.0, (Sine(2.0),)))
+SIGNALS = Signals(5.0, TERMS)
+LEGS = (
+    Hold((1.0, 2.0, 3.0)),
+    Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0),
+    Brake((0.1, 0.2, 0.3), (1.0, 0.4, 0.1), (0.3, 0.1, 0.7), 2.0),
+    Creep((0.1, 0.2, 0.3), (0.0, 0.1, -0.2), LOAD_POSITION),
+    Run((0.1, 0.2, 0.3), unshaped(SIGNALS)),
+    Slow(Transfer((0.1, 0.2, 0.3), (3.0, 1.0, 2.0), 4.0), 1.0, 2.0, 0.3),
+)
+
+
+@pytest.mark.parametrize("leg", LEGS, ids=lambda leg: type(leg).__name__)
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_leg_laid_out_is_the_leg(leg: Leg, asked: bool) -> None:
+    times = np.arange(-3, 1500) * 0.004
+    expected = [np.ravel(asked_jet(leg, t) if asked else leg.jet(t)) for t in times.tolist()]
+    assert np.array_equal(jets(leg, times, asked), np.array(expected))
+
+
+def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
+    limits = limits_from(autopilot_parameters(load_vehicle("bebop")), True)._replace(shaped=True)
+    steps = (
+        Takeoff(1.0),
+        Waypoint(2.0, 0.0, 2.0, 0.0),
+        Waypoint(2.0, 2.0, 2.0, 0.0),
+        Waypoint(0.0, 2.0, 1.5, 1.0),
+        SIGNALS,
+    )
+    made = prepare(steps, tuple(range(len(steps))), limits).made
+    passage, shaped = made[1], made[4]
+    assert isinstance(passage, Passage) and isinstance(shaped, Shaped) and len(shaped.pieces)
+    times = np.arange(-3, 2500) * 0.004
+    for leg in (Pass(passage, (0.1, -0.2, 0.05), 1.5), Run((0.1, 0.2, 0.3), shaped)):
+        expected = [np.ravel(leg.jet(t)) for t in times.tolist()]
+        assert np.array_equal(jets(leg, times), np.array(expected))
+
+
+def test_the_path_ahead_goes_on_into_what_follows() -> None:
+    first, second = Transfer((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), 2.0), Hold((1.0, 0.0, 1.0), 0.5)
+    third = Run((1.0, 0.0, 1.0), unshaped(SIGNALS))
+    flight = Flight(legs=(first, second), following=(third,))
+    times = np.arange(1000) * 0.004
+    expected = [np.ravel(jet_ahead(flight, t)) for t in times.tolist()]
+    assert np.array_equal(jets_ahead((first, second, third), times), np.array(expected))
