@@ -247,6 +247,8 @@ class FlightCore:
         commands = np.zeros((rows_of(setup.actuation), 4))
         kept = min(len(commands), len(self.rows.commands))
         commands[:kept] = self.rows.commands[:kept]
+        # a longer delay asks for more than is remembered: before, they were asked for about the same
+        commands[kept:] = self.rows.commands[-1]
         self.rows = self.rows._replace(commands=commands)
         rows = new_rows(setup.law)
         if law_of(setup.law) is law_of(before.law):

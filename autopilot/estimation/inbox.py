@@ -1,8 +1,9 @@
 """The readings of one tick as rows of an array, and which of them are believed.
 
 A row is (kind, instant that it shows in us, the reading's numbers as in its record). The age of a reading is
-made here, by the clock of the estimate. A reading that is no number, of the future or too old is dropped,
-and a sensor that claims to be perfect is believed to no more than the least deviations below.
+made here, by the clock of the estimate. A reading that is no number, beyond any sensor's range, of the future
+or too old is dropped, and a sensor that claims to be perfect is believed to no more than the least deviations
+below.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from autopilot.estimation.records import (
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale
 from autopilot.geometry.packed import pack, unpack
+from autopilot.geometry.so3 import Quat
 
 KIND, SHOWS, READING = 0, 1, 2  # columns
 COLUMNS = 16
@@ -37,7 +39,11 @@ LEAST_VELOCITY_STD_M_S = 2e-4
 LEAST_FIX_STD_M = 2e-3
 LEAST_DIRECTION_STD_RAD = 1e-4
 OLDEST_READING_S = 0.3  # older ones are dropped: the estimator's memory is no longer
+# beyond any sensor's range
 GREATEST_ACCEL_M_S2, GREATEST_RATE_RAD_S = 2000.0, 500.0
+FARTHEST_M, FASTEST_M_S = 1e6, 1e4
+GREATEST_STD = 1e4  # m, m/s, rad: who states more has measured nothing
+UNIT_TOLERANCE = 0.02  # of the square of a quaternion's length
 NOT_MEASURED = -1.0  # deviation of a velocity that was not measured
 
 
@@ -60,9 +66,15 @@ def put_vector(inbox: Array, at: int, kind: int, vector: tuple[float, ...]) -> N
 
 
 @kernel
-def finite(v: Vec3) -> bool:
-    """Whether all three are numbers."""
-    return isfinite(v[0]) and isfinite(v[1]) and isfinite(v[2])
+def within(v: Vec3, most: float) -> bool:
+    """Whether a vector is shorter than `most`; what is no number is not."""
+    return norm(v) < most
+
+
+@kernel
+def is_unit(q: Quat) -> bool:
+    """Whether a quaternion is a rotation, but for rounding."""
+    return abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0) < UNIT_TOLERANCE
 
 
 @kernel
@@ -101,8 +113,9 @@ def pose_in(row: Array, age_s: float) -> tuple[bool, PoseReading]:
         at_least(raw.attitude_std, LEAST_ANGLE_STD_RAD),
         at_least(raw.velocity_std, LEAST_VELOCITY_STD_M_S) if measured else NOT_MEASURED,
     )
-    turned = isfinite(q[0]) and isfinite(q[1]) and isfinite(q[2]) and isfinite(q[3])
-    return isfinite(age_s) and finite(pose.x_quad) and finite(pose.v_quad) and turned, pose
+    stated = max(pose.position_std, pose.attitude_std, pose.velocity_std) < GREATEST_STD
+    placed = within(pose.x_quad, FARTHEST_M) and within(pose.v_quad, FASTEST_M_S)
+    return isfinite(age_s) and placed and is_unit(q) and stated, pose
 
 
 @kernel
@@ -117,7 +130,9 @@ def load_in(row: Array, age_s: float) -> tuple[bool, LoadReading]:
         at_least(raw.position_std, LEAST_POSITION_STD_M),
         at_least(raw.velocity_std, LEAST_VELOCITY_STD_M_S) if measured else NOT_MEASURED,
     )
-    return isfinite(age_s) and finite(load.x_load) and finite(load.v_load), load
+    stated = max(load.position_std, load.velocity_std) < GREATEST_STD
+    placed = within(load.x_load, FARTHEST_M) and within(load.v_load, FASTEST_M_S)
+    return isfinite(age_s) and placed and stated, load
 
 
 @kernel
@@ -132,8 +147,9 @@ def fix_in(row: Array, age_s: float) -> tuple[bool, GnssReading]:
         at_least(raw.vertical_std, LEAST_FIX_STD_M),
         raw.rtk,
     )
-    stated = isfinite(raw.horizontal_std) and isfinite(raw.vertical_std)
-    return isfinite(age_s) and finite(fix.position) and finite(fix.velocity) and stated, fix
+    stated = abs(raw.horizontal_std) < GREATEST_STD and abs(raw.vertical_std) < GREATEST_STD
+    placed = within(fix.position, FARTHEST_M) and within(fix.velocity, FASTEST_M_S)
+    return isfinite(age_s) and placed and stated, fix
 
 
 @kernel
@@ -146,7 +162,7 @@ def direction_in(row: Array, age_s: float) -> tuple[bool, DirectionReading]:
         scale(1.0 / length, raw.direction_body),
         at_least(raw.direction_std, LEAST_DIRECTION_STD_RAD),
     )
-    return isfinite(age_s) and 0.5 < length < 2.0, sight
+    return isfinite(age_s) and 0.5 < length < 2.0 and sight.direction_std < GREATEST_STD, sight
 
 
 @kernel

@@ -52,7 +52,7 @@ def test_compiled_and_interpreted_flights_are_bit_equal() -> None:
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=True,
     )
     assert done.stdout.strip() == fingerprint()

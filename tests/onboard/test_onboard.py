@@ -17,7 +17,7 @@ from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home, hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
 from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, located_steps
+from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, ReturnHome, Takeoff, Waypoint
 from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
@@ -225,7 +225,7 @@ def test_a_home_that_is_set_moves_the_places_of_the_mission_that_follow_from_it(
         WireItem(2, 186, 0, 1, 2.0, 3.0, 0.0, 0.0, 0, 0, 0.0),
     )
     items = (up, back, low)
-    stored = StoredMission(items, located_steps(items, home))
+    stored = StoredMission(items)
     autopilot = build_onboard(Conditions(), home, stored)
     autopilot.add_link(GCS)
     autopilot.receive_sensors(sensors(0))

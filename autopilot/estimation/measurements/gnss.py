@@ -48,7 +48,7 @@ from autopilot.estimation.records import (
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, cross, from_columns, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, cross, from_columns, norm, sub
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
 
@@ -58,10 +58,17 @@ STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
 ANYWHERE_STD = 100.0  # m: the first fix says where
 MAGNETIC_FRESH_S = 0.2
+LEAST_SLANT = 0.01  # sine of the angle between specific force and magnetic field
 # A slow error that returns to zero makes the best estimate of the place half of the first and half of the
 # last fix: the place then follows each metre of a plain receiver's drift by half. It is to stay where it was,
 # be carried by the velocities: so the drift is believed to return to zero ten times as slowly as it wanders.
 PLAIN_REVERSION = 0.1
+
+
+@kernel
+def tells_attitude(accel: Vec3, field: Vec3) -> bool:
+    """Whether specific force and magnetic field (body) differ enough in direction to level and to head by."""
+    return norm(cross(accel, field)) > LEAST_SLANT * norm(accel) * norm(field)
 
 
 @kernel
@@ -221,7 +228,7 @@ def correct_gnss(
     state = with_aids(state, aids)
     starting = state.vehicle.source == NOBODY
     if starting:
-        if not aids.magnetic_age <= MAGNETIC_FRESH_S:
+        if not (aids.magnetic_age <= MAGNETIC_FRESH_S and tells_attitude(state.last_imu.accel, aids.field)):
             return state
         state = start_by_fix(state, history, fix, tuning)
     past = look_back(state, history, tuning, fix.age_s)

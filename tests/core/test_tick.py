@@ -1,0 +1,277 @@
+"""One tick: the same bits interpreted, sound whatever the sensors say, flown on with other parameters."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from autopilot.control.laws import LAWS
+from autopilot.core.flight_core import FlightCore
+from autopilot.core.sensor_inbox import Tick, fill
+from autopilot.core.tick import FLOWN, TO_DECIDE, control_tick, fly_tick, sense
+from autopilot.estimation import inbox as box
+from autopilot.estimation.filter import complaints
+from autopilot.estimation.records import ImuReading, LoadReading, PoseReading
+from autopilot.geometry.linear import ZERO
+from autopilot.geometry.packed import pack
+from autopilot.geometry.so3 import IDENTITY_QUAT
+from autopilot.guidance.layout import COLUMNS
+from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_ATTITUDE, QUAD_POSITION
+from autopilot.onboard.onboard import build_setup
+from autopilot.supervisor.quiescence import FOREVER_US, RESTING, at_rest
+from autopilot.supervisor.state import Phase
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameter_table import ParameterError
+from missions.model import Delay, Land, Takeoff
+from tests.doubles.craft import Craft
+
+TICK_US = 4000
+BEGIN_US = 10_000_000
+MODES = {
+    "resting": RESTING,
+    "load position": LOAD_POSITION,
+    "vehicle position": QUAD_POSITION,
+    "load attitude": LOAD_ATTITUDE,
+    "vehicle attitude": QUAD_ATTITUDE,
+}
+HOVER_M = 1.3  # height of the load
+
+
+def new_core(**values: float) -> FlightCore:
+    """The flight software of `bebop` before its first tick."""
+    table = autopilot_parameters(load_vehicle("bebop"))
+    for name, value in values.items():
+        table.set(name, value)
+    return FlightCore(build_setup(table, 1))
+
+
+def put_hover(core: FlightCore, now_us: int, tick: int) -> int:
+    """Readings of a load that hangs still, but for a little sway; how many they are."""
+    sway, length = 0.01 * math.sin(0.3 * tick), core.setup.vehicle.cable_length
+    over = (sway, 0.0, HOVER_M + length)
+    imu = ImuReading((0.01, -0.02, 0.005), (0.1 * sway, 0.05, core.setup.vehicle.gravity))
+    pose = PoseReading(0.0, over, IDENTITY_QUAT, ZERO, 0.001, 0.001, -1.0)
+    load = LoadReading(0.0, (0.5 * sway, 0.0, HOVER_M), ZERO, 0.001, -1.0)
+    inbox = core.rows.inbox
+    box.put_reading(inbox, 0, box.IMU, now_us, imu)
+    box.put_reading(inbox, 1, box.POSE, now_us - TICK_US, pose)
+    box.put_reading(inbox, 2, box.LOAD, now_us - TICK_US, load)
+    return 3
+
+
+def hold(core: FlightCore, mode: int, now_us: int) -> None:
+    """Let the core fly in this control mode from now on, a little off where it is."""
+    place = np.zeros((50, COLUMNS))
+    place[:, :3] = (
+        0.05,
+        -0.03,
+        HOVER_M + (core.setup.vehicle.cable_length if mode == QUAD_POSITION else 0.0),
+    )
+    core.rows = core.rows._replace(targets=place, references=place)
+    upward = (0.02, 0.01, math.sqrt(1.0 - 0.02**2 - 0.01**2))
+    stretch = at_rest(FOREVER_US, now_us, True)._replace(
+        mode=mode, period_us=TICK_US, load_weight=1.0, anchor_height=HOVER_M, upward=upward
+    )
+    pack(stretch, core.rows.stretch, 0)
+
+
+def settled(law: int = 2, ticks: int = 8) -> FlightCore:
+    """A core whose estimate has begun."""
+    core = new_core(CTL_LAW=law)
+    for tick in range(ticks):
+        now_us = BEGIN_US + tick * TICK_US
+        sense(core.rows, put_hover(core, now_us, tick), now_us, 0.0 if tick == 0 else TICK_US * 1e-6)
+    return core
+
+
+# ---- compiled and interpreted
+
+
+def rows_of(core: FlightCore) -> dict[str, Any]:
+    """All arrays that the tick reads and writes, by name."""
+    rows: dict[str, Any] = {f"law {name}": row for name, row in core.law_rows._asdict().items()}
+    for name, row in core.rows._asdict().items():
+        parts = row._asdict() if hasattr(row, "_asdict") else {"": row}
+        for part, array in parts.items():
+            if hasattr(array, "_asdict"):
+                rows |= {f"{name} {part} {key}": value for key, value in array._asdict().items()}
+            else:
+                rows[f"{name} {part}".strip()] = array
+    return rows
+
+
+def fingerprints() -> dict[str, str]:
+    """Hash of every array behind some ticks of each law in each mode."""
+    found = {}
+    for number, law in LAWS.items():
+        for name, mode in MODES.items():
+            core = settled(number)
+            begin_us = BEGIN_US + 8 * TICK_US
+            hold(core, mode, begin_us)
+            for tick in range(4):
+                now_us = begin_us + tick * TICK_US
+                count = put_hover(core, now_us, 8 + tick)
+                came = fly_tick(core.rows, core.law_rows, count, now_us, 8 + tick, TICK_US * 1e-6)
+                assert came == FLOWN
+            for array, row in rows_of(core).items():
+                found[f"{law.name}, {name}: {array}"] = hashlib.sha256(row.tobytes()).hexdigest()[:12]
+    return found
+
+
+SCRIPT = f"""
+import json, sys
+sys.path.insert(0, {str(Path(__file__).parents[2])!r})
+from tests.core.test_tick import fingerprints
+print(json.dumps(fingerprints()))
+"""
+
+
+def test_every_law_in_every_mode_leaves_the_same_rows_compiled_and_interpreted() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
+    )
+    interpreted, compiled = json.loads(done.stdout), fingerprints()
+    assert len(compiled) > 15 * len(LAWS) * len(MODES)
+    assert [name for name in compiled if compiled[name] != interpreted[name]] == []
+
+
+# ---- whatever the sensors say
+
+HOSTILE = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e10, -1e5, 3.0, 1.0, 0.0, -0.0, -1.0, 1e-30)
+INSTANTS_US = (0, -TICK_US, -299_000, -301_000, -BEGIN_US, 1, 10**9, math.nan, math.inf, -math.inf)
+ROW = st.tuples(
+    st.sampled_from((box.IMU, box.POSE, box.FIELD, box.FIX, box.HEIGHT, box.LOAD, box.DIRECTION, 99, -1)),
+    st.sampled_from(INSTANTS_US),
+    st.lists(st.sampled_from(HOSTILE), min_size=14, max_size=14),
+)
+SCRIPTS = st.lists(st.lists(ROW, max_size=6), min_size=1, max_size=4)
+REPEATS = 70  # ticks: more than the refusals after which a tracker is believed all the same
+
+
+def put_rows(core: FlightCore, rows: list[Any], now_us: int) -> int:
+    for at, (kind, later_us, numbers) in enumerate(rows):
+        core.rows.inbox[at] = [kind, now_us + later_us, *numbers]
+    return len(rows)
+
+
+def numbers_of(core: FlightCore) -> list[float]:
+    """All numbers of the estimate, but for the ages, which are infinite of what was never heard."""
+    e = core.estimator
+    e = e._replace(
+        vehicle=e.vehicle._replace(age_s=0.0),
+        load=e.load._replace(age_s=0.0),
+        aids=e.aids._replace(magnetic_age=0.0, barometer_age=0.0),
+    )
+    row = np.zeros(len(core.rows.estimator))
+    pack(e, row, 0)
+    return [*row, *core.rows.history.covariance.ravel()]
+
+
+@pytest.mark.parametrize("begun", [False, True], ids=["before the first reading", "in flight"])
+@settings(max_examples=40, deadline=None)
+@given(script=SCRIPTS)
+def test_no_reading_makes_the_estimate_or_a_force_no_number(begun: bool, script: list[list[Any]]) -> None:
+    core = settled() if begun else new_core()
+    begin_us = BEGIN_US + 8 * TICK_US
+    hold(core, LOAD_POSITION, begin_us)
+    for tick in range(REPEATS):
+        now_us = begin_us + tick * TICK_US
+        count = put_rows(core, script[tick % len(script)], now_us)
+        came = fly_tick(core.rows, core.law_rows, count, now_us, 8 + tick, TICK_US * 1e-6)
+        assert np.isfinite(numbers_of(core)).all()
+        if came == TO_DECIDE:
+            control_tick(core.rows, core.law_rows, 0)
+        assert all(0.0 <= force <= core.setup.vehicle.rotor_max for force in core.forces)
+
+
+@settings(max_examples=20, deadline=None)
+@given(script=SCRIPTS)
+def test_behind_any_readings_honest_ones_settle_the_estimate_again(script: list[list[Any]]) -> None:
+    core = settled()
+    for tick in range(8, 8 + REPEATS):
+        now_us = BEGIN_US + tick * TICK_US
+        sense(core.rows, put_rows(core, script[tick % len(script)], now_us), now_us, TICK_US * 1e-6)
+    for tick in range(8 + REPEATS, 8 + REPEATS + 750):
+        now_us = BEGIN_US + tick * TICK_US
+        sense(core.rows, put_hover(core, now_us, tick), now_us, TICK_US * 1e-6)
+    assert complaints(core.estimator, core.settings.failsafe.sensor_age_limit_s) == ()
+    assert core.state.x_load == pytest.approx((0.0, 0.0, HOVER_M), abs=0.02)
+
+
+def test_more_readings_than_the_inbox_has_room_for_are_all_heard() -> None:
+    core = new_core()
+    imu = ImuReading(ZERO, (0.0, 0.0, core.setup.vehicle.gravity))
+    over = (0.0, 0.0, HOVER_M + core.setup.vehicle.cable_length)
+    pose = PoseReading(0.0, over, IDENTITY_QUAT, ZERO, 0.001, 0.001, -1.0)
+    readings = ((box.IMU, BEGIN_US, imu), *((box.POSE, BEGIN_US, pose),) * 1000)
+    assert len(readings) > len(core.rows.inbox)
+    core.take_inbox(fill(core.rows.inbox, Tick(BEGIN_US, readings, imu, None, 0, ())))
+    core.step(len(readings), BEGIN_US, 0, 0.0)
+    heard = core.rows.history.consistency[0, 0]
+    assert heard == 999.0, "the first one starts the estimate"
+    assert core.state.x_quad == pytest.approx(over, abs=1e-9)
+    assert np.isfinite(numbers_of(core)).all()
+
+
+# ---- other parameters in flight
+
+
+def set_parameter(craft: Craft, name: str, value: float) -> None:
+    kind = mavlink.MAV_PARAM_TYPE_REAL32
+    craft.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
+
+
+def test_a_longer_and_a_shorter_delay_of_the_rotors_is_flown_with_from_the_next_tick_on() -> None:
+    """Nothing is forgotten of what the rotors were asked for: they are not believed to have stood still."""
+    craft = Craft(Takeoff(1.0), Delay(60.0), Land(), SIM_ACT_DELAY_MS=20.0)
+    craft.begin()
+    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    craft.wait(2.0)
+    vehicle = craft.onboard.core.setup.vehicle
+    weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    for delay_ms, rows in ((60.0, 17), (0.0, 2), (20.0, 7)):
+        set_parameter(craft, "SIM_ACT_DELAY_MS", delay_ms)
+        set_parameter(craft, "VEH_ACT_DELAY", delay_ms)
+        for _ in range(250):
+            craft.tick()
+            core = craft.onboard.core
+            assert core.pilot.thrust == pytest.approx(weight, rel=0.02), "measured 0.5 %"
+        assert core.rows.commands.shape == (rows, 4)
+        assert craft.simulator.parameters.table["SIM_ACT_DELAY_MS"] == delay_ms
+    assert craft.flight.phase == Phase.MISSION, craft.texts
+    # measured
+    assert craft.worst_error < 0.02
+
+
+def test_another_law_is_not_taken_in_flight() -> None:
+    craft = Craft(Takeoff(1.0), Delay(60.0), Land())
+    craft.begin()
+    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    law, kind = craft.onboard.core.setup.law, type(craft.onboard.core.law_rows)
+    set_parameter(craft, "CTL_LAW", 0.0)
+    craft.wait(0.5)
+    assert craft.onboard.parameters["CTL_LAW"] == 2.0
+    assert craft.onboard.core.setup.law == law
+    assert type(craft.onboard.core.law_rows) is kind
+    with pytest.raises(ParameterError, match="fixed while running"):
+        craft.onboard.parameters.set("CTL_LAW", 0.0)
+    assert craft.flight.phase == Phase.MISSION, craft.texts
+    assert craft.worst_error < 0.02
