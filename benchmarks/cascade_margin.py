@@ -39,11 +39,12 @@ from autopilot.control.actuators.lag_compensation import lag_gain
 from autopilot.control.actuators.rotor_model import Actuation, actuation_constants, advance
 from autopilot.control.command_filter import FilterState
 from autopilot.control.design import Timing, Wanted, design
-from autopilot.control.laws.plumbline import PlumblineConstants, load_position_tick
+from autopilot.control.laws.plumbline import PlumblineConstants, PlumblineLaw, PlumblineMemory, load_position
+from autopilot.control.laws.thesis import ThesisLaw
 from autopilot.control.linear_model import LOAD_STATES, hover_thrust, load_state_space
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
-from autopilot.control.records import Reference, Vehicle
+from autopilot.control.records import Cable, Reference, Vehicle
 from gcs.sweep.margin import sampled_plant, state_at
 
 Array = NDArray[np.float64]
@@ -165,8 +166,8 @@ def law(settings: Settings, vehicle: Vehicle) -> Callable[[Array], Array]:
     return tick
 
 
-def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConstants:
-    """What the law is told: the delay and lag of the settings, unless others are believed."""
+def plumbline_built(settings: Settings, vehicle: Vehicle) -> PlumblineLaw:
+    """The law, told the delay and lag of the settings, unless others are believed."""
     told = {
         "believed_tau": settings.rotor_tau,
         "believed_delay": settings.delay,
@@ -181,7 +182,7 @@ def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConsta
         gains = plumbline.PlumblineGains(
             **{n: getattr(settings.gains, n, ZERO) for n in plumbline.PlumblineGains._fields}
         )
-    return PlumblineConstants(
+    constants = PlumblineConstants(
         gains,
         Drag(0.0, 0.0),
         actuation_constants(told["believed_delay"], told["believed_tau"], settings.period),
@@ -189,6 +190,10 @@ def plumbline_constants(settings: Settings, vehicle: Vehicle) -> PlumblineConsta
         settings.period,
         vehicle,
     )
+    # the other modes play no part in load position
+    filters = thesis.thesis_filters(settings.period)
+    others = ThesisLaw(thesis.THESIS_GAINS, filters, QUAD_POSITION_GAINS, vehicle)
+    return PlumblineLaw(constants, others, told["believed_delay"])
 
 
 LAW_MEMORY = 8  # thrust rate, rotors' thrust and moment, integral; then the commands on their way
@@ -200,10 +205,12 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
     Mass and wind are not observed here: across the cable what is observed does not depend on the rotors, and
     along it the mass is learned slowly.
     """
-    constants = plumbline_constants(settings, vehicle)
+    built = plumbline_built(settings, vehicle)
     reference = Reference((ZERO,) * 7, HEADING)
-    observed = aloft(vehicle)
-    rows = constants.actuation.whole + 1
+    observed, cable = aloft(vehicle), Cable(vehicle.cable_length)
+    others = thesis.start(state_at(np.zeros(MOTION), vehicle), ZERO, ZERO)
+    believed = built.constants.actuation
+    rows = believed.whole + 1
     weight = hover_thrust(vehicle)
 
     def tick(numbers: Array) -> Array:
@@ -211,21 +218,17 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
         queue = np.zeros((rows + 1, 4))
         queue[:rows] = numbers[LAW_MEMORY:-MOTION].reshape(rows, 4)
         actuation = Actuation(queue, float(numbers[1]), _vec(numbers[2:5]))
-        memory, command = load_position_tick(
-            plumbline.PlumblineMemory(float(numbers[0]), _vec(numbers[5:8])),
-            state,
-            reference,
-            actuation,
-            observed,
-            constants,
+        position = plumbline.PlumblineMemory(float(numbers[0]), _vec(numbers[5:8]))
+        memory, command = load_position(
+            built, PlumblineMemory(position, others), state, reference, actuation, observed, cable
         )
-        after = advance(actuation, command.thrust, command.moment, constants.actuation)
+        after = advance(actuation, command.thrust, command.moment, believed)
         return np.array(
             [
-                memory.thrust_rate,
+                memory.position.thrust_rate,
                 after.thrust,
                 *after.moment,
-                *memory.integral,
+                *memory.position.integral,
                 *after.queue[:rows].ravel(),
                 command.thrust,
                 *command.moment,

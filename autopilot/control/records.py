@@ -39,7 +39,7 @@ class Cable(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the laws are told of the motion, while the cable is taut (2-19)."""
+    """State passed to the control laws: the motion while the cable is taut (2-19)."""
 
     x_load: Vec3  # x_L, m
     v_load: Vec3  # m/s

@@ -174,7 +174,7 @@ class FlightCore:
         if not (reels or self._dirty):
             return
         before_m = flight.cable.length_m
-        flight = self.flight = _with_cable_now(flight, now_us)
+        flight = self.flight = with_cable_now(flight, now_us)
         winch = flight.cable
         length = self.setup.vehicle.cable_length if winch.length_m is None else winch.length_m
         grown = 0.0 if before_m is None or winch.length_m is None else winch.length_m - before_m
@@ -275,7 +275,7 @@ def _constants(setup: Setup) -> CoreConstants:
     )
 
 
-def _with_cable_now(flight: Flight, now_us: int) -> Flight:
+def with_cable_now(flight: Flight, now_us: int) -> Flight:
     """The flight with its cable as the winch has it at this instant: L, L' and L'' of the leg that reels."""
     top = top_of(flight.legs[0]) if flight.legs else None
     if top is None:

@@ -10,6 +10,7 @@ from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance.layout import jets_ahead
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, Run, transfer_leg
+from autopilot.guidance.setpoint_follower import begin_following
 from autopilot.trajectory.shaping import shape
 from missions.model import Signals, Sine, Term
 
@@ -29,6 +30,7 @@ def rehearse(setup: Setup) -> None:
         transfer_leg(load, over, 1.0, 1.0, LOAD_POSITION),
         Creep(over, ZERO, QUAD_POSITION),
         Run(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
+        begin_following((load, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), 1.0),
     )
     tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
     for leg in legs:

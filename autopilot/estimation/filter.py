@@ -1,7 +1,7 @@
 """The estimator as the core sees it: one call for each tick's readings.
 
-What the laws are told (`control_state`) and what keeps the estimate from being flown on (`complaints`)
-follow.
+`control_state` is the state passed to the control laws, `complaints` says what keeps the estimate from being
+flown on.
 """
 
 from __future__ import annotations

@@ -142,6 +142,8 @@ def _with_field(record: Any, name: Any, value: Any) -> Any:
     kind: Any = getattr(record, "instance_class", None)
     if not _is_record(kind) or not isinstance(name, types.StringLiteral):
         return None
+    if name.literal_value not in kind._fields:
+        return None
     parts = ", ".join("value" if part == name.literal_value else f"record.{part}" for part in kind._fields)
     made: dict[str, Any] = {"kind": kind}
     exec(f"def put(record: Any, name: Any, value: Any) -> Any:\n    return kind({parts})\n", made)

@@ -284,7 +284,7 @@ def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLim
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """The vehicle leans as it is asked to; nobody looks after the position of the load."""
+    """The vehicle follows an attitude setpoint; the position of the load is uncontrolled."""
 
     lean: AttitudeSetpoint
     anchor: Vec3

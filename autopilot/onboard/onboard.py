@@ -65,7 +65,7 @@ _REBOOT = mavlink.MAVLink_command_long_message(
 )
 MOST_NAMED = 8  # items in one text
 AT_ONCE_STEPS = 30  # of a mission that is prepared between two ticks on the ground; some 0.4 s
-LEAP_US = 5_000_000  # a tick that far ahead is no tick of this flight
+LEAP_US = 5_000_000  # larger jumps are rejected
 
 
 class Work(NamedTuple):

@@ -170,7 +170,7 @@ class VehicleEndpoint:
             self._forget(link)
 
     def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
-        """Handle what came over `link`; answers leave with the next `poll`. No bytes raise anything."""
+        """Handle a datagram of `link`; answers leave with the next `poll`. Malformed input never raises."""
         events: list[Event] = []
         for received in decode(datagram)[0]:
             message_id = received.message.get_msgId()  # some messages have a field called id

@@ -198,6 +198,7 @@ def may_decide(
         and isfinite(norm(state.v_quad))
         and isfinite(norm(state.x_load))
         and isfinite(norm(state.v_load))
+        and isfinite(pull)
     )
     if not finite or not tilt <= at.tilt_limit or not known:
         return True

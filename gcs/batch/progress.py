@@ -37,7 +37,7 @@ class BatchDisplay(LiveBars):
         plain = (lambda: self._line(running)) if self.flown != self._told else None
         self._show(lambda: self._rows(running), plain, at_once=last)
 
-    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+    def columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
 
         bar = BarColumn(bar_width=32)

@@ -43,11 +43,12 @@ class Origin:
 
 def origin_of(settings: Mapping[str, Any], entries: Iterable[str]) -> Origin:
     """The origin of flights that are flown now, by the modules `entries`, under `settings`."""
-    return Origin(settings, version("plumbline"), _code(tuple(entries)))
+    return Origin(settings, version("plumbline"), code_of(tuple(entries)))
 
 
 @cache
-def _code(entries: tuple[str, ...]) -> str:
+def code_of(entries: tuple[str, ...]) -> str:
+    """The fingerprint of the sources that these modules reach, read once in a run."""
     return fingerprint(entries)
 
 

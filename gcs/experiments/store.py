@@ -14,13 +14,13 @@ MARK_FILE = "flown.json"  # written when a flight is whole; says which code flew
 TLOG_FILE = "flight.tlog"
 _WHOLE = ("completed", "diverged", "timeout")  # outcomes that say something about the experiment
 # of the code that flies an experiment: `gcs fly` once it has read a mission file, and what it starts
-_ENTRIES = ("gcs.workflows.own_flight", "missions.fileformat", "sitl.__main__", "autopilot.__main__")
+ENTRIES = ("gcs.workflows.own_flight", "missions.fileformat", "sitl.__main__", "autopilot.__main__")
 
 
 def experiment_origin(experiment: Experiment) -> Origin:
     """What an experiment follows from when it is flown now."""
     case, law, vehicle = experiment
-    return origin_of(_settings(case, law, vehicle, SENSORS, SEED, {}), _ENTRIES)
+    return origin_of(_settings(case, law, vehicle, SENSORS, SEED, {}), ENTRIES)
 
 
 def is_flown(directory: Path, origin: Origin) -> bool:

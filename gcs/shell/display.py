@@ -48,7 +48,7 @@ class LiveBars:
         self._stage: str | None = None  # of the last plain line
         self._plain_s = 0.0
 
-    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+    def columns(self) -> tuple[ProgressColumn | str, ...]:
         """Columns of the bars."""
         raise NotImplementedError
 
@@ -86,9 +86,7 @@ class LiveBars:
         from rich.progress import Progress
 
         console = Console(stderr=True)
-        self._bars = Progress(
-            *self._columns(), console=console, auto_refresh=False, transient=self._transient
-        )
+        self._bars = Progress(*self.columns(), console=console, auto_refresh=False, transient=self._transient)
         self._bars.start()
         return self._bars
 
@@ -122,7 +120,7 @@ class FlightDisplay(LiveBars):
             progress.phase,
         )
 
-    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+    def columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn
 
         return (
@@ -178,7 +176,7 @@ class StepDisplay(LiveBars):
         row = {"description": title or self._title, "completed": done, "total": total or None}
         self._show(lambda: {"step": row}, None)
 
-    def _columns(self) -> tuple[ProgressColumn | str, ...]:
+    def columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
 
         return (SpinnerColumn(), "{task.description}", BarColumn(), MofNCompleteColumn())

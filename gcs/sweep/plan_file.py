@@ -10,13 +10,13 @@ from gcs.batch.reuse import Origin, file_digests, origin_of
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
 
 PLAN_FILE = "plan.json"
-_ENTRIES = ("gcs.sweep.work",)  # of the code that flies a sweep
+ENTRIES = ("gcs.sweep.work",)  # of the code that flies a sweep
 
 
 def sweep_origin(plan: SweepPlan) -> Origin:
     """What the flights of a plan follow from when they are flown now."""
     files = file_digests((plan.mission, plan.vehicle, plan.sensors))
-    return origin_of({"plan": plan.to_json(), "files": files}, _ENTRIES)
+    return origin_of({"plan": plan.to_json(), "files": files}, ENTRIES)
 
 
 def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, axpy, dot, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, axpy, sub
 from autopilot.geometry.so3 import quat_normalise
+from sitl.plant.impact import stretched
 from sitl.plant.rates import rates
 from sitl.plant.records import Motion, Rotors, Truth
 from sitl.plant.rotors import approach, decay
@@ -41,30 +42,6 @@ def _shift(motion: Motion, s: float, rate: Motion) -> Motion:
         axpy(s, rate.omega, motion.omega),
         motion.length + s * rate.length,
         motion.length_dot + s * rate.length_dot,
-    )
-
-
-@kernel
-def stretched(motion: Motion, truth: Truth) -> Motion:
-    """The pair with its distance set to the cable length and no velocity along the cable but the winch's.
-
-    Centre of mass and linear momentum stay. After a taut step this takes back the integrator's drift; at the
-    instant a slack cable comes taut it is the perfectly inelastic impact.
-    """
-    length = norm(motion.cable)
-    q_cable = scale(1.0 / length, motion.cable)
-    share = truth.quad_mass / (truth.quad_mass + truth.load_mass)
-    excess = length - motion.length
-    speed = dot(q_cable, motion.cable_dot) - motion.length_dot
-    return Motion(
-        axpy(-share * excess, q_cable, motion.x_load),
-        axpy(-share * speed, q_cable, motion.v_load),
-        scale(motion.length, q_cable),
-        axpy(-speed, q_cable, motion.cable_dot),
-        motion.quat,
-        motion.omega,
-        motion.length,
-        motion.length_dot,
     )
 
 

@@ -16,7 +16,8 @@ from autopilot.geometry.linear import ZERO, Vec3, axpy, dot, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.geometry.so3 import IDENTITY_QUAT
 from sitl.plant.contact import quad_reach
-from sitl.plant.flow import Flow, flow, stretched
+from sitl.plant.flow import Flow, flow
+from sitl.plant.impact import stretched
 from sitl.plant.records import Motion, PlantState, Rotors, Truth
 from sitl.plant.rotors import limited
 

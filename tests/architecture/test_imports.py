@@ -2,10 +2,11 @@
 
 Missions and geometry stand alone; trajectory on both, the wire on these; the vehicle on the wire; services,
 laws, estimator and guidance on those; the supervisor on guidance and services; the core of the flight on
-everything below. `sitl` knows of the autopilot its geometry and its wire, `gcs` also the paths and the
-definitions of parameters; only `gcs/closed_loop.py` and `gcs/sweep` join the cores. What a vehicle is and how
-a TOML file is read are leaves that every program shares. Sockets, clocks, threads and logging belong to the
-shells alone.
+everything below. A law is known by its folder: nothing outside imports one by name. `sitl` knows of the
+autopilot its geometry and its wire, and is built like it: the plant on geometry, the sensors on the plant,
+the world's tick on both. `gcs` knows also the paths and the definitions of parameters; only
+`gcs/closed_loop.py` and `gcs/sweep` join the cores. What a vehicle is and how a TOML file is read are leaves
+that every program shares. Sockets, clocks, threads and logging belong to the shells alone.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("autopilot", "sitl", "gcs", "missions")
+
+LAW_FILES = (ROOT / "autopilot" / "control" / "laws").glob("[!_]*.py")
+LAWS = sorted(path.stem for path in LAW_FILES if path.stem != "interface")
 
 LEAVES = ("autopilot.geometry", "missions", "autopilot.trajectory", "autopilot.wire", "autopilot.vehicle")
 VEHICLE = ("autopilot.vehicle.model", "autopilot.vehicle.file")  # the record of a vehicle, and its file
@@ -65,13 +69,13 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.shell.options": ("autopilot.wire",),
     "autopilot.shell": ("autopilot",),
     "autopilot.__main__": ("autopilot",),
-    "sitl": (
-        "autopilot.geometry",
-        "autopilot.wire",
-        "autopilot.shell.options",
-        *VEHICLE,
-        "missions.toml_files",
-    ),
+    "sitl.plant": ("autopilot.geometry",),
+    "sitl.sensors": ("autopilot.geometry", "missions.toml_files", "sitl.plant.records"),
+    "sitl.vehicles": (*VEHICLE, "autopilot.wire", "sitl.plant.records"),
+    "sitl.settings": ("autopilot.geometry", "autopilot.wire"),
+    "sitl.world": ("autopilot.geometry", "sitl.plant", "sitl.sensors", "sitl.settings"),
+    "sitl.sim_core": ("autopilot.geometry", "sitl.plant", "sitl.sensors", "sitl.settings", "sitl.world"),
+    "sitl": ("autopilot.geometry", "autopilot.wire", "autopilot.shell.options", *VEHICLE),
     "gcs": GCS,
     "gcs.workflows.flight_inputs": (
         *GCS,
@@ -93,6 +97,7 @@ TOP: dict[str, tuple[str, ...]] = {
     ),
     "autopilot.onboard": ("autopilot.shell", "autopilot.__main__", "gcs.closed_loop", "gcs.sweep"),
     "gcs.closed_loop": ("gcs",),
+    **{f"autopilot.control.laws.{law}": ("autopilot.control.laws",) for law in LAWS},
 }
 
 WORLD = {"socket", "selectors", "time", "random", "logging", "threading", "asyncio", "subprocess", "signal"}
@@ -206,14 +211,24 @@ BAD = {
     "autopilot/trajectory/feasibility.py": "from autopilot.vehicle.file import load_vehicle",
     "autopilot/control/laws/thesis.py": "import autopilot.services.commands",
     "autopilot/control/actuators/mixer.py": "from autopilot.guidance.legs import Hold",
+    "autopilot/control/thesis_cascade.py": "from autopilot.estimation.records import EstimatorState",
+    "autopilot/control/believed.py": "from autopilot.control.laws import thesis",
     "autopilot/estimation/predict.py": "from autopilot.control.laws import thesis",
+    "autopilot/estimation/inbox.py": "from autopilot.core.sensor_inbox import fill",
+    "autopilot/estimation/release.py": "from autopilot.control.load_motion import Drag",
     "autopilot/estimation/measurements/pose.py": "from autopilot.supervisor.state import Flight",
     "autopilot/guidance/legs.py": "from autopilot.supervisor.state import Flight",
+    "autopilot/guidance/layout.py": "from autopilot.services.records import Verdict",
     "autopilot/services/commands.py": "def f():\n    from autopilot.control.laws import thesis",
     "autopilot/services/endpoint.py": "from autopilot.onboard import onboard",
-    "autopilot/supervisor/advance.py": "from autopilot.core.tick import step",
+    "autopilot/supervisor/advance.py": "from autopilot.core.flight_core import FlightCore",
+    "autopilot/supervisor/quiescence.py": "from autopilot.core.tick import Seen",
+    "autopilot/supervisor/settings.py": "from autopilot.control.laws import chosen_law",
+    "autopilot/supervisor/watches/slack.py": "from autopilot.estimation.tautness import tautness",
     "autopilot/supervisor/requests/arming.py": "from autopilot.estimation.filter import estimate",
     "autopilot/core/tick.py": "import time",
+    "autopilot/core/flight_core.py": "from autopilot.control.laws.plumbline import LAW",
+    "autopilot/core/sensor_inbox.py": "from autopilot.onboard.packet_loss import PacketLoss",
     "autopilot/core/warmup.py": "from autopilot.onboard.onboard import Onboard",
     "autopilot/onboard/onboard.py": "from sitl.sim_core import SimCore",
     "autopilot/onboard/snapshot.py": "from autopilot.shell.storage import Storage",
@@ -222,12 +237,18 @@ BAD = {
     "missions/model.py": "from autopilot.geometry.linear import Vec3",
     "missions/schema.py": "import random",
     "sitl/plant/step.py": "from autopilot.control.records import Vehicle",
+    "sitl/plant/winch.py": "from sitl.settings import Settings",
+    "sitl/plant/records.py": "from autopilot.vehicle.model import Vehicle",
+    "sitl/sensors/noise.py": "from sitl.world import WorldRows",
+    "sitl/world.py": "from sitl.sim_core import SimCore",
+    "sitl/sim_core.py": "from sitl.hil import HilSimulator",
+    "sitl/settings.py": "from autopilot.vehicle.file import load_vehicle",
     "sitl/hil.py": "import socket as s",
     "sitl/vehicles/truth.py": "from autopilot.vehicle.parameters import autopilot_parameters",
     "sitl/sensors/files.py": "from missions.model import Step",
     "sitl/sensors/imu.py": "from gcs.analysis import align",
     "sitl/vehicles/loader.py": "from sitl.__main__ import main",
-    "gcs/clients/flight.py": "from autopilot.core.tick import step",
+    "gcs/clients/flight.py": "from autopilot.core.tick import fly_tick",
     "gcs/analysis/align.py": "from sitl.plant.records import Truth",
     "gcs/commands/fly.py": "from sitl.sensors.files import load_profile",
     "gcs/workflows/fly.py": "from sitl.vehicles.sim_parameters import sim_parameters",
@@ -236,8 +257,13 @@ BAD = {
 }
 GOOD = {
     "autopilot/__main__.py": "from autopilot.shell.program import main",
-    "autopilot/shell/program.py": "import socket, time\nfrom autopilot.core.tick import step",
-    "autopilot/core/tick.py": "from autopilot.control.laws import thesis\nfrom missions.model import Step",
+    "autopilot/shell/program.py": "import socket, time\nfrom autopilot.core.flight_core import FlightCore",
+    "autopilot/core/tick.py": (
+        "from autopilot.control.laws.interface import kernels_of\nfrom autopilot.supervisor import quiescence"
+    ),
+    "autopilot/onboard/onboard.py": "from autopilot.control.laws import build_law, chosen_law",
+    "autopilot/control/laws/plumbline.py": "from autopilot.control.laws import thesis",
+    "autopilot/supervisor/quiescence.py": "from autopilot.control.records import State",
     "autopilot/control/laws/thesis.py": (
         "from autopilot.geometry.linear import Vec3\nfrom ..records import Command"
     ),
@@ -247,6 +273,7 @@ GOOD = {
     "sitl/vehicles/truth.py": (
         "from autopilot.vehicle.file import load_vehicle\nfrom autopilot.vehicle.model import Vehicle"
     ),
+    "sitl/world.py": "from sitl.plant.step import step_plant\nfrom sitl.settings import Settings",
     "sitl/sensors/shipped.py": "from missions.toml_files import TomlFiles",
     "gcs/workflows/flight_inputs.py": "from sitl.vehicles.sim_parameters import sim_parameters",
     "gcs/closed_loop.py": "from sitl.hil import HilSimulator\nfrom autopilot.onboard.onboard import Onboard",

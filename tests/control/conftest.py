@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from autopilot.control import height, quad_position
+from autopilot.control import height, quad_position, thesis_cascade
 from autopilot.control.actuators import mixer
-from autopilot.control.laws import thesis
 from autopilot.control.records import Vehicle
 from tests.control import model as independent
 from tests.control import oracle
@@ -46,8 +45,8 @@ def model() -> SimpleNamespace:
 
 @pytest.fixture(scope="session")
 def law_sources() -> dict[str, str]:
-    """Source texts, by module, of the thesis's laws with all they are made of."""
-    return sources(thesis, height, quad_position, mixer)
+    """Source texts, by module, of the thesis's cascade with all they are made of."""
+    return sources(thesis_cascade, height, quad_position, mixer)
 
 
 @pytest.fixture(scope="session")

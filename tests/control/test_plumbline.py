@@ -22,16 +22,21 @@ from autopilot.control.actuators import predictor as prediction
 from autopilot.control.actuators import rotor_model as actuation
 from autopilot.control.actuators.mixer import mix
 from autopilot.control.actuators.rotor_model import actuation_constants
-from autopilot.control.laws.interface import PlumblineLaw, build_law
+from autopilot.control.believed import believed_design, believed_vehicle
+from autopilot.control.laws import build_law, chosen_law
+from autopilot.control.laws import plumbline as law_file
+from autopilot.control.laws.interface import kernels_of, law_of
+from autopilot.control.laws.plumbline import PlumblineLaw
 from autopilot.control.load_motion import Drag
 from autopilot.control.quad_attitude import attitude_from_rates, attitude_moment
-from autopilot.control.records import Jet, Reference, State, Vehicle
+from autopilot.control.records import Cable, Jet, Reference, State, Vehicle
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.signals import evaluate, signal_table
 from autopilot.vehicle import file as vehicle_file
 from autopilot.vehicle.file import VehicleFileError, load_vehicle
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
+from autopilot.wire.parameter_table import ParameterTable
 from benchmarks import cascade_margin
 from missions.fileformat import load_mission
 from missions.model import Signals
@@ -79,6 +84,8 @@ def compiled() -> SimpleNamespace:
         lag_gain=rotor_lag.lag_gain,
         hasten=rotor_lag.hasten,
         actuation_constants=actuation.actuation_constants,
+        rows_of=actuation.rows_of,
+        steady=actuation.steady,
         after_delay=actuation.after_delay,
         advance=actuation.advance,
         predict=prediction.predict,
@@ -514,11 +521,11 @@ def forces_are_differentiated(law: SimpleNamespace, model: SimpleNamespace, vehi
 
 def rotors_are_believed_as_they_are(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """Belief and a simulation of the commands, each from the instant it is in force, over whole and broken
-    delays."""
+    delays; no more commands are remembered than the delay asks for."""
     for delay, lag in ((0.0, 0.02), (0.010, 0.02), (0.012, 0.0), (0.0719, 0.03), (0.2, 0.01)):
         constants = law.actuation_constants(delay, lag, TICK)
         rng = np.random.default_rng(35)
-        belief, commands, fine = actuation.steady(4.9), [], 40
+        belief, commands, fine = law.steady(4.9, law.rows_of(constants)), [], 40
         true, h = np.array([4.9, 0.0, 0.0, 0.0]), TICK / fine
         kept = math.exp(-h / lag) if lag > 0.0 else 0.0
 
@@ -757,37 +764,49 @@ def test_rotors_that_are_fast_enough_are_left_alone() -> None:
 
 
 def built(**values: float) -> PlumblineLaw:
-    table = autopilot_parameters(load_vehicle("bebop"))
-    table.set("CTL_LAW", float(LAWS.index("plumbline")))
-    for name, value in values.items():
-        table.set(name, value)
-    law = build_law(table)
+    law = build_law(parameters(**values))
     assert isinstance(law, PlumblineLaw)
     return law
 
 
+def parameters(**values: float) -> ParameterTable:
+    table = autopilot_parameters(load_vehicle("bebop"))
+    table.set("CTL_LAW", float(LAWS.index("plumbline")))
+    for name, value in values.items():
+        table.set(name, value)
+    return table
+
+
 def test_it_is_selected_by_its_number_and_set_by_its_parameters() -> None:
-    law = built(PLB_DELAY_TOL=20.0, VEH_ACT_DELAY=10.0, PLB_DRAG=0.5)
-    assert law.designed.tolerance == pytest.approx(0.020, rel=1e-3)
-    assert law.designed.omega_R < built().designed.omega_R
-    assert law.constants.gains == law.designed.gains
+    table = parameters(PLB_DELAY_TOL=20.0, VEH_ACT_DELAY=10.0, PLB_DRAG=0.5)
+    designed = believed_design(table, believed_vehicle(table))
+    assert designed.tolerance == pytest.approx(0.020, rel=1e-3)
+    usual = parameters()
+    assert designed.omega_R < believed_design(usual, believed_vehicle(usual)).omega_R
+    law = build_law(table)
+    assert law.constants.gains == designed.gains
     assert law.constants.drag == Drag(0.5, 0.012)
     assert law.constants.lag_gain == rotor_lag.lag_gain(0.02, 0.01, TICK)
     assert law.constants.actuation == actuation_constants(0.010, 0.02, TICK)
-    assert law.preview_s == pytest.approx(0.010)
-    assert law.ramp_lag_s == 0.0
+    assert chosen_law(table) is law_of(law) is law_file.LAW
+    assert law_file.LAW.preview_s(law) == pytest.approx(0.010)
+    assert law_file.LAW.ramp_lag_s(law) == 0.0
 
 
 def test_every_mode_flies_through_one_interface(model: SimpleNamespace) -> None:
     law, state = built(VEH_ACT_DELAY=10.0), level_state(model)
+    flown, vehicle = kernels_of(law), law.constants.vehicle
+    cable = Cable(vehicle.cable_length)
     hovering = actuation.steady(4.905)
-    observed = observer.nominal(law.constants.vehicle)._replace(support=0.0, load_ground=-1.0)
-    memory = law.start(state, ZERO, ZERO)
-    memory, one = law.load_position(memory, state, Reference((ZERO,) * 7, EAST), hovering, observed)
-    memory, two = law.load_attitude(memory, state, state.q_cable, EAST, 4.905, hovering, observed)
-    memory, three = law.quad_attitude(memory, state, state.R, 4.905, hovering, observed)
-    above = Reference((state.x_quad, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), EAST)
-    memory, four = law.quad_position(memory, state, above, actuation.steady(3.924), observed)
+    observed = observer.nominal(vehicle)._replace(support=0.0, load_ground=-1.0)
+    memory = flown.start(law, state, ZERO, ZERO)
+    still, above = Reference((ZERO,) * 7, EAST), Reference((state.x_quad, *(ZERO,) * 6), EAST)
+    memory, one = flown.load_position(law, memory, state, still, hovering, observed, cable)
+    memory, two = flown.load_attitude(
+        law, memory, state, state.q_cable, EAST, 4.905, hovering, observed, cable
+    )
+    memory, three = flown.quad_attitude(law, memory, state, state.R, 4.905, hovering, observed, cable)
+    memory, four = flown.quad_position(law, memory, state, above, actuation.steady(3.924), observed, cable)
     assert [c.thrust for c in (one, two, three, four)] == pytest.approx([4.905] * 3 + [3.924])
     for command in (one, two, three, four):
         agree(command.moment, np.zeros(3), ROUNDING)
@@ -860,8 +879,8 @@ def test_cases_are_flown_within_true_limits(mission: str, delay_ticks: int, bebo
     rows = signal_table(signals.terms)
     state, constants = aloft(truth), law.constants
     belief, observed = actuation.steady(4.905), observer.aloft(bebop)
-    on_their_way = [state.rotor_force] * delay_ticks
-    memory = law.start(sensed(state), state.x_load, ZERO)
+    on_their_way, cable = [state.rotor_force] * delay_ticks, Cable(truth.cable_length)
+    memory = law_file.start(law, sensed(state), state.x_load, ZERO)
     worst = 0.0
     for k in range(round(signals.duration_s / TICK)):
         x, v, a, j, snap, c, p = evaluate(rows, k * TICK + law.preview_s)
@@ -871,7 +890,9 @@ def test_cases_are_flown_within_true_limits(mission: str, delay_ticks: int, bebo
         observed = observer.observe(
             observed, sensed(state), 1.0, belief.thrust, OBSERVER, constants.drag, bebop
         )
-        memory, command = law.load_position(memory, sensed(state), reference, belief, observed)
+        memory, command = law_file.load_position(
+            law, memory, sensed(state), reference, belief, observed, cable
+        )
         mixed = mix(command.thrust, command.moment, bebop, 1.0)
         belief = actuation.advance(belief, mixed.thrust_done, mixed.moment_done, constants.actuation)
         on_their_way.append(mixed.forces)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from autopilot.control.laws import build_law, chosen_law
@@ -11,11 +12,12 @@ from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, Takeoff
 from autopilot.supervisor.advance import advance
+from autopilot.supervisor.machine import begin_legs
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.settings import Settings, settings_from
-from autopilot.supervisor.state import Flight, MissionPlan, Phase, View
+from autopilot.supervisor.state import IN_AIR, Flight, MissionPlan, Phase, View
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
@@ -40,6 +42,12 @@ def hanging(now_us: int = 0, x: Vec3 = (0.0, 0.0, 2.0), v: Vec3 = ZERO, **change
     """A load that hangs still under its vehicle, or moves along with it."""
     over = (x[0], x[1], x[2] + SETTINGS.cable_length_m)
     return View(now_us, over, v, x, v, True, 0.0, ())._replace(**changes)
+
+
+def entered(flight: Flight, phase: Phase, seen: View, settings: Settings) -> Flight:
+    """The flight as it begins a phase, whether or not the table leads there."""
+    begun = replace(flight, phase=phase, phase_start_us=seen.now_us, still_since_us=-1, following=())
+    return begin_legs(begun, seen, settings) if phase in IN_AIR else replace(begun, legs=())
 
 
 class Sky:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from autopilot.supervisor.flight import Phase, setpoint
-
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.guidance.setpoint_follower import Follow
+from autopilot.supervisor.state import Phase, setpoint
 from autopilot.wire.dialect import plumbline as m
 from missions import model
 from tests.doubles.craft import Craft
@@ -85,7 +84,7 @@ def test_offboard_hold_and_mission_follow_each_other_in_full_motion() -> None:
         else:
             fly(0.4)
             fly(0.1, (2.5, -1.0, 1.5))  # heard, not followed
-    craft.run(lambda craft: craft.flight.step >= 2)  # the first waypoint is passed
+    craft.run(lambda craft: craft.flight.mission.step >= 2)  # the first waypoint is passed
     assert not any("given up" in text or "slack" in text for text in craft.texts)
     # measured 11 mm from the reference and 0.279 m; a stop that coasted on downwards ended on the ground
     assert worst < 0.025

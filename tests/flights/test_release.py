@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import pytest
-from autopilot.supervisor.flight import Phase
 
+from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Waypoint
 from missions.model import Release as ReleaseStep
@@ -138,10 +138,10 @@ DELIVERY = (
 def test_a_mission_delivers_and_lands_beside_what_it_delivered() -> None:
     craft = Craft(*DELIVERY)
     craft.begin()
-    craft.run(lambda c: c.flight.released)
-    assert craft.flight.on_mission
+    craft.run(lambda c: c.flight.cable.released)
+    assert craft.flight.mission.active
     landed(craft)
-    assert craft.flight.mission_done
+    assert craft.flight.mission.done
     assert craft.truth.x_load == pytest.approx((1.0, 0.5, 0.02), abs=0.03)
     assert 0.3 < math.dist(craft.truth.x_quad[:2], (1.0, 0.5)) < 0.4
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import pytest
-from autopilot.supervisor.flight import Phase
 
 from autopilot.geometry.linear import norm
+from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Signals, Sine, Takeoff, Term
 from tests.doubles.craft import Craft, at_phase
@@ -36,7 +36,7 @@ def test_the_cable_comes_taut_no_faster_than_the_parameter_says(limit: float, se
     craft.begin()
     found = snaps(craft, lambda c: c.flight.phase == Phase.MISSION)
     # measured 0.051 and 0.151 m/s (the creep of MIS_TAUT_SPEED): the vehicle's climb varies by its noise
-    assert 0.0 < max(found) < min(limit, SETTINGS.taut_speed_m_s) + 0.02
+    assert 0.0 < max(found) < min(limit, SETTINGS.motion.taut_speed_m_s) + 0.02
     assert snaps(craft, at_phase(Phase.DISARMED)) == [], "nor does landing snap"
 
 

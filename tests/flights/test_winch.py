@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import pytest
-from autopilot.supervisor.flight import Phase
 
 from autopilot.guidance.legs import Hold
+from autopilot.supervisor.state import Phase
 from missions.model import Delay, Land, Takeoff, Waypoint, Winch
 from tests.doubles.craft import Craft, at_phase
 from tests.doubles.sky import ACCEPTED
@@ -60,7 +60,7 @@ def test_the_vehicle_stays_and_the_load_goes_down_and_up(settings_: dict[str, fl
         assert load < OFF_M
         assert vehicle < OFF_M
         assert true_length(craft) == pytest.approx(there, abs=LENGTH_M)
-        assert craft.flight.cable_m == pytest.approx(there, abs=1e-12)
+        assert craft.flight.cable.length_m == pytest.approx(there, abs=1e-12)
         assert craft.truth.x_load[2] == pytest.approx(2.7 - there, abs=0.01)
     assert craft.truth.slack_events == slack
     assert "Winch: 1.50 m to 0.60 m" in craft.texts
@@ -94,7 +94,7 @@ def test_a_hold_stops_the_winch_and_belief_and_truth_stop_alike() -> None:
     load, vehicle = reeled(craft, 4.0)
     assert max(load, vehicle) < OFF_M
     assert 0.31 < true_length(craft) < 0.5  # two seconds of stopping behind two of getting under way
-    assert craft.flight.cable_m == pytest.approx(true_length(craft), abs=LENGTH_M)
+    assert craft.flight.cable.length_m == pytest.approx(true_length(craft), abs=LENGTH_M)
     assert isinstance(craft.flight.legs[0], Hold)
     assert craft.command(WINCH, 1.0, RETRACT) == ACCEPTED
     reeled(craft, 6.0)
@@ -106,7 +106,7 @@ def test_with_receiver_and_camera_the_length_is_followed_too() -> None:
     craft.command(WINCH, 1.0, LENGTH, 0.6, 0.3)
     load, _ = reeled(craft, 7.0)
     assert load < 0.06  # measured 25 mm, as in hover
-    assert craft.flight.cable_m == pytest.approx(true_length(craft), abs=LENGTH_M)
+    assert craft.flight.cable.length_m == pytest.approx(true_length(craft), abs=LENGTH_M)
 
 
 def test_a_mission_lowers_its_load_by_the_winch() -> None:
@@ -126,7 +126,7 @@ def test_a_mission_lowers_its_load_by_the_winch() -> None:
     craft.run(lambda c: c.flight.phase == Phase.MISSION)
     craft.run(watched)
     assert lowest == pytest.approx(0.9, abs=0.01)
-    assert craft.flight.mission_done
+    assert craft.flight.mission.done
     assert true_length(craft) == pytest.approx(0.7, abs=LENGTH_M)
     reached = [m.seq for m in craft.heard if m.get_type() == "MISSION_ITEM_REACHED"]
     assert reached == [0, 1, 2, 3, 4, 5]

@@ -10,6 +10,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
+from autopilot.control.laws import chosen_law
 from autopilot.geometry.linear import Vec3, norm
 from autopilot.guidance.legs import (
     LOAD_ATTITUDE,
@@ -43,7 +44,8 @@ from missions.model import Signals, Sine, Term
 
 HERE, THERE = (1.0, -2.0, 3.0), (2.0, 1.0, 2.5)
 SIGNALS = Signals(4.0, (Term("y", 0.4, 0.3, 0.7, 1.0, 0.7, (Sine(1.3),)),))
-LIMITS = limits_from(autopilot_parameters(load_vehicle("bebop")))
+TABLE = autopilot_parameters(load_vehicle("bebop"))
+LIMITS = limits_from(TABLE, chosen_law(TABLE).follows_shaped)
 SHAPED = shape(Signals(3.0, (Term("y", 0.2, 0.2, 0.7, None, 0.0),)), LIMITS.body, LIMITS.bounds)
 POINTS = (HERE, THERE, (3.0, 1.0, 3.0))
 _PATH, _TIMES = passage(POINTS, 1.5, 1.5, LIMITS.body, LIMITS.bounds, False)

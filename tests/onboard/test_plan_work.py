@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.supervisor.flight import Phase
-
+from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import PENDING
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -47,9 +46,9 @@ def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() ->
     upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
     work = onboard.work
     assert work is not None
-    assert craft.flight.plan.prepared.pending
+    assert craft.flight.mission.plan.prepared.pending
     onboard.finish(work, work.done())
     assert onboard.work is None
-    assert not craft.flight.plan.prepared.pending
+    assert not craft.flight.mission.plan.prepared.pending
     onboard.finish(work, PENDING)
-    assert not craft.flight.plan.prepared.pending, "an answer that nobody waits for"
+    assert not craft.flight.mission.plan.prepared.pending, "an answer that nobody waits for"

@@ -14,7 +14,6 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import _enter as enter
 from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
@@ -27,7 +26,7 @@ from autopilot.supervisor.state import (
 )
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint
-from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, entered, hanging, view
 
 STEPS = (Takeoff(2.0), Waypoint(3.0, 0.0, 2.0, hold_s=1.0), model.Land())
 # m: setpoints on both sides of a join; a tick of 20 ms at 1.5 m/s is 30 mm
@@ -238,11 +237,11 @@ def test_a_landing_that_is_called_off_by_another_item_is_called_off() -> None:
 
 def lowering(phase: Phase) -> Flight:
     """A flight in the last leg of its landing."""
-    flight = enter(
+    flight = entered(
         Flight(phase=Phase.HOLD, mission=MissionProgress(speed_m_s=1.0)), Phase.LOWER, hanging(), SETTINGS
     )
     if phase == Phase.SET_DOWN:
-        flight = enter(flight, phase, hanging(x=(0.0, 0.0, 0.02)), SETTINGS)
+        flight = entered(flight, phase, hanging(x=(0.0, 0.0, 0.02)), SETTINGS)
     return Flight(phase=phase, legs=flight.legs[-1:], leg_start_us=0)
 
 
@@ -302,7 +301,7 @@ def under_way(phase: Phase) -> Flight:
         mission=MissionProgress(plan=plan, step=1, takeoff_altitude_m=4.0, speed_m_s=1.0),
         setpoints=Setpoints(offboard=Stream(PositionSetpoint(HERE), 0)),
     )
-    return enter(held, phase, hanging(x=HERE), SETTINGS)
+    return entered(held, phase, hanging(x=HERE), SETTINGS)
 
 
 @pytest.mark.parametrize("trouble", TROUBLES)

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from autopilot.supervisor.flight import Guide, Phase, pace_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -33,6 +32,7 @@ from autopilot.services.requests import (
     SetMode,
     Takeoff,
 )
+from autopilot.supervisor.state import Guide, Phase, pace_of
 from autopilot.wire.dialect import plumbline as m
 from tests.doubles.motion import CABLE_LENGTH
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
@@ -88,7 +88,7 @@ def test_offboard_brings_the_load_to_the_setpoint_and_holds_when_it_is_lost() ->
     stream(sky, at(3.0, -1.0, 2.5), 12.0)
     assert norm(sub(sky.view.x_load, (3.0, -1.0, 2.5))) < 0.01
     assert sky.flight.phase == Phase.GUIDED
-    sky.wait(SETTINGS.offboard_loss_us * 1e-6 - 0.05)
+    sky.wait(SETTINGS.setpoints.offboard_loss_us * 1e-6 - 0.05)
     assert sky.flight.phase == Phase.GUIDED
     sky.wait(0.2)
     assert sky.flight.phase == Phase.HOLD
@@ -99,22 +99,19 @@ def test_offboard_brings_the_load_to_the_setpoint_and_holds_when_it_is_lost() ->
 def test_a_relative_setpoint_is_from_where_the_load_is() -> None:
     sky = offboard(at(0.0, 0.0, 2.0))
     assert sky.ask(at(1.0, math.nan, math.nan, relative=True)).result == ACCEPTED
-    asked = sky.flight.offboard.asked
+    asked = sky.flight.setpoints.offboard.asked
     assert isinstance(asked, PositionSetpoint)
     assert asked.position[0] == pytest.approx(sky.view.x_load[0] + 1.0)
     assert math.isnan(asked.position[1])
 
 
 def test_setpoints_for_the_vehicle_are_a_cable_above_those_for_the_load() -> None:
-    sky = Sky(settings=SETTINGS.__class__(**{**_fields(SETTINGS), "guides_vehicle": True})).airborne()
+    guided = replace(SETTINGS.setpoints, guides_vehicle=True)
+    sky = Sky(settings=replace(SETTINGS, setpoints=guided)).airborne()
     sky.ask(at(0.0, 0.0, 5.0))
-    asked = sky.flight.offboard.asked
+    asked = sky.flight.setpoints.offboard.asked
     assert isinstance(asked, PositionSetpoint)
     assert asked.position[2] == pytest.approx(5.0 - CABLE_LENGTH)
-
-
-def _fields(record: Any) -> dict[str, Any]:
-    return {name: getattr(record, name) for name in record.__dataclass_fields__}
 
 
 def test_offboard_from_the_ground_takes_off_when_asked_up() -> None:
@@ -168,7 +165,7 @@ def test_the_stick_leads_and_is_lost() -> None:
     assert sky.ask(POSCTL).result == ACCEPTED
     assert mode_of(sky.flight) == (identity.POSCTL, 0)
     stream(sky, FollowStick((1.0, 0.0, 0.0)), 4.0)
-    assert sky.view.v_load[0] == pytest.approx(SETTINGS.stick_speed_m_s, rel=0.01)
+    assert sky.view.v_load[0] == pytest.approx(SETTINGS.setpoints.stick_speed_m_s, rel=0.01)
     stream(sky, FollowStick(ZERO), 5.0)
     assert norm(sky.view.v_load) < 0.01
     sky.wait(1.0)
@@ -179,7 +176,7 @@ def test_the_stick_leads_and_is_lost() -> None:
 def test_an_orbit_is_flown_about_its_centre_without_a_stream() -> None:
     sky = Sky().airborne()
     assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED
-    assert sky.flight.guide == Guide.ORBIT
+    assert sky.flight.setpoints.guide == Guide.ORBIT
     sky.wait(20.0)
     x, v = sky.view.x_load, sky.view.v_load
     assert math.hypot(x[0], x[1]) == pytest.approx(2.0, abs=0.01)
@@ -198,7 +195,7 @@ def test_a_circle_of_so_many_turns_ends_in_a_hold() -> None:
     assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0, turns=1.5)).result == ACCEPTED
     sky.run(lambda sky: sky.flight.phase == Phase.HOLD, 40.0)
     # 1.5 turns of 2 m at 1 m/s, and half of the ramp, 4 v / a, in which the speed is reached
-    lasted = 1.5 * 2.0 * math.pi * 2.0 + 0.5 * 4.0 / SETTINGS.accel_m_s2
+    lasted = 1.5 * 2.0 * math.pi * 2.0 + 0.5 * 4.0 / SETTINGS.motion.accel_m_s2
     assert (sky.now_us - begun_us) * 1e-6 == pytest.approx(lasted, abs=0.05)
     assert sky.texts[-1] == "Circle flown: holding"
     sky.wait(5.0)
@@ -241,7 +238,7 @@ def test_the_pace_is_that_of_the_pendulum() -> None:
 
 # ---- ArduPilot's GUIDED
 
-ARDUPILOT = replace(SETTINGS, guided_mode=True)
+ARDUPILOT = replace(SETTINGS, setpoints=replace(SETTINGS.setpoints, guided_mode=True))
 GUIDED = SetMode(identity.AUTO, identity.AUTO_LOITER, number=4)
 LOITER = SetMode(identity.AUTO, identity.AUTO_LOITER, number=5)
 
@@ -272,7 +269,7 @@ def test_one_place_is_enough_in_guided() -> None:
 def test_a_velocity_in_guided_ceases_after_its_time() -> None:
     sky = guided()
     assert sky.ask(moving(1.0, 0.0, 0.0)).result == ACCEPTED
-    sky.wait(ARDUPILOT.guided_loss_us * 1e-6 - 0.1)
+    sky.wait(ARDUPILOT.setpoints.guided_loss_us * 1e-6 - 0.1)
     assert sky.flight.phase == Phase.GUIDED and sky.view.v_load[0] > 0.9
     sky.wait(0.2)
     assert sky.flight.phase == Phase.HOLD
@@ -299,7 +296,7 @@ def test_a_setpoint_ends_a_circle_in_guided() -> None:
     assert sky.ask(Orbit(2.0, 1.0, 0.0, 0.0, 3.0)).result == ACCEPTED
     sky.wait(3.0)
     assert sky.ask(at(0.0, 0.0, 2.0)).result == ACCEPTED
-    assert sky.flight.guide == Guide.OFFBOARD
+    assert sky.flight.setpoints.guide == Guide.OFFBOARD
 
 
 def test_with_other_identities_holding_heeds_no_setpoint() -> None:

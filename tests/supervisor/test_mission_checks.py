@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from autopilot.core.flight_core import with_cable_now
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.guidance.legs import top_of
 from autopilot.services.requests import Arm, Pause, ReplaceMission, Reposition, SetCurrent, StartMission
 from autopilot.supervisor.mission import with_plan
-from autopilot.supervisor.state import Phase, leg_time_s
+from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.timeline import MissionState, state_after, timeline
 from autopilot.wire.dialect import plumbline as m
@@ -87,18 +87,6 @@ FLOWN: dict[str, tuple[Step, ...]] = {
 }
 
 
-def tick(sky: Sky) -> None:
-    """A tick of a world in which the cable is as long as the winch makes it."""
-    sky.tick()
-    flight = sky.flight
-    top = top_of(flight.legs[0]) if flight.legs else None
-    length = flight.cable.length_m
-    if top is not None:
-        length = top - flight.legs[0].jet(leg_time_s(flight, sky.now_us))[0][2]
-    if length is not None:
-        sky.settings = replace(sky.settings, cable_length_m=length)
-
-
 def flown(sky: Sky) -> list[Vec3]:
     """Where each step of a mission ends, by the legs of the flight."""
     plan = sky.flight.mission.plan
@@ -107,7 +95,10 @@ def flown(sky: Sky) -> list[Vec3]:
     assert sky.ask(Arm(True, False)).result == ACCEPTED
     while len(found) < len(plan.steps):
         before = sky.flight
-        tick(sky)
+        sky.tick()
+        sky.flight = with_cable_now(sky.flight, sky.now_us)
+        if sky.flight.cable.length_m is not None:
+            sky.settings = replace(sky.settings, cable_length_m=sky.flight.cable.length_m)
         here = sky.view.x_quad if before.cable.released else sky.view.x_load
         last = before.legs[-1] if before.legs else None
         ended = here if last is None or last.duration_s > 1e6 else last.jet(last.duration_s)[0]
@@ -282,11 +273,17 @@ def test_a_winch_that_is_taken_up_again_counts_with_what_is_left_of_it() -> None
     sky.ask(StartMission(None))
     assert sky.ask(Arm(True, False)).result == ACCEPTED
 
+    def tick() -> None:
+        sky.tick()
+        sky.flight = with_cable_now(sky.flight, sky.now_us)
+        length = sky.flight.cable.length_m or SETTINGS.cable_length_m
+        sky.settings = replace(sky.settings, cable_length_m=length)
+
     while sky.settings.cable_length_m < 1.8:
-        tick(sky)
+        tick()
     assert sky.ask(Pause()).result == ACCEPTED
     for _ in range(250):
-        tick(sky)
+        tick()
     assert sky.flight.phase == Phase.HOLD
     assert sky.settings.cable_length_m + 1.5 > sky.settings.winch.longest_m
     assert sky.ask(StartMission(None)).result == ACCEPTED

@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from autopilot.supervisor.flight import Phase, asked_setpoint, jet_ahead
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import Hold, Pass, Run
+from autopilot.guidance.legs import Hold, Pass, Run, asked_jet
 from autopilot.services.requests import Arm, Pause, StartMission
-from autopilot.supervisor.requests import with_plan
+from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.state import Phase, jet_ahead, leg_time_s
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
@@ -33,7 +33,7 @@ LIMITS = SETTINGS.limits._replace(shaped=True)
 
 def prepared_sky(*steps: Step, limits: object = LIMITS) -> Sky:
     sky = Sky(*steps)
-    plan = sky.flight.plan
+    plan = sky.flight.mission.plan
     found = prepare(plan.steps, plan.sequence, limits)  # type: ignore[arg-type]
     sky.flight = with_plan(sky.flight, replace(plan, prepared=found))
     return sky
@@ -66,8 +66,7 @@ def test_getting_ready_is_taken_from_the_delay_before() -> None:
     assert isinstance(run, Run)
     assert run.path.lead_s > 0.3
     assert (sky.now_us - begun) * 1e-6 == pytest.approx(3.0 - run.path.lead_s, abs=1e-6 * STEP_US)
-    asked = asked_setpoint(sky.flight, sky.now_us)
-    assert asked is not None
+    asked = asked_jet(run, leg_time_s(sky.flight, sky.now_us))
     assert asked == run.asked(0.0)
     assert norm(asked[1]) == 0.0
 
@@ -121,7 +120,7 @@ def test_a_load_beside_the_beginning_of_a_path_is_led_onto_it() -> None:
 @pytest.mark.parametrize("item", [1, 2])
 def test_a_passage_is_paused_and_gone_on_with(item: int) -> None:
     sky = started(Takeoff(2.0), *ROUND, model.Land())
-    sky.run(lambda s: s.flight.step == item and s.flight.phase == Phase.MISSION)
+    sky.run(lambda s: s.flight.mission.step == item and s.flight.phase == Phase.MISSION)
     sky.wait(1.0)
     assert isinstance(sky.flight.legs[0], Pass)
     assert sky.ask(Pause()).result == ACCEPTED
@@ -145,9 +144,9 @@ def test_what_cannot_be_flown_is_refused_with_the_item_and_the_reason() -> None:
 
 def test_a_start_before_the_paths_are_there_is_for_later() -> None:
     sky = prepared_sky(Takeoff(2.0), *ROUND, model.Land())
-    ready = sky.flight.plan.prepared
-    sky.flight = with_plan(sky.flight, replace(sky.flight.plan, prepared=PENDING))
+    plan = sky.flight.mission.plan
+    sky.flight = with_plan(sky.flight, replace(plan, prepared=PENDING))
     assert sky.ask(StartMission(None)).result == IN_PROGRESS
-    sky.flight = replace(sky.flight, plan=replace(sky.flight.plan, prepared=ready))
+    sky.flight = replace(sky.flight, mission=replace(sky.flight.mission, plan=plan))
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED

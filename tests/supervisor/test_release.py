@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import pytest
-from autopilot.supervisor.flight import Phase
 
 from autopilot.guidance.legs import QUAD_POSITION
 from autopilot.services.requests import FollowAttitude, Grab, Release, StartMission
-from autopilot.supervisor.advance import enter
-from autopilot.supervisor.requests import decide
+from autopilot.supervisor.requests.decide import decide
+from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import AttitudeRun, Delay, Land, Signals, Takeoff, Term, Waypoint
-from tests.doubles.sky import ACCEPTED, Sky, hanging
+from tests.doubles.sky import ACCEPTED, Sky, entered, hanging
 
 DENIED = mavlink.MAV_RESULT_DENIED
 
@@ -23,12 +22,12 @@ def test_released_by_command_a_mission_is_held_and_goes_on_as_the_vehicles() -> 
     sky.wait(1.0)
     verdict = sky.ask(Release())
     assert (verdict.result, verdict.text) == (ACCEPTED, "Load released, mission held")
-    assert (sky.flight.phase, sky.flight.on_mission) == (Phase.HOLD, False)
+    assert (sky.flight.phase, sky.flight.mission.active) == (Phase.HOLD, False)
     assert sky.ask(StartMission(None)).result == ACCEPTED
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     flown = [(mode, jet[0]) for _, mode, jet in sky.setpoints[-500:]]
     assert {mode for mode, _ in flown} == {QUAD_POSITION}
-    assert sky.flight.mission_done
+    assert sky.flight.mission.done
 
 
 SIGNALS = Signals(4.0, (Term("x", 0.1, 0.0, 2.0, None, 0.0),))
@@ -52,10 +51,10 @@ def test_a_release_is_never_refused(phase: Phase) -> None:
     if phase == Phase.MISSION:
         sky.ask(StartMission(1))
     else:
-        sky.flight = enter(sky.flight, phase, sky.view, sky.settings)
+        sky.flight = entered(sky.flight, phase, sky.view, sky.settings)
     flight, verdict = decide(sky.flight, Release(), hanging(sky.now_us), sky.settings)
     assert verdict.result == ACCEPTED
-    assert flight.released
+    assert flight.cable.released
     if phase in (Phase.FAILSAFE, Phase.SET_DOWN):
         assert flight.phase == phase
         return
@@ -72,4 +71,4 @@ def test_a_load_out_of_reach_is_not_taken() -> None:
     assert verdict.text == "Gripper: the load lies 1.9 m away, the cable reaches 0.7 m"
     sky.view = sky.view._replace(x_load=(0.5, 0.0, 0.02))
     assert sky.ask(Grab()).result == ACCEPTED
-    assert not sky.flight.released
+    assert not sky.flight.cable.released

@@ -12,7 +12,6 @@ import pytest
 from autopilot.guidance.legs import Hold, Transfer
 from autopilot.services import identity, requests
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import _enter as enter
 from autopilot.supervisor.requests.arming import arming_complaints
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.requests.verdicts import ACCEPTED as YES
@@ -27,7 +26,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
-from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, hanging, view
+from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky, entered, hanging, view
 
 DENIED = mavlink.MAV_RESULT_DENIED
 LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
@@ -121,8 +120,8 @@ def flight_in(phase: Phase, on_mission: bool, plan: MissionPlan) -> Flight:
         return replace(held, phase=phase)
     if phase == Phase.MISSION and not plan.steps:
         return replace(held, phase=phase, legs=(Hold((0.5, 0.0, 2.0)),))
-    entered = enter(held, phase, hanging(x=(0.5, 0.0, 2.0)), SETTINGS)
-    return replace(entered, mission=replace(entered.mission, active=on_mission))
+    begun = entered(held, phase, hanging(x=(0.5, 0.0, 2.0)), SETTINGS)
+    return replace(begun, mission=replace(begun.mission, active=on_mission))
 
 
 def seen_in(phase: Phase) -> Any:

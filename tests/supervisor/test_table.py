@@ -17,7 +17,6 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services import requests as R
 from autopilot.supervisor import machine
 from autopilot.supervisor.advance import advance
-from autopilot.supervisor.machine import _enter as enter
 from autopilot.supervisor.machine import happen
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import (
@@ -35,7 +34,7 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.table import TRANSITIONS, markdown
 from missions.model import Land, Step, Takeoff, Waypoint
-from tests.doubles.sky import ACCEPTED, SETTINGS, hanging, view
+from tests.doubles.sky import ACCEPTED, SETTINGS, entered, hanging, view
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT = ROOT / "docs" / "architecture.md"
@@ -90,7 +89,7 @@ def test_every_phase_can_be_left_and_reached() -> None:
 
 
 def test_who_disarms_selects_nothing_and_rewinds_the_mission() -> None:
-    flight = enter(on_mission(*STEPS, step=1), Phase.SET_DOWN, hanging(), SETTINGS)
+    flight = entered(on_mission(*STEPS, step=1), Phase.SET_DOWN, hanging(), SETTINGS)
     after = happen(flight, Event.VEHICLE_DOWN, view(SECOND), SETTINGS)
     assert after is not None
     assert (after.mission.active, after.mission.step, after.legs) == (False, 0, ())
@@ -130,8 +129,8 @@ def under_way(phase: Phase, *steps: Step, step: int = 0, active: bool = False) -
     flight = on_mission(*(steps or STEPS), step=step)
     if phase not in IN_AIR:
         return off_mission(replace(flight, phase=phase))
-    entered = enter(flight, phase, hanging(x=HERE), SETTINGS)
-    return entered if active or phase == Phase.MISSION else off_mission(entered)
+    begun = entered(flight, phase, hanging(x=HERE), SETTINGS)
+    return begun if active or phase == Phase.MISSION else off_mission(begun)
 
 
 def asked(flight: Flight, request: Any, seen: View | None = None) -> Flight:
@@ -219,7 +218,7 @@ def vehicle_down(phase: Phase) -> Flight:
     if phase == Phase.SET_DOWN:
         return landed(under_way(phase))
     alone = replace(on_mission(*STEPS), cable=CableState(released=True))
-    return landed(off_mission(enter(alone, phase, hanging(x=HERE), SETTINGS)))
+    return landed(off_mission(entered(alone, phase, hanging(x=HERE), SETTINGS)))
 
 
 CAUSES: dict[Event, Callable[[Phase], Flight]] = {

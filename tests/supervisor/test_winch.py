@@ -6,22 +6,22 @@ import math
 from dataclasses import replace
 
 import pytest
-from autopilot.core.winch import cable_now, commanded_rate
-from autopilot.supervisor.flight import Flight, Phase
 
+from autopilot.core.flight_core import commanded_rate, with_cable_now
 from autopilot.guidance.legs import Hold, Reel, Slow, top_of
 from autopilot.services.requests import Orbit, Pause, Release, StartMission
 from autopilot.services.requests import Winch as WinchRequest
-from autopilot.supervisor.advance import enter
+from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff, Winch
-from tests.doubles.sky import ACCEPTED, SETTINGS, Sky
+from tests.doubles.sky import ACCEPTED, SETTINGS, Sky, entered
 
 DENIED, LATER = mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
-def over(sky: Sky, **changes: object) -> Sky:
-    sky.settings = replace(sky.settings, **changes)  # type: ignore[arg-type]
+def over(sky: Sky, usable: bool) -> Sky:
+    """The same in which the law can, or cannot, fly another length of the cable."""
+    sky.settings = replace(sky.settings, winch=replace(sky.settings.winch, usable=usable))
     return sky
 
 
@@ -45,11 +45,11 @@ def test_the_winch_wants_a_load_that_is_held_in_the_air() -> None:
     sky.airborne()
     for phase in (Phase.RETURN, Phase.LOWER, Phase.SET_DOWN):
         held_there = sky.flight
-        sky.flight = enter(sky.flight, phase, sky.view, sky.settings)
+        sky.flight = entered(sky.flight, phase, sky.view, sky.settings)
         assert sky.ask(WinchRequest(0.5)).result == LATER, phase
         sky.flight = held_there
-    assert over(sky, reels=False).ask(WinchRequest(0.5)).result == DENIED
-    over(sky, reels=True).ask(Release())
+    assert over(sky, usable=False).ask(WinchRequest(0.5)).result == DENIED
+    over(sky, usable=True).ask(Release())
     assert sky.ask(WinchRequest(0.5)).result == DENIED
 
 
@@ -73,37 +73,37 @@ def test_a_mission_paused_while_reeling_goes_on_to_the_same_length() -> None:
     def tick(seconds: float) -> None:
         for _ in range(round(seconds / 0.02)):
             sky.tick()
-            sky.flight = cable_now(sky.flight, sky.now_us)
-            length = sky.flight.cable_m or 0.7
+            sky.flight = with_cable_now(sky.flight, sky.now_us)
+            length = sky.flight.cable.length_m or 0.7
             sky.settings = replace(sky.settings, cable_length_m=length)
 
     assert sky.ask(StartMission(1)).result == ACCEPTED
     tick(2.5)
     assert sky.ask(Pause()).result == ACCEPTED
     tick(4.0)
-    paused = sky.flight.cable_m
+    paused = sky.flight.cable.length_m
     assert paused is not None
     assert 0.75 < paused < 1.4
-    assert sky.flight.reel_rate == 0.0
+    assert sky.flight.cable.reel_rate == 0.0
     assert sky.ask(StartMission(None)).result == ACCEPTED
     tick(7.0)
-    assert sky.flight.cable_m == pytest.approx(1.5, abs=1e-9)
+    assert sky.flight.cable.length_m == pytest.approx(1.5, abs=1e-9)
 
 
 def test_the_length_is_that_of_the_leg_also_while_it_is_stopped() -> None:
     leg = Reel((0.0, 0.0, 2.0), 2.7, 0.3, 1.0, 2.0)
     flight = Flight(phase=Phase.HOLD, legs=(leg,), leg_start_us=0)
-    assert cable_now(flight, 2_000_000).cable_m == pytest.approx(0.7 + 0.3 * 1.5)
-    assert cable_now(flight, 2_000_000).reel_rate == 0.3
+    assert with_cable_now(flight, 2_000_000).cable.length_m == pytest.approx(0.7 + 0.3 * 1.5)
+    assert with_cable_now(flight, 2_000_000).cable.reel_rate == 0.3
     assert commanded_rate(flight, 2_000_000, 0.004) == 0.3
     stopping = Slow(leg, 2.0, 1.0)
     assert top_of(stopping) == 2.7
-    stopped = cable_now(replace(flight, legs=(stopping,)), 1_000_000)
-    assert stopped.cable_m == pytest.approx(0.7 + 0.3 * 2.0)
-    assert stopped.reel_rate == 0.0
+    stopped = with_cable_now(replace(flight, legs=(stopping,)), 1_000_000)
+    assert stopped.cable.length_m == pytest.approx(0.7 + 0.3 * 2.0)
+    assert stopped.cable.reel_rate == 0.0
     resting = replace(flight, legs=(Hold((0.0, 0.0, 2.0)),))
     assert commanded_rate(resting, 0, 0.004) == 0.0
-    assert SETTINGS.longest_m == 3.0
+    assert SETTINGS.winch.longest_m == 3.0
 
 
 def test_while_the_winch_works_no_stream_takes_over() -> None:

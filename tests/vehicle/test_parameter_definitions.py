@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from autopilot.vehicle.file import VEHICLES, load_vehicle
+from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import (
     DEFAULT_LAW,
     LAWS,
@@ -53,6 +54,37 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
     assert world["SIM_QUAD_MASS"] == truth.quad_mass
     assert world.describe("SIM_QUAD_MASS").low == truth.quad_mass / 100.0
     assert world.describe("SIM_QUAD_MASS").high == truth.quad_mass * 100.0
+
+
+# keys of a vehicle file of which the autopilot makes nothing: names, and what only the plant knows
+OF_THE_WORLD_ALONE = {
+    *("name", "rotors"),
+    *("spin_drag_n_m_s2", "load_drag_n_s_m", "load_drag_quadratic_n_s2_m2"),
+    *("gear_height_m", "gear_spread_m", "rotor_reach_m", "rotor_height_m", "load_radius_m"),
+    *("contact_frequency_rad_s", "contact_damping_ratio", "friction", "slip_rate_1_s"),
+}
+BELIEVED = tuple(key for key in Vehicle.model_fields if key not in OF_THE_WORLD_ALONE)
+
+
+@pytest.mark.parametrize("key", BELIEVED)
+def test_every_number_of_the_vehicle_has_a_parameter(key):
+    """Each number that is believed, moved, moves a default; of three numbers each does."""
+    vehicle = load_vehicle("heavy")
+    before = autopilot_parameters(vehicle).values()
+    value = getattr(vehicle, key)
+    if isinstance(value, tuple):
+        moves = [tuple(v * (1.5 if i == k else 1.0) for i, v in enumerate(value)) for k in range(len(value))]
+    else:
+        moves = [1.5 * value + 1e-3]
+    for moved in moves:
+        assert autopilot_parameters(vehicle.model_copy(update={key: moved})).values() != before
+
+
+def test_what_only_the_plant_knows_moves_no_parameter():
+    vehicle = load_vehicle("heavy")
+    numbers = {key: 1.5 * getattr(vehicle, key) + 1e-3 for key in OF_THE_WORLD_ALONE - {"name", "rotors"}}
+    moved = vehicle.model_copy(update=numbers)
+    assert autopilot_parameters(moved).values() == autopilot_parameters(vehicle).values()
 
 
 def test_every_number_that_is_taken_from_the_vehicle_is_a_default():

@@ -45,7 +45,7 @@ from autopilot.geometry.linear import ZERO, sub
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 
 REJECTIONS_BEFORE_RESET = 50.0
-# A hard knock (the ground, a cable that comes taut) is over between two samples of the accelerometer: after
+# An impact (the ground, a cable that comes taut) is over between two samples of the accelerometer: after
 # so many refusals the velocity may have changed by about so much, m/s, soon after the last reading that was
 # believed. The place is off by what came of it since.
 REFUSED_BY_KNOCK, KNOCK_STD = 4.0, 0.3

@@ -13,7 +13,7 @@ from gcs.batch.closure import PACKAGES, ROOT, closure, fingerprint
 from gcs.experiments import store
 from gcs.sweep import plan_file
 
-SWEEP, EXPERIMENT = plan_file._ENTRIES, store._ENTRIES
+SWEEP, EXPERIMENT = plan_file.ENTRIES, store.ENTRIES
 BOTH = {"sweep": SWEEP, "experiment": EXPERIMENT}
 
 

@@ -8,6 +8,7 @@ from gcs.batch.progress import BatchDisplay
 from gcs.shell import display as display_module
 from gcs.shell.display import LiveBars, StepDisplay
 
+CURSOR = "\x1b[?25h"  # shown again
 RUNNING = (("Case A", "gcs: lift"), ("Case B", ""))
 
 
@@ -73,7 +74,7 @@ def test_a_terminal_shows_a_bar_and_a_line_for_each_flight_that_runs(
         display.add(1, 1, RUNNING[:1])
         second = capsys.readouterr().err
         assert "Case A: lift" in second and "Case B" not in second and "1/4" in second
-    assert display._bars is None
+    assert capsys.readouterr().err.endswith(CURSOR), "the terminal is given back"
 
 
 def test_quiet_is_quiet(clock: Clock, terminal: None, capsys: pytest.CaptureFixture[str]) -> None:
@@ -98,4 +99,4 @@ def test_a_short_step_shows_no_bar(clock: Clock, terminal: None, capsys: pytest.
 
 def test_columns_are_for_each_display_to_say() -> None:
     with pytest.raises(NotImplementedError):
-        LiveBars(quiet=False)._columns()
+        LiveBars(quiet=False).columns()

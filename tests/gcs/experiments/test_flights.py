@@ -26,7 +26,7 @@ def _code_of_the_test(monkeypatch):
 
 def written_by(monkeypatch, code):
     """The flights of now are flown by other code."""
-    monkeypatch.setattr(reuse, "_code", lambda entries: code)
+    monkeypatch.setattr(reuse, "code_of", lambda entries: code)
 
 
 class Sky:

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks import plant_convergence as convergence
+from sitl.plant.impact import stretched
 from sitl.plant.records import Motion
-from sitl.plant.step import advance, advance_many, initial_state, stretched
+from sitl.plant.step import advance, advance_many, initial_state
 
 CALM = (0.0, 0.0, 0.0)
 OFF = (0.0, 0.0, 0.0, 0.0)

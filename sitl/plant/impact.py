@@ -1,0 +1,41 @@
+"""The impact of a cable that comes taut: perfectly inelastic along the cable (5-2-1).
+
+| symbol | code name | unit | |
+|---|---|---|---|
+| q | q_cable | | unit vector from vehicle to load |
+| v_c | speed | m/s | closing speed: q . (x_L' - x_Q'), less what the winch lets out |
+| m_Q, m_L | quad_mass, load_mass | kg | |
+
+Linear momentum stays and the ends part no more: x_L' loses m_Q / (m_Q + m_L) v_c along q, x_Q' gains
+m_L / (m_Q + m_L) v_c. The impulse of the snap is mu v_c with mu = m_Q m_L / (m_Q + m_L); energy is lost.
+"""
+
+from __future__ import annotations
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import axpy, dot, norm, scale
+from sitl.plant.records import Motion, Truth
+
+
+@kernel
+def stretched(motion: Motion, truth: Truth) -> Motion:
+    """The pair with its distance set to the cable length and no velocity along the cable but the winch's.
+
+    Centre of mass and linear momentum stay. After a taut step this takes back the integrator's drift; at the
+    instant a slack cable comes taut it is the perfectly inelastic impact.
+    """
+    length = norm(motion.cable)
+    q_cable = scale(1.0 / length, motion.cable)
+    share = truth.quad_mass / (truth.quad_mass + truth.load_mass)
+    excess = length - motion.length
+    speed = dot(q_cable, motion.cable_dot) - motion.length_dot
+    return Motion(
+        axpy(-share * excess, q_cable, motion.x_load),
+        axpy(-share * speed, q_cable, motion.v_load),
+        scale(motion.length, q_cable),
+        axpy(-speed, q_cable, motion.cable_dot),
+        motion.quat,
+        motion.omega,
+        motion.length,
+        motion.length_dot,
+    )
