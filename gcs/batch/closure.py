@@ -1,8 +1,9 @@
 """Which files decide what happens in a flight: everything that the modules that fly import, and its data.
 
 The set follows from the imports, read from the source without running it, so that a new module is part of it
-as soon as it is used. Imports inside functions count. A module that is loaded by a computed name is not seen:
-name it among the entry points.
+as soon as it is used. Imports inside functions count. A package that finds its modules by `iter_modules`
+imports all of them. Any other module that is loaded by a computed name is not seen: name it among the entry
+points.
 """
 
 from __future__ import annotations
@@ -63,18 +64,25 @@ def _source(module: str, root: Path) -> Path | None:
 
 
 def _data(package: Path) -> Iterator[Path]:
-    """What lies beside the code of a package, without its subdirectories."""
-    return (
-        path
-        for path in package.iterdir()
-        if path.is_file() and path.suffix not in _NO_DATA and not path.name.startswith(".")
-    )
+    """What lies beside the code of a package, and in its folders that hold no code."""
+    for path in package.iterdir():
+        if path.name.startswith("."):
+            continue
+        if path.is_file() and path.suffix not in _NO_DATA:
+            yield path
+        elif path.is_dir() and not any(path.glob("*.py")):
+            yield from _data(path)
 
 
 def _imports(path: Path, module: str) -> Iterator[str]:
-    """Every dotted name that the file imports; `from a import b` gives a and a.b, which may be a module."""
+    """Every dotted name that the file imports; `from a import b` gives a and a.b, which may be a module.
+
+    A file that calls `iter_modules` imports what lies beside it.
+    """
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_bytes(), str(path))):
+        if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] == "iter_modules":
+            yield from (f"{package}.{found.stem}" for found in sorted(path.parent.glob("*.py")))
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -122,6 +122,7 @@ class FlightClient:
         self._was_armed = False
         self._was_airborne = False
         self._mission_over = False
+        self._item_flown = 0  # the last one in the air
         self._given_up_us: int | None = None  # the vehicle's clock at the failure
         self._pending: Outcome | None = None  # the outcome, once the aftermath is captured
 
@@ -253,6 +254,8 @@ class FlightClient:
         if reached is not None and self._was_airborne and reached.seq == len(self.items) - 1:
             self._mission_over = True
         setpoint = view.latest.get("LOAD_SETPOINT")
+        if setpoint is not None and setpoint.phase not in _GROUND_PHASES:
+            self._item_flown = setpoint.seq
         if setpoint is not None and setpoint.phase in _LANDING_PHASES:
             self._mission_over = self._mission_over or setpoint.seq == len(self.items) - 1
         if self._pending is None:
@@ -296,7 +299,7 @@ class FlightClient:
         if self._mission_over:
             return Outcome("completed")
         if self._was_airborne:
-            where = f"item {self._item()} of {len(self.items)}"
+            where = f"item {self._item_flown} of {len(self.items)}"
             return Outcome(
                 "interrupted", f"the vehicle was disarmed before the end of the mission, at {where}"
             )

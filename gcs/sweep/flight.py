@@ -138,7 +138,10 @@ class _Flight:
         self.tick_us = settings.tick_us
         every = divider(1e6 / self.tick_us, table["CTL_RATE_HZ"], "CTL_RATE_HZ")
         self.core = FlightCore(build_setup(table, every), LAID_OUT)
-        plan = _plan(tuple(encode_mission(mission, home)), self.core.setup.settings.limits)
+        items = tuple(encode_mission(mission, home))
+        self.items = len(items)
+        self.item = 0  # of the mission, last flown
+        plan = _plan(items, self.core.setup.settings.limits)
         self.core.change(with_plan(self.core.flight, plan))
         self.world = new_world(apply_parameters(truth, sim_table), profile, settings, conditions.seed)
         self.core.take_inbox(new_inbox(most_readings(self.world)))
@@ -203,6 +206,8 @@ class _Flight:
             self.flown.slack_events += int(now.plant.slack_events - before.plant.slack_events)
         if phase == Phase.MISSION:
             self.mission_us += now.now_us - before.now_us
+            mission = self.core.flight.mission
+            self.item = mission.plan.sequence[mission.step]
 
     def _decide(self, now_us: int) -> None:
         """The supervisor's tick, as the process has it; and where the mission asks the load to be."""
@@ -255,11 +260,20 @@ class _Flight:
         if flown.outcome:
             return
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
-            flown.outcome = "completed" if flight.mission.done else "interrupted"
+            self._landed()
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.limit_us:
             where: str = flight.phase.name.lower()
             flown.outcome, flown.lost_phase = "timeout", where
             flown.reason = f"not landed after {self.limit_us * 1e-6:.0f} s of flight: still in phase {where}"
+
+    def _landed(self) -> None:
+        """The vehicle is disarmed; said as `gcs fly` says it."""
+        if self.core.flight.mission.done:
+            self.flown.outcome = "completed"
+            return
+        where = f"item {self.item} of {self.items}"
+        self.flown.outcome = "interrupted"
+        self.flown.reason = f"the vehicle was disarmed before the end of the mission, at {where}"
 
     def _conclude(self) -> None:
         flown, f = self.flown, unpack(Figures, self.figures, 0)

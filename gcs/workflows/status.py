@@ -8,7 +8,7 @@ from gcs.clients.vehicle_view import VehicleView
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 
-_LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
+LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
 
 
 def vehicle_status(address: Address) -> dict[str, Any]:
@@ -16,7 +16,7 @@ def vehicle_status(address: Address) -> dict[str, Any]:
     with Session(address) as session:
         session.listen_to_truth()
         session.find()
-        session.watch(lambda: False, _LISTEN_S, "listening")
+        session.watch(lambda: False, LISTEN_S, "listening")
         return status_record(session.view)
 
 

@@ -52,6 +52,28 @@ def test_commands_on_their_way_keep_their_order(core_in_the_air) -> None:
     assert in_force == [(0.0,) * 4] * 2 + sent[:6]
 
 
+@pytest.mark.parametrize("delays_ms", [(10, 22, 1), (10, 1, 22), (0, 200, 0), (200, 0, 200)])
+def test_commands_keep_their_order_where_the_delay_changes_in_flight(
+    core_in_the_air, delays_ms: tuple[int, ...]
+) -> None:
+    """Those on their way get the new delay; none that is in force gives way to an older one."""
+    core = core_in_the_air(SIM_ACT_DELAY_MS=delays_ms[0])
+    sent, in_force, expected = [], [], []
+    newest = -1
+    for delay_ms in delays_ms:
+        core.retune(core.truth, core.settings._replace(actuator_delay_us=1000 * delay_ms))
+        for _ in range(60):
+            sent.append((0.01 * (len(sent) + 1),) * 4)
+            core.tick(sent[-1])
+            in_force.append(core.state.rotor_force)
+            # command k is sent at 4k ms and shows once its instant has passed
+            newest = max(
+                newest, *(k for k in range(-1, len(sent)) if k < 0 or 4 * k + delay_ms < 4 * len(sent))
+            )
+            expected.append(sent[newest] if newest >= 0 else (0.0,) * 4)
+    assert in_force == expected
+
+
 def test_rotors_stand_until_the_first_command(core_in_the_air) -> None:
     core = core_in_the_air(SIM_ACT_DELAY_MS=200.0)
     for _ in range(50):

@@ -36,7 +36,7 @@ def test_a_copy_of_the_sources_has_the_same_fingerprint(tree: Path, entries: tup
     ("kind", "name", "counts"),
     [
         ("sweep", "autopilot/control/laws/thesis.py", True),
-        ("sweep", "autopilot/vehicle/bebop.toml", True),
+        ("sweep", "autopilot/vehicle/vehicles/bebop.toml", True),
         ("sweep", "sitl/plant/step.py", True),
         ("sweep", "sitl/sensors/lab.toml", True),
         ("sweep", "missions/case-b.toml", True),
@@ -105,16 +105,22 @@ def test_nothing_that_python_really_imports_is_missing(entries: tuple[str, ...])
 def test_imports_of_every_form_are_followed(tmp_path: Path) -> None:
     for name, text in {
         "gcs/__init__.py": "",
-        "gcs/a.py": "import gcs.b.c as c, os\nfrom .b import (\n    d,\n    name,\n)",
+        "gcs/a.py": "import gcs.b.c as c, gcs.many, os\nfrom .b import (\n    d,\n    name,\n)",
         "gcs/b/__init__.py": "from .e import name",
         "gcs/b/c.py": "from ..f import thing",
         "gcs/b/d.py": "def g():\n    from gcs import h",
         "gcs/b/e.py": "name = 1",
         "gcs/b/table.toml": "",
         "gcs/b/page.html": "",
+        "gcs/b/tables/other.toml": "",
+        "gcs/b/code/__init__.py": "",
+        "gcs/b/code/of_code.toml": "",
         "gcs/f.py": "import numpy, unknown.module",
         "gcs/h.py": "from missions import *",
         "gcs/lonely.py": "",
+        "gcs/many/__init__.py": "import pkgutil\nNAMES = [m.name for m in pkgutil.iter_modules(__path__)]",
+        "gcs/many/one.py": "from gcs import by_one",
+        "gcs/by_one.py": "",
         "missions/__init__.py": "",
         "missions/one.toml": "",
     }.items():
@@ -123,7 +129,7 @@ def test_imports_of_every_form_are_followed(tmp_path: Path) -> None:
         path.write_text(text, encoding="utf-8")
     found = {path.relative_to(tmp_path).as_posix() for path in closure(["gcs.a"], tmp_path)}
     rest = {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*.*")} - found
-    assert rest == {"gcs/lonely.py", "gcs/b/page.html"}
+    assert rest == {"gcs/lonely.py", "gcs/b/page.html", "gcs/b/code/__init__.py", "gcs/b/code/of_code.toml"}
 
 
 def test_an_entry_point_that_is_no_module_is_an_error() -> None:

@@ -242,8 +242,15 @@ def test_interrupted_by_the_user(world, fly, items):
     assert client.poll(0) == []
 
 
-def test_disarmed_by_somebody_else(world, fly):
-    world.vehicle.script = then(normal_flight, 10.0, lambda vehicle: vehicle.arm(False))
+@pytest.mark.parametrize("told_on_the_ground", [0, 1])
+def test_disarmed_by_somebody_else(world, fly, told_on_the_ground):
+    """The item is the last in the air, though on the ground the mission stands at its beginning again."""
+
+    def disarm(vehicle):
+        vehicle.arm(False)
+        vehicle.item = told_on_the_ground
+
+    world.vehicle.script = then(normal_flight, 10.0, disarm)
     client, _ = fly()
     assert client.outcome.name == "interrupted"
     assert "item 1 of 4" in client.outcome.reason
