@@ -114,7 +114,8 @@ def gcs(signing_key: bytes | None) -> None:
     """Plumbline's ground station: fly missions in which the load on the cable is what is commanded.
 
     gcs fly case-b flies a shipped mission with a simulator and an autopilot of its own and ends in a report.
-    The other commands speak to a vehicle that is running already (sitl and autopilot, or gcs fly --speed 1).
+    gcs upload, arm, start, status, param and the like command a vehicle that is running already (sitl and
+    autopilot, or gcs fly --speed 1).
 
     Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong usage,
     3 flown, but the mission was not completed, 130 stopped by Ctrl-C.
