@@ -117,7 +117,7 @@ def _start(
     processes: Processes, options: FlightOptions, out: Path, storage: Path, ground: str, truth: str
 ) -> None:
     if not options.quiet and not kernel.is_compiled(_LAST_COMPILED):
-        say("the first flight compiles the kernels of simulator and autopilot: about a minute")
+        say("the first flight compiles the kernels of simulator and autopilot: a minute or two")
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
     both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS.index(options.law)}"]
