@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
+from autopilot.control.actuators.mixer import MixerResult
 from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of
 from autopilot.control.laws.interface import law_of, new_rows
 from autopilot.control.load_motion import Drag
-from autopilot.control.records import Cable, State, Vehicle
+from autopilot.control.records import Cable, Command, State, Vehicle
 from autopilot.core.tick import (
     NO_COMMAND,
     STOPPED,
@@ -30,7 +31,7 @@ from autopilot.core.tick import (
     control_tick,
     fly_tick,
 )
-from autopilot.estimation.filter import complaints
+from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints
 from autopilot.estimation.inbox import new_inbox
 from autopilot.estimation.records import (
     Array,
@@ -39,8 +40,8 @@ from autopilot.estimation.records import (
     blank_state,
     new_history,
 )
-from autopilot.geometry.linear import ZERO
-from autopilot.geometry.packed import pack, packed, unpack
+from autopilot.geometry.linear import IDENTITY, ZERO
+from autopilot.geometry.packed import pack, packed, unpack, width
 from autopilot.guidance.layout import COLUMNS, jets_ahead
 from autopilot.guidance.legs import Catch, least_move_s, top_of
 from autopilot.services.records import Verdict
@@ -116,7 +117,8 @@ class FlightCore:
     @property
     def forces(self) -> tuple[float, float, float, float]:
         """What the rotors are to give, N."""
-        return self.pilot.mixed.forces
+        # asked for at every tick: of the pilot only what lies behind the command
+        return unpack(MixerResult, self.rows.pilot, width(Command)).forces
 
     @property
     def state(self) -> State:
@@ -302,21 +304,5 @@ def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
     return -flight.legs[0].jet(leg_time_s(flight, now_us) + period_s)[1][2]
 
 
-_BLIND = Seen(
-    State(
-        ZERO,
-        ZERO,
-        (0.0, 0.0, -1.0),
-        ZERO,
-        ZERO,
-        ZERO,
-        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-        ZERO,
-    ),
-    False,
-    0.0,
-    0.0,
-    0.0,
-    1,
-    7,
-)
+_REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
+_BLIND = Seen(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD)  # before the first reading

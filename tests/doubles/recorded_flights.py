@@ -14,6 +14,28 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.telemetry import telemetry_of
 from gcs.analysis.tracks import Telemetry
 
+# of the record that `gcs fly --json` prints: programs rely on them
+STABLE_KEYS = {
+    "mission",
+    "law",
+    "sensors",
+    "seed",
+    "outcome",
+    "flight_s",
+    "wall_s",
+    "real_time_factor",
+    "load_error_max_m",
+    "load_error_rms_m",
+    "rise_time_90_s",
+    "overshoot_pct",
+    "settling_time_5pct_s",
+    "psi_R_max",
+    "psi_q_max",
+    "saturated_fraction",
+    "slack_events",
+    "report_dir",
+}
+
 BOOT_US = 1_767_225_600_000_000
 TICK_S = 0.008
 CABLE_M = 0.7

@@ -13,30 +13,11 @@ import pytest
 from autopilot.wire.tlog import TlogWriter
 from gcs.closed_loop import Conditions, fly
 from missions.fileformat import load_mission
+from tests.doubles.recorded_flights import STABLE_KEYS
 
 pytestmark = pytest.mark.processes
 Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
 
-STABLE_KEYS = {
-    "mission",
-    "law",
-    "sensors",
-    "seed",
-    "outcome",
-    "flight_s",
-    "wall_s",
-    "real_time_factor",
-    "load_error_max_m",
-    "load_error_rms_m",
-    "rise_time_90_s",
-    "overshoot_pct",
-    "settling_time_5pct_s",
-    "psi_R_max",
-    "psi_q_max",
-    "saturated_fraction",
-    "slack_events",
-    "report_dir",
-}
 FILES = ("flight.tlog", "flight.ulg", "flight.parquet", "summary.json", "report.html", "overview.png")
 
 
