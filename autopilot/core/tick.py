@@ -262,7 +262,6 @@ def control_tick(rows: CoreRows, law_rows: Any, at: int) -> None:
         pack(memory, law_rows.memory, 0)
         mixed = mix(command.thrust, command.moment, vehicle, constants.limited)
     actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, constants.actuation)
-    rows.commands[:] = actuation.queue
     pilot = Pilot(
         command,
         mixed,
