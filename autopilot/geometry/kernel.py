@@ -17,6 +17,7 @@ from functools import cache, update_wrapper
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+import llvmlite.binding
 import numba
 from numba import _dynfunc, types
 from numba.core import caching
@@ -170,6 +171,19 @@ class _Linked(JITCodeLibrary):  # type: ignore[misc]
         self._linking_libraries = list(seen)
         super().finalize()
 
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
+                function.linkage = "internal"
+        options = llvmlite.binding.create_pipeline_tuning_options(speed_level=int(os.environ.get("SL","3")))
+        options.inlining_threshold = int(os.environ.get("INL", "225"))
+        options.loop_vectorization = os.environ.get("LV","1")=="1"
+        options.slp_vectorization = os.environ.get("SLP","0")=="1"
+        builder = llvmlite.binding.create_pass_builder(self._codegen._tm, options)
+        passes = builder.getModulePassManager()
+        passes.run(self._final_module, builder)
+        if os.environ.get("TWICE"): passes.run(self._final_module, builder)
+
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _OuterLowering(NativeLowering):  # type: ignore[misc]
@@ -233,6 +247,15 @@ class _InnerCompiler(_Compiler):
     lowering = _InnerLowering
 
 
+class _Inner(CPUDispatcher):  # type: ignore[misc]
+    """A kernel as others call it: for numbers of any value, of whose literals nothing is made of its own."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """numba's own, with literal numbers taken for what they are."""
+        plain = {name: types.unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template([types.unliteral(kind) for kind in args], plain)
+
+
 class _Kernel(CPUDispatcher):  # type: ignore[misc]
     """A compiled function with two faces: one that Python calls, and one that kernels call.
 
@@ -243,7 +266,7 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]
     def __init__(self, function: Any) -> None:
         super().__init__(function, targetoptions=dict(_OPTIONS), pipeline_class=_OuterCompiler)
         inner = dict(_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-        self.inner = CPUDispatcher(function, targetoptions=inner, pipeline_class=_InnerCompiler)
+        self.inner = _Inner(function, targetoptions=inner, pipeline_class=_InnerCompiler)
         self.enable_caching()
 
     @property
@@ -251,8 +274,10 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]
         return types.Dispatcher(self.inner)
 
 
-_OPTIONS = {"nopython": True, "error_model": "numpy"}
-INSIDE = {"error_model": "numpy", "pipeline_class": _InnerCompiler}  # for what only kernels call
+_OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False}
+INSIDE = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler}  # for what only kernels call
+
+INLINED = dict(INSIDE, forceinline=True)  # the same, where less than a call is left of it
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
