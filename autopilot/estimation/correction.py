@@ -1,7 +1,7 @@
-"""What all corrections share: the past a reading speaks of, rows of its Jacobian, and the state moved by it.
+"""What all corrections share: the past a reading speaks of, entries of its Jacobian, and the state moved.
 
-A reading of `age` ago is a function of the errors of *then*; a Jacobian wants them in errors of *now*. Errors move
-by x' = F x, and back over the age
+A reading of `age` ago is a function of the errors of *then*; a Jacobian wants them in errors of *now*. Errors
+move by x' = F x, and back over the age
 
     attitude(then)  = attitude + age R gyro bias
     velocity(then)  = velocity - attitude x S + age R accel bias

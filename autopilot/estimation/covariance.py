@@ -4,8 +4,8 @@ An error x of the state obeys x' = F x + noise. `transit` applies Phi = I + F dt
 and applies it again, Phi (Phi P)^T = Phi P Phi^T, so that each of the two passes runs along rows.
 
 What a reading measures are scalars y_k = h_k x + noise of variance r_k, each independent of the others. They
-are absorbed one after the other, but P is moved once: row k of H P loses what it shares with the scalars before it,
-and P the sum of the squares of these rows over their variances.
+are absorbed one after the other, but P is moved once: row k of H P loses what it shares with the scalars
+before it, and P the sum of the squares of these rows over their variances.
 """
 
 from __future__ import annotations

@@ -17,16 +17,10 @@ from functools import cache, update_wrapper
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-import llvmlite.binding
-import numba
-from numba import _dynfunc, types
-from numba.core import caching
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import register_pass
-from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
+from numba.core import caching, config
 from platformdirs import user_cache_path
+
+from autopilot.geometry.compiler import Kernel
 
 _ROOT = Path(__file__).resolve().parents[2]
 _IMPORT = re.compile(
@@ -133,160 +127,13 @@ def is_compiled(path: Path) -> bool:
     return _CHOSEN_BY_USER or _folder(path).is_dir()
 
 
-class _Unlinked(JITCodeLibrary):  # type: ignore[misc]
-    """What a kernel becomes inside of others: intermediate code, of which no machine code is made."""
-
-    def finalize(self) -> None:
-        """Nothing is linked in, or optimised: both is done once, where it ends up."""
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """None of its functions has an address."""
-        return 0
-
-    def needed(self, seen: dict[Any, None]) -> None:
-        """Gather all libraries that this one calls, directly or not, and itself."""
-        if self in seen:
-            return
-        seen[self] = None
-        for library in self._linking_libraries:
-            if isinstance(library, _Unlinked):
-                library.needed(seen)
-            else:
-                seen[library] = None
-
-
-class _Linked(JITCodeLibrary):  # type: ignore[misc]
-    """What Python calls, with all that it calls in turn."""
-
-    def finalize(self) -> None:
-        """Link everything in, optimise, and make machine code."""
-        seen: dict[Any, None] = {}
-        for library in self._linking_libraries:
-            if isinstance(library, _Unlinked):
-                library.needed(seen)
-            else:
-                seen[library] = None
-        self._linking_libraries = list(seen)
-        super().finalize()
-
-    def _optimize_final_module(self) -> None:
-        for function in self._final_module.functions:
-            if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
-                function.linkage = "internal"
-        options = llvmlite.binding.create_pipeline_tuning_options(speed_level=int(os.environ.get("SL","3")))
-        options.inlining_threshold = int(os.environ.get("INL", "225"))
-        options.loop_vectorization = os.environ.get("LV","1")=="1"
-        options.slp_vectorization = os.environ.get("SLP","0")=="1"
-        builder = llvmlite.binding.create_pass_builder(self._codegen._tm, options)
-        passes = builder.getModulePassManager()
-        passes.run(self._final_module, builder)
-        if os.environ.get("TWICE"): passes.run(self._final_module, builder)
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _OuterLowering(NativeLowering):  # type: ignore[misc]
-    """Lowering of what Python calls."""
-
-    _name = "outer_lowering"
-
-    def run_pass(self, state: Any) -> bool:
-        """Lower, with a library that links once."""
-        state.library = _Linked(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        return bool(super().run_pass(state))
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _InnerLowering(NativeLowering):  # type: ignore[misc]
-    """Lowering of what kernels call, which ends before machine code."""
-
-    _name = "inner_lowering"
-
-    def run_pass(self, state: Any) -> bool:
-        """Lower, and make the result known to those who call it."""
-        context = state.targetctx
-        state.library = _Unlinked(context.codegen(), state.func_id.func_qualname)
-        state.flags.no_compile = True
-        super().run_pass(state)
-        lowered = state["cr"]
-        described = lowered.fndesc
-        key = _dynfunc.make_function(
-            described.lookup_module(), described.qualname, "", 0, lowered.env, (state.library,)
-        )
-        context.insert_user_function(key, described, [state.library])
-        state["cr"] = lowered._replace(cfunc=key)
-        return True
-
-
-class _Compiler(CompilerBase):  # type: ignore[misc]
-    """numba's own pipeline with another end."""
-
-    lowering: Any
-
-    def define_pipelines(self) -> list[Any]:
-        """The passes in order."""
-        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        manager.passes = [
-            (self.lowering if one is NativeLowering else one, text) for one, text in manager.passes
-        ]
-        manager.finalize()
-        return [manager]
-
-
-class _OuterCompiler(_Compiler):
-    """The compiler of kernels that Python calls."""
-
-    lowering = _OuterLowering
-
-
-class _InnerCompiler(_Compiler):
-    """The compiler of kernels that others call."""
-
-    lowering = _InnerLowering
-
-
-class _Inner(CPUDispatcher):  # type: ignore[misc]
-    """A kernel as others call it: for numbers of any value, of whose literals nothing is made of its own."""
-
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """numba's own, with literal numbers taken for what they are."""
-        plain = {name: types.unliteral(kind) for name, kind in kws.items()}
-        return super().get_call_template([types.unliteral(kind) for kind in args], plain)
-
-
-class _Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function with two faces: one that Python calls, and one that kernels call.
-
-    numba would make machine code, and wrappers for Python, of every function on the way to the one that is
-    called, though all of them are inlined: two thirds of the time that compiling takes.
-    """
-
-    def __init__(self, function: Any) -> None:
-        super().__init__(function, targetoptions=dict(_OPTIONS), pipeline_class=_OuterCompiler)
-        inner = dict(_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-        self.inner = _Inner(function, targetoptions=inner, pipeline_class=_InnerCompiler)
-        self.enable_caching()
-
-    @property
-    def _numba_type_(self) -> Any:
-        return types.Dispatcher(self.inner)
-
-
-_OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False}
-INSIDE = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler}  # for what only kernels call
-
-INLINED = dict(INSIDE, forceinline=True)  # the same, where less than a call is left of it
-
-
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile `function` to machine code with strict IEEE arithmetic and a disk cache.
 
     Fast-math stays off, so that CPython and machine code agree to the bit. Division by zero gives inf or nan
-    as IEEE 754 says, in place of an exception.
+    as IEEE 754 says, in place of an exception. A kernel makes no arrays: it writes those that it is given.
     """
-    if numba.config.DISABLE_JIT:
+    if config.DISABLE_JIT:
         return function
-    compiled: Callable[P, T] = update_wrapper(_Kernel(function), function)
+    compiled: Callable[P, T] = update_wrapper(Kernel(function), function)
     return compiled

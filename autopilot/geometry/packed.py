@@ -22,7 +22,7 @@ from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from autopilot.geometry.kernel import INLINED
+from autopilot.geometry.compiler import INLINED
 
 Row = NDArray[np.float64]
 R = TypeVar("R")

@@ -1,12 +1,12 @@
 """Eight numbers that machine code moves, adds and multiplies at once.
 
-LLVM leaves loops over small matrices as they are: it cannot know that their arrays do not overlap. `Wide` is a
-vector of eight doubles with + - *, each number by itself, so that machine code and Python agree to the bit:
+LLVM leaves loops over small matrices as they are: it cannot know that their arrays do not overlap. `Wide` is
+a vector of eight doubles with + - *, each number by itself, so that machine code and Python agree to the bit:
 
     put_wide(P, i, j, wide_at(P, i, j) + factor * wide_at(P, k, j))      # eight numbers of row i
 
-Arrays are two-dimensional, of float64, contiguous by rows. The numbers from column j to j + 7 must exist: as in
-kernels generally, nothing is checked.
+Arrays are two-dimensional, of float64, contiguous by rows. The numbers from column j to j + 7 must exist: as
+in kernels generally, nothing is checked.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 from numpy.typing import NDArray
 
-from autopilot.geometry.kernel import INLINED
+from autopilot.geometry.compiler import INLINED
 
 WIDTH = 8
 Array = NDArray[np.float64]

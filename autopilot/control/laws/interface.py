@@ -28,7 +28,7 @@ import numpy as np
 from numba.extending import overload
 
 from autopilot.control.records import Vehicle
-from autopilot.geometry.kernel import INSIDE
+from autopilot.geometry.compiler import INSIDE
 from autopilot.geometry.packed import packed, unpack, width
 from autopilot.wire.parameter_table import ParameterTable
 
