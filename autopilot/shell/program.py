@@ -59,6 +59,7 @@ _BEAT_S = 1.0  # between two heartbeats while the clock stands
 _SLOW_SHARE = 0.8  # of the wall clock, below which the vehicle's is slow
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _GROUND_RESEND_S = 0.5
+_MOST_SAID = 32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
 _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
@@ -148,11 +149,16 @@ class GroundStations:
 
 
 class GroundInStep:
-    """One ground station that shares our clock: every 20 ms we wait until it has caught up."""
+    """One ground station that shares our clock: every 20 ms we wait until it has caught up.
+
+    It does nothing with what it hears until it is asked: what is said in a window goes with the question.
+    """
 
     def __init__(self, address: Address) -> None:
         self._socket = _open(address, "ground station")
         self._address = address
+        self._said: list[bytes] = []  # in this window
+        self._size = 0
 
     def join(self, onboard: Onboard) -> None:
         """Serve the link from now on."""
@@ -160,13 +166,14 @@ class GroundInStep:
         set_timeout(self._socket, _GROUND_RESEND_S)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
-        """Send what is due; at the end of a window wait for the ground station's word on it."""
+        """Say what is due; at the end of a window wait for the ground station's word on it."""
         for _, datagram in onboard.ground_datagrams():
-            self._send(datagram)
+            self._say(datagram)
         ask = onboard.question(_GROUND_LINK)
         if ask is None:
             return
-        self._send(ask)
+        self._say(ask)
+        self._flush()
         stamp = onboard.now_us * 1000
         asked = time.monotonic()
         while True:
@@ -183,6 +190,17 @@ class GroundInStep:
             handle(events)
             if any(isinstance(event, TimesyncAnswered) and event.ts1 == stamp for event in events):
                 return
+
+    def _say(self, datagram: bytes) -> None:
+        if self._size + len(datagram) > _MOST_SAID:
+            self._flush()
+        self._said.append(datagram)
+        self._size += len(datagram)
+
+    def _flush(self) -> None:
+        self._send(b"".join(self._said))
+        self._said.clear()
+        self._size = 0
 
     def _send(self, datagram: bytes) -> None:
         with suppress(OSError):

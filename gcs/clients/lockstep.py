@@ -8,10 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import Field, FrameWriter, layout_of
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.datagrams import messages
 from gcs.clients.operation import GROUND
+
+_TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
+_TC1, _TS1 = (Field(mavlink.MAVLink_timesync_message, name) for name in ("tc1", "ts1"))
+_TIMES = {
+    message_id: Field(kind, "time_usec")
+    for message_id, kind in mavlink.mavlink_map.items()
+    if "time_usec" in kind.fieldnames
+}
 
 
 class LockstepTurns:
@@ -29,9 +37,8 @@ class LockstepTurns:
     def question(self, datagram: bytes) -> int | None:
         """The vehicle's time in ns if `datagram` holds its question, else None."""
         for one in messages(datagram)[0]:
-            message = one.message
-            if message.get_msgId() == mavlink.MAVLINK_MSG_ID_TIMESYNC and message.tc1 == 0:
-                return int(message.ts1)
+            if one.id == mavlink.MAVLINK_MSG_ID_TIMESYNC and _TC1.of(one.frame) == 0:
+                return int(_TS1.of(one.frame))
         return None
 
     def repeated(self, question_ns: int) -> bytes | None:
@@ -42,9 +49,8 @@ class LockstepTurns:
 
     def answer(self, question_ns: int) -> bytes:
         """The datagram that ends our turn."""
-        message = mavlink.MAVLink_timesync_message(tc1=question_ns + 1, ts1=question_ns)
         self._answered_ns = question_ns
-        self._answer = self._writer.frame(message)
+        self._answer = self._writer.frame((_TIMESYNC, (question_ns + 1, question_ns)))
         return self._answer
 
 
@@ -62,7 +68,7 @@ class TruthQueue:
         """Take datagrams in, in the order of their arrival."""
         for datagram in datagrams:
             received, _ = messages(datagram)
-            times = [one.message.time_usec for one in received if hasattr(one.message, "time_usec")]
+            times = [_TIMES[one.id].of(one.frame) for one in received if one.id in _TIMES]
             self._waiting.append((max(times, default=0), datagram))
 
     def until(self, now_us: int) -> list[bytes]:

@@ -10,7 +10,7 @@ from gcs.clients.flight import FlightClient
 from gcs.clients.lockstep import LockstepTurns, TruthQueue
 from gcs.errors import NoVehicleError
 from gcs.shell.display import FlightDisplay
-from gcs.shell.link import UdpSocket, monotonic_us, wait
+from gcs.shell.link import UdpSocket, monotonic_us
 from gcs.shell.stopping import StopRequest
 
 _WAIT_S = 0.2
@@ -41,8 +41,7 @@ def run_lockstep(
     started = False
     heard_s = time.monotonic()
     while client.outcome is None:
-        wait([vehicle], _WAIT_S)
-        datagrams = vehicle.drain()
+        datagrams = vehicle.wait(_WAIT_S)
         if stop:
             client.interrupt()
         elif not datagrams:
@@ -54,7 +53,7 @@ def run_lockstep(
                 raise NoVehicleError(reason)
             if reason:
                 client.lose(reason)
-            display.update(client.progress)
+            _show(display, client)
             continue
         heard_s = time.monotonic()
         for datagram in datagrams:
@@ -76,7 +75,7 @@ def run_lockstep(
             pending.clear()
             vehicle.send(turns.answer(question_ns))
             capture.flush(now_us)
-            display.update(client.progress)
+            _show(display, client)
             if client.outcome is not None:
                 break
 
@@ -100,6 +99,11 @@ def _turn(
         capture.on_sent(datagram)
 
 
+def _show(display: FlightDisplay, client: FlightClient) -> None:
+    if display.due:
+        display.update(client.progress)
+
+
 def run_wall_clock(
     client: FlightClient,
     capture: Capture,
@@ -120,7 +124,7 @@ def run_wall_clock(
         if not started and client.connection.target is not None:
             started = True
             first_word()
-        display.update(client.progress)
+        _show(display, client)
         if stop:
             client.interrupt()
         reason = ended()
