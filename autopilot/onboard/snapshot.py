@@ -6,15 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, nan, sqrt
+from operator import itemgetter
 from typing import Any, get_type_hints
 
 from autopilot.control.load_motion import Drag
 from autopilot.core.flight_core import FlightCore
 from autopilot.core.health import BatteryConstants, Condition, remaining, sensors, vibration, voltage
 from autopilot.core.tick import Pilot, Seen
-from autopilot.estimation.records import TRACKER, EstimatorState, LoadEstimate, VehicleEstimate
+from autopilot.estimation.records import TRACKER, EstimatorState
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
-from autopilot.geometry.packed import unpack, width
+from autopilot.geometry.packed import Row, width
 from autopilot.geometry.so3 import quat_from_rotation
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Run, asked_jet
 from autopilot.services import identity, snapshot
@@ -131,16 +132,22 @@ def mission_state(flight: Flight, items: int) -> int:
     return mavlink.MISSION_STATE_NOT_STARTED
 
 
+def tracked(estimator: EstimatorState) -> bool:
+    """Whether a tracker tells where the vehicle is, and of late."""
+    vehicle, load = estimator.vehicle, estimator.load
+    return vehicle.source == TRACKER and vehicle.age_s < FRESH_S and load.age_s < FRESH_S
+
+
 def sensor_bits(
     condition: Condition, estimator: EstimatorState, ready: bool, fake_gps: bool, now_us: int
 ) -> tuple[int, int]:
     """Sensors present and healthy, as bits of SYS_STATUS; a tracker stands in for what it makes needless."""
     present, healthy = (bits | _ALWAYS for bits in sensors(condition, now_us))
     if estimator.vehicle.source == TRACKER:
-        tracked = snapshot.TRACKER | (_BY_TRACKER & ~present if fake_gps else 0)
-        present |= tracked
-        if estimator.vehicle.age_s < FRESH_S and estimator.load.age_s < FRESH_S:
-            healthy |= tracked
+        by_tracker = snapshot.TRACKER | (_BY_TRACKER & ~present if fake_gps else 0)
+        present |= by_tracker
+        if tracked(estimator):
+            healthy |= by_tracker
     if ready:
         healthy |= snapshot.PREARM
     return present, healthy
@@ -262,53 +269,59 @@ def _makes(*names: str) -> Callable[[Part], Part]:
     return decorate
 
 
-def _place(record: Any, name: str, first: int = 0) -> tuple[Any, int]:
-    """Type of a field, and its first number, of a packed record that begins at `first`."""
-    hints = get_type_hints(record)
-    before = record._fields[: record._fields.index(name)]
-    return hints[name], first + sum(width(hints[one]) for one in before)
+def _slot(record: Any, *path: str) -> slice | int:
+    """Where in a packed record the numbers of a field lie: of a vector all, of a number its place."""
+    first, kind = 0, record
+    for name in path:
+        hints = get_type_hints(kind)
+        first += sum(width(hints[one]) for one in kind._fields[: kind._fields.index(name)])
+        kind = hints[name]
+    return first if width(kind) == 1 else slice(first, first + width(kind))
 
 
-_QUAT = _place(VehicleEstimate, "quat_wxyz", _place(EstimatorState, "vehicle")[1])
-_TENSION = _place(LoadEstimate, "tension", _place(EstimatorState, "load")[1])
+def _reader(record: Any, *paths: str) -> Callable[[Row], Any]:
+    """Reads the fields of a packed record that lie at these paths, a.b for the field b of the field a."""
+    take = itemgetter(*(_slot(record, *path.split(".")) for path in paths))
+    # of a tuple even a part is a tuple
+    return lambda row: take(tuple(row.tolist()))
+
+
+_read_seen = _reader(
+    Seen,
+    *(f"state.{name}" for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad")),
+    *("state.omega_body", "taut"),
+)
+_read_estimator = _reader(
+    EstimatorState, "vehicle.quat_wxyz", "load.tension", "doubt.horizontal", "doubt.vertical"
+)
+_read_pilot = _reader(
+    Pilot,
+    *("control_mode", "slack_events", "mixed.saturated", "mixed.forces"),
+    *(f"command.{name}" for name in ("e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q")),
+    *(f"command.{name}" for name in ("q_c", "thrust", "moment")),
+)
 
 
 @_makes(
     *("launch", "breach", "breaches", "breach_us", "armed", "phase", "main_mode", "sub_mode"),
     *("landed_state", "seq", "mission_current", "mission_total", "mission_state", "reel_rate"),
+    "system_status",
 )
 def _flight(m: Moment) -> tuple[Any, ...]:
-    return m.moments.told(m.flight, m.items)
-
-
-@_makes("system_status")
-def _status(m: Moment) -> tuple[Any, ...]:
-    return (system_status(m.flight, m.flight.phase == Phase.DISARMED and m.ready),)
+    told, flight = m.moments.told(m.flight, m.items), m.flight
+    return (*told, system_status(flight, flight.phase == Phase.DISARMED and m.ready))
 
 
 @_makes("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad", "omega_body", "taut", "distance")
 def _motion(m: Moment) -> tuple[Any, ...]:
-    seen = unpack(Seen, m.core.rows.seen, 0)
-    x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, _, omega_body, _ = seen.state
+    x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, taut = _read_seen(m.core.rows.seen)
     distance = norm(sub(x_load, x_quad))
-    return x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, seen.taut, distance
+    return x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, taut != 0.0, distance
 
 
-@_makes("quat_wxyz")
-def _attitude(m: Moment) -> tuple[Any, ...]:
-    kind, first = _QUAT
-    return (unpack(kind, m.core.rows.estimator, first),)
-
-
-@_makes("tension")
-def _tension(m: Moment) -> tuple[Any, ...]:
-    kind, first = _TENSION
-    return (unpack(kind, m.core.rows.estimator, first),)
-
-
-@_makes("horizontal_std", "vertical_std")
-def _doubt(m: Moment) -> tuple[Any, ...]:
-    return m.estimator.doubt.horizontal, m.estimator.doubt.vertical
+@_makes("quat_wxyz", "tension", "horizontal_std", "vertical_std")
+def _estimate(m: Moment) -> tuple[Any, ...]:
+    return _read_estimator(m.core.rows.estimator)  # type: ignore[no-any-return]
 
 
 @_makes("estimator_flags")
@@ -317,18 +330,14 @@ def _flags(m: Moment) -> tuple[Any, ...]:
 
 
 @_makes(
-    *("control_mode", "slack_events", "q_cable_c", "e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R"),
-    *("psi_q", "thrust", "moment", "forces", "saturated"),
+    *("control_mode", "slack_events", "saturated", "forces", "e_x", "e_v"),
+    *("e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q", "q_cable_c", "thrust", "moment"),
 )
 def _command(m: Moment) -> tuple[Any, ...]:
-    pilot = m.pilot
-    c, mixed, carrying = pilot.command, pilot.mixed, m.flight.phase in CARRYING
-    return (
-        *(pilot.control_mode, pilot.slack_events, c.q_c),
-        *((c.e_x, c.e_v) if carrying else (ZERO, ZERO)),
-        *(c.e_q, c.e_q_dot, c.e_R, c.e_Omega, c.psi_R, c.psi_q, c.thrust, c.moment),
-        *(mixed.forces, mixed.saturated),
-    )
+    mode, slack_events, saturated, forces, e_x, e_v, *others = _read_pilot(m.core.rows.pilot)
+    if m.flight.phase not in CARRYING:
+        e_x = e_v = ZERO
+    return (int(mode), int(slack_events), int(saturated), forces, e_x, e_v, *others)
 
 
 @_makes("quat_c_wxyz")
@@ -374,7 +383,7 @@ def _gps(m: Moment) -> tuple[Any, ...]:
     if gps is not None:
         place = (gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std)
         return (GpsFix(gps.time_us, gps.fix_type, *place, gps.satellites),)
-    if m.fake_gps and m.estimator.vehicle.source == TRACKER and m.sensors_healthy & snapshot.TRACKER:
+    if m.fake_gps and tracked(m.estimator):
         fixed, accuracy = mavlink.GPS_FIX_TYPE_3D_FIX, (m.horizontal_std, m.vertical_std)
         return (GpsFix(m.now_us, fixed, m.x_quad, m.v_quad, *accuracy, _NO_COUNT),)
     return (None,)
