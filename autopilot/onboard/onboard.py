@@ -255,7 +255,8 @@ class Onboard:
     def log_sample(self) -> Sample:
         """What the flight log records at this tick."""
         imu = self._last.imu if self._last else None
-        return Sample(self._snapshot(), imu, self.core.estimator)
+        moment = self._snapshot()
+        return Sample(moment, imu, moment.accel_quad, lambda: moment.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:

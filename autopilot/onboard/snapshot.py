@@ -217,15 +217,12 @@ class Moment(Snapshot):
         self.battery = battery
         self.receiver = receiver
 
+    accel_quad: Vec3  # inertial acceleration, ENU: for the flight log
+
     @cached_property
     def estimator(self) -> EstimatorState:
         """The estimate."""
         return self.core.estimator
-
-    @cached_property
-    def pilot(self) -> Pilot:
-        """Command, rotor forces, and what is observed."""
-        return self.core.pilot
 
     @cached_property
     def view(self) -> View:
@@ -292,7 +289,8 @@ _read_seen = _reader(
     *("state.omega_body", "taut"),
 )
 _read_estimator = _reader(
-    EstimatorState, "vehicle.quat_wxyz", "load.tension", "doubt.horizontal", "doubt.vertical"
+    EstimatorState,
+    *("vehicle.quat_wxyz", "load.tension", "doubt.horizontal", "doubt.vertical", "vehicle.accel_quad"),
 )
 _read_pilot = _reader(
     Pilot,
@@ -300,6 +298,9 @@ _read_pilot = _reader(
     *(f"command.{name}" for name in ("e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q")),
     *(f"command.{name}" for name in ("q_c", "thrust", "moment")),
 )
+
+
+_read_attitude_asked = _reader(Pilot, "command.R_c")
 
 
 @_makes(
@@ -319,7 +320,7 @@ def _motion(m: Moment) -> tuple[Any, ...]:
     return x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, taut != 0.0, distance
 
 
-@_makes("quat_wxyz", "tension", "horizontal_std", "vertical_std")
+@_makes("quat_wxyz", "tension", "horizontal_std", "vertical_std", "accel_quad")
 def _estimate(m: Moment) -> tuple[Any, ...]:
     return _read_estimator(m.core.rows.estimator)  # type: ignore[no-any-return]
 
@@ -342,7 +343,8 @@ def _command(m: Moment) -> tuple[Any, ...]:
 
 @_makes("quat_c_wxyz")
 def _attitude_asked(m: Moment) -> tuple[Any, ...]:
-    return (quat_from_rotation(m.pilot.command.R_c),)
+    r = _read_attitude_asked(m.core.rows.pilot)
+    return (quat_from_rotation((r[0:3], r[3:6], r[6:9])),)
 
 
 @_makes(
@@ -397,7 +399,7 @@ def _vibration(m: Moment) -> tuple[Any, ...]:
 @_makes("wind")
 def _wind(m: Moment) -> tuple[Any, ...]:
     felt = m.flight.phase in IN_AIR
-    return (wind(m.pilot.observed.push, m.core.setup.drag) if felt else (nan, nan, nan),)
+    return (wind(m.core.pilot.observed.push, m.core.setup.drag) if felt else (nan, nan, nan),)
 
 
 @_makes("battery_voltage", "battery_current", "battery_used_mah", "battery_remaining")
