@@ -271,23 +271,26 @@ def decode(datagram: bytes) -> tuple[list[Received], int]:
     good = 0
     start = 0
     while start < end:
-        length = announced_length(datagram, start)
-        stop = start + length
-        if not length or stop > end:
-            start += 1
-            continue
-        if datagram[start] == _MAGIC_V2:
+        magic = datagram[start]
+        if magic == _MAGIC_V2 and start + _HEADER_V2 + _CRC <= end:
             _, payload, flags, _, sequence, system, component, low, high = _HEADER2.unpack_from(
                 datagram, start
             )
-            if flags & ~_SIGNED:  # laid out in a way that is not known
-                start += 1
-                continue
             message_id = low | high << 16
             tail = start + _HEADER_V2 + payload
-        else:
+            stop = tail + _CRC + (_SIGNATURE if flags else 0)
+            legible = not flags or flags == _SIGNED  # else laid out in a way that is not known
+        elif magic == _MAGIC_V1 and start + _HEADER_V1 + _CRC <= end:
             _, payload, sequence, system, component, message_id = datagram[start : start + _HEADER_V1]
             tail = start + _HEADER_V1 + payload
+            stop = tail + _CRC
+            legible = True
+        else:
+            start += 1
+            continue
+        if stop > end or not legible:
+            start += 1
+            continue
         layout = _BY_ID.get(message_id)
         if layout is None:
             start = stop if stop == end or datagram[stop] in MAGICS else start + 1
@@ -297,6 +300,6 @@ def decode(datagram: bytes) -> tuple[list[Received], int]:
             start += 1
             continue
         received.append(Received(message_id, system, component, sequence, datagram[start:stop]))
-        good += length
+        good += stop - start
         start = stop
     return received, end - good

@@ -25,7 +25,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients import command
 from gcs.clients.connection import LINK_TIMEOUT_US, Connection
-from gcs.clients.datagrams import messages
 from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Status
 from gcs.clients.vehicle_view import VehicleView
@@ -44,7 +43,6 @@ AFTERMATH_US = 2_000_000  # captured after the autopilot has given up, for the p
 TIME_FACTOR = 1.5  # a flight may take this many times what was expected,
 TIME_MARGIN_S = 60.0  # and this much more
 
-Source = Literal["vehicle", "truth"]
 OutcomeName = Literal["completed", "diverged", "refused", "timeout", "lost", "interrupted"]
 
 
@@ -130,12 +128,8 @@ class FlightClient:
 
     # ---- in and out
 
-    def receive(self, datagram: bytes, source: Source, now_us: int) -> None:
-        """Take a datagram in, of the vehicle or of the simulated world."""
-        if source == "truth":
-            for one in messages(datagram)[0]:
-                self.view.truth.put(one)
-            return
+    def receive(self, datagram: bytes, now_us: int) -> None:
+        """Take a datagram of the vehicle in."""
         for one in self.connection.receive(datagram, now_us):
             if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and (
                 one.component != getattr(self.connection.target, "component", None)

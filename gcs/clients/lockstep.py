@@ -10,7 +10,9 @@ from collections.abc import Iterable
 
 from autopilot.wire.codec import Field, FrameWriter, layout_of
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
+from gcs.clients.flight import FlightClient
 from gcs.clients.operation import GROUND
 
 _TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
@@ -76,3 +78,18 @@ class TruthQueue:
         ready = [datagram for time_us, datagram in self._waiting if time_us <= now_us]
         self._waiting = [(time_us, datagram) for time_us, datagram in self._waiting if time_us > now_us]
         return ready
+
+
+def ground_turn(
+    client: FlightClient, capture: Capture, truth: list[bytes], vehicle: list[bytes], now_us: int
+) -> list[bytes]:
+    """The ground station's turn: hears the vehicle, answers, and keeps a record of both and of the truth."""
+    for datagram in truth:
+        capture.on_truth(datagram)
+    for datagram in vehicle:
+        client.receive(datagram, now_us)
+        capture.on_vehicle(datagram)
+    sent = client.poll(now_us)
+    for datagram in sent:
+        capture.on_sent(datagram)
+    return sent

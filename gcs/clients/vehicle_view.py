@@ -13,13 +13,11 @@ BOOT_CLOCK = "SYSTEM_TIME"
 _TEXT_LENGTH = 50  # of one STATUSTEXT; a longer text comes in chunks
 
 _STATUSTEXT = mavlink.MAVLINK_MSG_ID_STATUSTEXT
-_CLOCKS = {
-    name: Field(mavlink.mavlink_map[message_id], "time_usec")
-    for name, message_id in (
-        ("LOAD_SETPOINT", mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT),
-        ("CASCADE_ERRORS", mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS),
-    )
-}
+_IDS = {kind.msgname: message_id for message_id, kind in mavlink.mavlink_map.items()}
+_CLOCKS = [
+    (kind.id, Field(kind, "time_usec"))
+    for kind in (mavlink.MAVLink_load_setpoint_message, mavlink.MAVLink_cascade_errors_message)
+]
 _SOURCES = {
     message_id: Field(kind, "source")
     for message_id, kind in mavlink.mavlink_map.items()
@@ -92,22 +90,22 @@ class Newest(Mapping[str, Any]):
     """The newest message of each name; it is decoded when it is looked at."""
 
     def __init__(self) -> None:
-        self._received: dict[str, Received] = {}
+        self._received: dict[int, Received] = {}
 
     def put(self, received: Received) -> None:
         """It takes the place of the one before."""
-        self._received[mavlink.mavlink_map[received.id].msgname] = received
+        self._received[received.id] = received
 
-    def frame(self, name: str) -> bytes | None:
+    def frame(self, message_id: int) -> bytes | None:
         """The newest as it came."""
-        received = self._received.get(name)
+        received = self._received.get(message_id)
         return None if received is None else received.frame
 
     def __getitem__(self, name: str) -> Any:
-        return self._received[name].message
+        return self._received[_IDS[name]].message
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._received)
+        return (mavlink.mavlink_map[message_id].msgname for message_id in self._received)
 
     def __len__(self) -> int:
         return len(self._received)
@@ -194,7 +192,7 @@ class VehicleView:
     @property
     def time_us(self) -> int | None:
         """The vehicle's clock since boot, as its fastest messages tell it."""
-        frames = [(clock, self.latest.frame(name)) for name, clock in _CLOCKS.items()]
+        frames = [(clock, self.latest.frame(message_id)) for message_id, clock in _CLOCKS]
         times = [clock.of(frame) for clock, frame in frames if frame is not None]
         if times:
             return int(max(times))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient
-from gcs.clients.lockstep import LockstepTurns, TruthQueue
+from gcs.clients.lockstep import LockstepTurns, TruthQueue, ground_turn
 from gcs.errors import NoVehicleError
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import UdpSocket, monotonic_us
@@ -71,32 +71,14 @@ def run_lockstep(
             pending.append(datagram)
             now_us = question_ns // 1000
             truth_queue.put(truth.drain())
-            _turn(client, capture, truth_queue.until(now_us), pending, now_us, vehicle)
+            for sent in ground_turn(client, capture, truth_queue.until(now_us), pending, now_us):
+                vehicle.send(sent)
             pending.clear()
             vehicle.send(turns.answer(question_ns))
             capture.flush(now_us)
             _show(display, client)
             if client.outcome is not None:
                 break
-
-
-def _turn(
-    client: FlightClient,
-    capture: Capture,
-    truth: list[bytes],
-    vehicle: list[bytes],
-    now_us: int,
-    link: UdpSocket,
-) -> None:
-    for datagram in truth:
-        client.receive(datagram, "truth", now_us)
-        capture.on_truth(datagram)
-    for datagram in vehicle:
-        client.receive(datagram, "vehicle", now_us)
-        capture.on_vehicle(datagram)
-    for datagram in client.poll(now_us):
-        link.send(datagram)
-        capture.on_sent(datagram)
 
 
 def _show(display: FlightDisplay, client: FlightClient) -> None:
@@ -119,7 +101,9 @@ def run_wall_clock(
     while client.outcome is None:
         time.sleep(_TICK_S)
         now_us = monotonic_us()
-        _turn(client, capture, truth.drain() if truth else [], vehicle.drain(), now_us, vehicle)
+        told = truth.drain() if truth else []
+        for sent in ground_turn(client, capture, told, vehicle.drain(), now_us):
+            vehicle.send(sent)
         capture.flush(client.view.time_us or 0)
         if not started and client.connection.target is not None:
             started = True
