@@ -52,6 +52,11 @@ class Connection:
                 ours.append(one)
         return ours
 
+    @property
+    def next_heartbeat_us(self) -> int:
+        """When `poll` has something to send again."""
+        return self._next_heartbeat_us or 0
+
     def poll(self, now_us: int) -> list[bytes]:
         """Our heartbeat, once a second."""
         if self._next_heartbeat_us is not None and now_us < self._next_heartbeat_us:

@@ -156,6 +156,11 @@ class FlightClient:
             datagrams += [self.connection.frame(message) for message in self._operations[0].poll(now_us)]
         return datagrams
 
+    @property
+    def silent_until_us(self) -> int:
+        """Until when, by our clock, `poll` sends nothing, whatever is received; 0: that is not known."""
+        return self.connection.next_heartbeat_us if self.stage is Stage.FLY else 0
+
     def interrupt(self, reason: str = "stopped by the user") -> None:
         """End the flight from outside, if it is not over."""
         if self.outcome is None:

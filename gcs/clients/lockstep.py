@@ -1,7 +1,8 @@
 """The ground's half of lockstep: the vehicle's TIMESYNC opens our turn, our answer ends it.
 
-The vehicle stands still between its question (tc1 = 0, ts1 = its time in ns) and our answer (tc1 = ts1 + 1),
-so whatever we send before the answer is handled at that very tick.
+The vehicle stands still between its question (tc1 = 0, ts1 = its time in ns) and our answer (tc1 > ts1), so
+whatever we send before the answer is handled at that very tick. A later tc1 is a promise that we send nothing
+before that time: until then the vehicle asks, but does not wait for our answers.
 """
 
 from __future__ import annotations
@@ -49,10 +50,11 @@ class LockstepTurns:
             return None
         return self._answer if question_ns == self._answered_ns else b""
 
-    def answer(self, question_ns: int) -> bytes:
-        """The datagram that ends our turn."""
+    def answer(self, question_ns: int, silent_until_us: int = 0) -> bytes:
+        """The datagram that ends our turn, and the promise to send nothing before a time."""
         self._answered_ns = question_ns
-        self._answer = self._writer.frame((_TIMESYNC, (question_ns + 1, question_ns)))
+        silent_until_ns = max(question_ns + 1, silent_until_us * 1000)
+        self._answer = self._writer.frame((_TIMESYNC, (silent_until_ns, question_ns)))
         return self._answer
 
 

@@ -39,6 +39,7 @@ def run_lockstep(
     truth_queue = TruthQueue()
     pending: list[bytes] = []
     started = False
+    promised_us = 0  # how far the vehicle may go by itself
     heard_s = time.monotonic()
     while client.outcome is None:
         datagrams = vehicle.wait(_WAIT_S)
@@ -74,11 +75,22 @@ def run_lockstep(
             for sent in ground_turn(client, capture, truth_queue.until(now_us), pending, now_us):
                 vehicle.send(sent)
             pending.clear()
-            vehicle.send(turns.answer(question_ns))
+            promised_us = max(promised_us, client.silent_until_us)
+            vehicle.send(turns.answer(question_ns, client.silent_until_us))
             capture.flush(now_us)
             _show(display, client)
             if client.outcome is not None:
                 break
+    _let_stand(vehicle, turns, promised_us)
+
+
+def _let_stand(vehicle: UdpSocket, turns: LockstepTurns, promised_us: int) -> None:
+    """Wait until the vehicle waits for us, so that its own log of the flight ends at the same tick always."""
+    while datagrams := vehicle.wait(_WAIT_S):
+        for datagram in datagrams:
+            question_ns = turns.question(datagram)
+            if question_ns is not None and question_ns >= promised_us * 1000:
+                return
 
 
 def _show(display: FlightDisplay, client: FlightClient) -> None:
