@@ -27,7 +27,7 @@ from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
-from autopilot.onboard.snapshot import Options, make_snapshot
+from autopilot.onboard.snapshot import Moment, Moments, Options
 from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.heartbeat import heartbeat_message
@@ -45,7 +45,6 @@ from autopilot.services.records import (
     WorldSaved,
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
-from autopilot.services.snapshot import Snapshot
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
@@ -140,6 +139,7 @@ class Onboard:
         self._world = WorldParameters(parameters)
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
+        self._moments = Moments(self.core, options, parameters)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
@@ -255,7 +255,8 @@ class Onboard:
     def log_sample(self) -> Sample:
         """What the flight log records at this tick."""
         imu = self._last.imu if self._last else None
-        return Sample(self._snapshot(), imu, self.core.estimator)
+        moment = self._snapshot()
+        return Sample(moment, imu, moment.accel_quad, lambda: moment.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:
@@ -328,9 +329,9 @@ class Onboard:
 
     def stranded_heartbeat(self, link: Link) -> bytes:
         """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
-        snapshot = self._snapshot()._replace(system_status=mavlink.MAV_STATE_CRITICAL)
-        if snapshot.armed:
-            snapshot = snapshot._replace(system_status=mavlink.MAV_STATE_EMERGENCY)
+        snapshot = self._snapshot()
+        critical, emergency = mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY
+        snapshot.system_status = emergency if snapshot.armed else critical
         return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
 
     def rehearse(self) -> None:
@@ -421,14 +422,6 @@ class Onboard:
         plan = replace(flight.mission.plan, prepared=prepared)
         self.core.change(replace(flight, mission=replace(flight.mission, plan=plan)))
 
-    def _snapshot(self) -> Snapshot:
-        return make_snapshot(
-            self.core,
-            self._options,
-            self.endpoint.mission,
-            self._condition,
-            self._battery,
-            self._gps,
-            self.parameters["MAV_FAKE_GPS"] == 1.0,
-            self.now_us,
-        )
+    def _snapshot(self) -> Moment:
+        mission, condition = self.endpoint.mission, self._condition
+        return Moment(self._moments, mission, condition, self._battery, self._gps, self.now_us)
