@@ -359,6 +359,7 @@ def main(
 
         warm = build()  # compiles, or loads, every kernel
         warm.truth_datagram()
+        warm.receive(b"")
         warm.advance()
         simulator = build()
         if cpu is not None:

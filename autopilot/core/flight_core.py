@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
-from autopilot.control.actuators.mixer import MixerResult
 from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of
 from autopilot.control.laws.interface import law_of, new_rows
 from autopilot.control.load_motion import Drag
@@ -102,6 +101,9 @@ class FlightCore:
             references=_NO_ROWS,
         )
 
+        first = width(Command)  # forces are the first of what the mixer gives
+        self.force_row = self.rows.pilot[first : first + 4]  # what the rotors are to give, N
+
     # ---- what there is
 
     @property
@@ -117,8 +119,8 @@ class FlightCore:
     @property
     def forces(self) -> tuple[float, float, float, float]:
         """What the rotors are to give, N."""
-        # asked for at every tick: of the pilot only what lies behind the command
-        return unpack(MixerResult, self.rows.pilot, width(Command)).forces
+        f1, f2, f3, f4 = self.force_row.tolist()
+        return (f1, f2, f3, f4)
 
     @property
     def state(self) -> State:

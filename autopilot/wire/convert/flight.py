@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from numba.extending import register_jitable
+
 from autopilot.geometry.frames import enu_from_ned, flu_from_frd, frd_from_flu, ned_from_enu
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.convert.scaling import uint16
@@ -26,7 +28,8 @@ class LoadState(NamedTuple):
     slack_events: int
 
 
-def load_state_message(
+@register_jitable
+def load_state_values(
     time_us: int,
     source: int,
     x_load: Vec3,
@@ -37,9 +40,10 @@ def load_state_message(
     tension: float,
     taut: bool,
     slack_events: int,
-) -> Any:
-    """LOAD_STATE, see `LoadState`."""
-    return mavlink.MAVLink_load_state_message(
+) -> tuple[float, ...]:
+    """LOAD_STATE, see `LoadState`: the numbers in the order of the wire."""
+    pulls = 1 if taut else 0
+    return (
         time_us,
         *ned_from_enu(x_load),
         *ned_from_enu(v_load),
@@ -48,9 +52,15 @@ def load_state_message(
         distance,
         tension,
         uint16(slack_events),
-        1 if taut else 0,
+        pulls,
         source,
     )
+
+
+def load_state_message(*record: Any) -> Any:
+    """LOAD_STATE, see `LoadState`."""
+    values: Any = load_state_values(*record)
+    return mavlink.MAVLink_load_state_message(*values)
 
 
 def read_load_state(m: Any) -> LoadState:
@@ -230,11 +240,18 @@ class RotorState(NamedTuple):
     saturated: int
 
 
-def rotor_state_message(
+@register_jitable
+def rotor_state_values(
     time_us: int, source: int, forces: Forces, force_min: float, force_max: float, saturated: int
-) -> Any:
+) -> tuple[float, ...]:
+    """ROTOR_STATE, see `RotorState`: the numbers in the order of the wire."""
+    return (time_us, *forces, force_min, force_max, saturated, source)
+
+
+def rotor_state_message(*record: Any) -> Any:
     """ROTOR_STATE, see `RotorState`."""
-    return mavlink.MAVLink_rotor_state_message(time_us, forces, force_min, force_max, saturated, source)
+    values: Any = rotor_state_values(*record)
+    return mavlink.MAVLink_rotor_state_message(values[0], values[1:5], *values[5:])
 
 
 def read_rotor_state(m: Any) -> RotorState:
