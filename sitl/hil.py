@@ -264,12 +264,13 @@ class HilSimulator:
 
     def _sensor_frames(self) -> bytes:
         writer, core = self._sensor_writer, self.core
-        aside = b"".join(map(writer.frame, self.parameters.take()))
+        aside = self.parameters.take()
+        first = b"".join(map(writer.frame, aside)) if aside else b""
         rows = core.rows
         length, writer.sequence = put_sensors(
             core.now_us, rows.clock, rows.queue, self._newest, self._statement, self._buffer, writer.sequence
         )
-        return aside + self._buffer[:length].tobytes()
+        return first + self._buffer[:length].tobytes()
 
     def _truth_frames(self) -> bytes | None:
         core = self.core

@@ -6,8 +6,11 @@ The work is done by `sitl.world.world_tick`, on flat arrays. What has left the s
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, unpack, width
 from sitl.plant.records import PlantState, Rotors, Truth
@@ -37,6 +40,7 @@ class SimCore:
         self._pulse_at_us = settings.pulse_at_us
         self.rows = new_world(truth, profile, settings, seed)
         self._world: World | None = None
+        self._tick: Callable[..., None] | None = None  # the tick's machine code, once it was run
         self.now_us = 0  # simulated time of this tick
         self.tick_count = 0  # ticks so far
 
@@ -91,7 +95,9 @@ class SimCore:
 
     def tick(self, command: Rotors, gripper_open: bool = False, reel_rate: float = 0.0) -> None:
         """Integrate to the next tick; see `world_tick`."""
-        world_tick(self.rows, command, gripper_open, reel_rate)
+        if self._tick is None:
+            self._tick = entry_of(world_tick, self.rows, command, gripper_open, reel_rate)
+        self._tick(self.rows, command, gripper_open, reel_rate)
         self._world = None
         self.now_us += self.settings.tick_us
         self.tick_count += 1

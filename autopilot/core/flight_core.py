@@ -7,6 +7,7 @@ tick as `Winch`, what is flown and until when as `Stretch` with its setpoints la
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
@@ -39,6 +40,7 @@ from autopilot.estimation.records import (
     blank_state,
     new_history,
 )
+from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import IDENTITY, ZERO
 from autopilot.geometry.packed import pack, packed, unpack, width
 from autopilot.guidance.layout import COLUMNS, jets_ahead
@@ -86,6 +88,7 @@ class FlightCore:
         self._cable_m: float | None = None  # that `settings` were made for
         self._dirty = True  # the flight has changed since the winch was told
         self.law_rows = new_rows(setup.law)
+        self._fly: Callable[..., int] | None = None  # the tick's machine code for this law, once it was run
         pilot = Pilot(NO_COMMAND, STOPPED, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
             estimator=packed(blank_state()),
@@ -157,7 +160,9 @@ class FlightCore:
     def step(self, count: int, now_us: int, tick: int, dt: float) -> Report:
         """One tick of `dt` seconds with the first `count` readings of the inbox."""
         self.move_cable(now_us)
-        if fly_tick(self.rows, self.law_rows, count, now_us, tick, dt) != TO_DECIDE:
+        if self._fly is None:
+            self._fly = entry_of(fly_tick, self.rows, self.law_rows, count, now_us, tick, dt)
+        if self._fly(self.rows, self.law_rows, count, now_us, tick, dt) != TO_DECIDE:
             return _NOTHING
         return self.decide(now_us, round(dt * 1e6))
 
@@ -262,6 +267,7 @@ class FlightCore:
             pilot = self.pilot._replace(control_mode=RESTING)
             pack(pilot, self.rows.pilot, 0)
         self.law_rows = rows
+        self._fly = None
         self._follow_cable()
         self.interrupt()
 

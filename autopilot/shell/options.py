@@ -67,6 +67,19 @@ def receive(sock: socket.socket, flags: int = 0) -> tuple[bytes, Address] | None
         return None
 
 
+def send(sock: socket.socket, datagram: bytes, address: Address | None = None) -> bool:
+    """Send a datagram, of a connected socket without an address; False if it is lost: nobody listens there
+    yet, or the network is full."""
+    try:
+        if address is None:
+            sock.send(datagram)
+        else:
+            sock.sendto(datagram, address)
+    except OSError:
+        return False
+    return True
+
+
 def datagram_socket(address: Address) -> socket.socket:
     """A UDP socket of the family of `address`."""
     family = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0][0]
