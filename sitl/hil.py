@@ -6,12 +6,13 @@ docs/sensors.md describes the link for those who connect an autopilot of their o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import ZERO
 from autopilot.geometry.packed import Row, packed
 from autopilot.wire import convert
@@ -92,6 +93,7 @@ class HilSimulator:
         self._home = home
         self._lockstep = lockstep
         self._truth_every = truth_every
+        self._put_sensors: Callable[..., tuple[int, int]] | None = None  # its machine code, once it was run
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._begin()
@@ -266,10 +268,10 @@ class HilSimulator:
         writer, core = self._sensor_writer, self.core
         aside = self.parameters.take()
         first = b"".join(map(writer.frame, aside)) if aside else b""
-        rows = core.rows
-        length, writer.sequence = put_sensors(
-            core.now_us, rows.clock, rows.queue, self._newest, self._statement, self._buffer, writer.sequence
-        )
+        arguments = (core.rows, core.now_us, self._newest, self._statement, self._buffer, writer.sequence)
+        if self._put_sensors is None:
+            self._put_sensors = entry_of(put_sensors, *arguments)
+        length, writer.sequence = self._put_sensors(*arguments)
         return first + self._buffer[:length].tobytes()
 
     def _truth_frames(self) -> bytes | None:

@@ -53,10 +53,9 @@ from sitl.world import (
     MOCAP,
     READING,
     SHOWS,
-    Floats,
-    Ints,
     World,
     WorldModel,
+    WorldRows,
     arrived,
 )
 from sitl.world import MAG as MAGNETOMETER
@@ -87,13 +86,6 @@ class Newest(NamedTuple):
     height: BarometerReading
 
 
-class _Queues(NamedTuple):
-    """The part of the world's rows that readings are taken out of."""
-
-    clock: Ints
-    queue: Floats
-
-
 @kernel
 def pressure_pa(altitude_m: float) -> float:
     """International standard atmosphere below 11 km; altitude above mean sea level."""
@@ -108,7 +100,7 @@ def _put(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, sequenc
 
 @kernel
 def put_sensors(
-    now_us: int, clock: Ints, queue: Floats, newest: Row, statement: Row, buffer: Bytes, sequence: int
+    rows: WorldRows, now_us: int, newest: Row, statement: Row, buffer: Bytes, sequence: int
 ) -> tuple[int, int]:
     """Take out of the queues what has left the sensors by now, and write its frames, HIL_SENSOR last.
 
@@ -117,9 +109,9 @@ def put_sensors(
     """
     said = unpack(Statement, statement, 0)
     stated, payload = said.stated, np.empty(PAYLOAD_ROOM, np.uint8)
-    queues: Any = _Queues(clock, queue)
+    queue = rows.queue
     at = fields = 0
-    found = arrived(MOCAP, now_us, queues)
+    found = arrived(MOCAP, now_us, rows)
     while found >= 0:
         row = queue[MOCAP, found]
         pose = unpack(PoseReading, row, READING)
@@ -135,8 +127,8 @@ def put_sensors(
         )
         at = _put(ODOMETRY, values, payload, buffer, at, sequence)
         sequence += 1
-        found = arrived(MOCAP, now_us, queues)
-    found = arrived(LOAD, now_us, queues)
+        found = arrived(MOCAP, now_us, rows)
+    found = arrived(LOAD, now_us, rows)
     while found >= 0:
         row = queue[LOAD, found]
         load = unpack(LoadReading, row, READING)
@@ -153,8 +145,8 @@ def put_sensors(
         )
         at = _put(LOAD_SENSOR, tracked, payload, buffer, at, sequence)
         sequence += 1
-        found = arrived(LOAD, now_us, queues)
-    found = arrived(CABLE, now_us, queues)
+        found = arrived(LOAD, now_us, rows)
+    found = arrived(CABLE, now_us, rows)
     while found >= 0:
         row = queue[CABLE, found]
         cable = unpack(CableReading, row, READING)
@@ -171,8 +163,8 @@ def put_sensors(
             )
             at = _put(LOAD_SENSOR, sighted, payload, buffer, at, sequence)
             sequence += 1
-        found = arrived(CABLE, now_us, queues)
-    found = arrived(GNSS, now_us, queues)
+        found = arrived(CABLE, now_us, rows)
+    found = arrived(GNSS, now_us, rows)
     while found >= 0:
         row = queue[GNSS, found]
         fix = unpack(GnssReading, row, READING)
@@ -188,24 +180,24 @@ def put_sensors(
         )
         at = _put(HIL_GPS, fixed, payload, buffer, at, sequence)
         sequence += 1
-        found = arrived(GNSS, now_us, queues)
+        found = arrived(GNSS, now_us, rows)
     last = unpack(Newest, newest, 0)
     inertial, field, height = last.inertial, last.field, last.height
-    found = arrived(IMU, now_us, queues)
+    found = arrived(IMU, now_us, rows)
     while found >= 0:
         inertial = unpack(ImuReading, queue[IMU, found], READING)
         fields |= ACCEL | GYRO
-        found = arrived(IMU, now_us, queues)
-    found = arrived(MAGNETOMETER, now_us, queues)
+        found = arrived(IMU, now_us, rows)
+    found = arrived(MAGNETOMETER, now_us, rows)
     while found >= 0:
         field = unpack(MagnetometerReading, queue[MAGNETOMETER, found], READING)
         fields |= MAG
-        found = arrived(MAGNETOMETER, now_us, queues)
-    found = arrived(BARO, now_us, queues)
+        found = arrived(MAGNETOMETER, now_us, rows)
+    found = arrived(BARO, now_us, rows)
     while found >= 0:
         height = unpack(BarometerReading, queue[BARO, found], READING)
         fields |= PRESSURE | TEMPERATURE
-        found = arrived(BARO, now_us, queues)
+        found = arrived(BARO, now_us, rows)
     pack(Newest(inertial, field, height), newest, 0)
     altitude = said.home.altitude_m + height.height
     own = hil_sensor_values(

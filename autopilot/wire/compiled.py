@@ -3,7 +3,7 @@
 A message is given by a type that `wire_record` makes of pymavlink's own class: a NamedTuple of its fields in
 the order of the wire, arrays as tuples. Layout, id and CRC_EXTRA are those of the generated class.
 
-    HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message)
+    HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message, __name__)
 
     end = put_frame(HIL_SENSOR, values, payload, buffer, at, Origin(sequence, 1, 26))
     if holds(HIL_SENSOR, datagram, start, payload):
@@ -78,15 +78,19 @@ class Origin(NamedTuple):
 _LAYOUTS: dict[Any, _Layout] = {}
 
 
-def wire_record(message_type: Any) -> Any:
-    """The record type of one of pymavlink's classes; a message with text raises KeyError."""
+def wire_record(message_type: Any, module: str) -> Any:
+    """The record type of one of pymavlink's classes; a message with text raises KeyError.
+
+    It must be kept in this module under the name of the message, where numba finds it when it loads machine
+    code.
+    """
     kinds = dict(zip(message_type.fieldnames, message_type.fieldtypes, strict=True))
     fields, at = [], 0
     for name, count in zip(message_type.ordered_fieldnames, message_type.array_lengths, strict=True):
         size, number = _NUMBERS[kinds[name]]
         fields.append((at, count, number))
         at += size * max(count, 1)
-    record = namedtuple(message_type.msgname, message_type.ordered_fieldnames)  # type: ignore[misc]
+    record = namedtuple(message_type.msgname, message_type.ordered_fieldnames, module=module)  # type: ignore[misc]
     _LAYOUTS[record] = _Layout(message_type.id, message_type.crc_extra, at, tuple(fields))
     return record
 

@@ -23,14 +23,14 @@ from autopilot.wire.convert.simulator import (
 )
 from autopilot.wire.dialect import plumbline as mavlink
 
-HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message)
-ODOMETRY = wire_record(mavlink.MAVLink_odometry_message)
-LOAD_SENSOR = wire_record(mavlink.MAVLink_load_sensor_message)
-HIL_GPS = wire_record(mavlink.MAVLink_hil_gps_message)
-HIL_ACTUATOR_CONTROLS = wire_record(mavlink.MAVLink_hil_actuator_controls_message)
-HIL_STATE_QUATERNION = wire_record(mavlink.MAVLink_hil_state_quaternion_message)
-LOAD_STATE = wire_record(mavlink.MAVLink_load_state_message)
-ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message)
+HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message, __name__)
+ODOMETRY = wire_record(mavlink.MAVLink_odometry_message, __name__)
+LOAD_SENSOR = wire_record(mavlink.MAVLink_load_sensor_message, __name__)
+HIL_GPS = wire_record(mavlink.MAVLink_hil_gps_message, __name__)
+HIL_ACTUATOR_CONTROLS = wire_record(mavlink.MAVLink_hil_actuator_controls_message, __name__)
+HIL_STATE_QUATERNION = wire_record(mavlink.MAVLink_hil_state_quaternion_message, __name__)
+LOAD_STATE = wire_record(mavlink.MAVLink_load_state_message, __name__)
+ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
 
 _SYSTEM = 5  # where a frame names its sender
 
