@@ -362,7 +362,8 @@ def main(
         simulator = build()
         if cpu is not None:
             _run_on(cpu)
-        be_punctual()
+        # where it would wait spinning for most of the time, it would keep others from their work
+        be_punctual(not lockstep and simulator.tick_us * 1000 / factor > 4 * _SPIN_NS)
         mode = f"at {factor:g} x real time"
         if lockstep:
             mode = "in lockstep" if speed is None else f"in lockstep, at most {mode[3:]}"

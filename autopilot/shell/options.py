@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import os
 import signal
 import socket
 import struct
@@ -96,8 +97,15 @@ def shown(address: Address | None) -> str:
     return f"{address[0]}:{address[1]}" if address else "nowhere"
 
 
-def be_punctual() -> None:
-    """Ask the system and the interpreter for short delays; none of it is needed."""
+def be_punctual(real_time: bool) -> None:
+    """Ask the system and the interpreter for short delays; none of it is needed.
+
+    A program that keeps to the wall clock also asks to go before all others, but not for the processes that
+    it starts.
+    """
+    if real_time:
+        with suppress(OSError, AttributeError):
+            os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
     gc.collect()

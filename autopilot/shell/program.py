@@ -509,7 +509,7 @@ def main(
             print(f"autopilot: {trouble}", file=sys.stderr)
         program.take_areas(areas)
         program.onboard.rehearse()
-        be_punctual()
+        be_punctual(real_time=not in_step)
         with StopRequest() as stop:
             program.run(stop)
     except (AutopilotError, VehicleFileError, ParameterError, StorageError) as error:
