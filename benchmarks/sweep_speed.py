@@ -21,7 +21,7 @@ from missions.fileformat import load_mission
 class NoLog:
     """Takes frames and forgets them."""
 
-    def write(self, unix_us: int, frame: bytes) -> None:
+    def write(self, unix_us: int, *frames: bytes) -> None:
         """Nothing."""
 
 

@@ -68,9 +68,9 @@ class Hasher:
     def __init__(self) -> None:
         self.flown, self.said = sha256(), sha256()
 
-    def write(self, unix_us: int, frame: bytes) -> None:
-        """Take one record."""
-        for one in decode(frame)[0]:
+    def write(self, unix_us: int, *frames: bytes) -> None:
+        """Take records in."""
+        for one in decode(b"".join(frames))[0]:
             message = one.message
             kind = message.get_msgId()
             into = self.said if kind in TEXTS else self.flown

@@ -20,7 +20,7 @@ from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
-from gcs.clients.lockstep import LockstepTurns, TruthQueue
+from gcs.clients.lockstep import LockstepTurns, TruthQueue, ground_turn
 from missions.model import Mission
 from sitl.hil import HilSimulator
 
@@ -89,19 +89,3 @@ def fly(mission: Mission, conditions: Conditions, log: FrameLog, watch: Watch | 
             simulator.receive(answer)
         simulator.advance()
     return client.outcome
-
-
-def ground_turn(
-    client: FlightClient, capture: Capture, truth: list[bytes], vehicle: list[bytes], now_us: int
-) -> list[bytes]:
-    """The ground station's turn: hears everything, answers, and keeps a record of both."""
-    for datagram in truth:
-        client.receive(datagram, "truth", now_us)
-        capture.on_truth(datagram)
-    for datagram in vehicle:
-        client.receive(datagram, "vehicle", now_us)
-        capture.on_vehicle(datagram)
-    sent = client.poll(now_us)
-    for datagram in sent:
-        capture.on_sent(datagram)
-    return sent

@@ -14,11 +14,13 @@ from math import isfinite, nan
 from typing import NamedTuple
 
 from autopilot.estimation.records import EstimatorState, ImuReading
-from autopilot.geometry.frames import frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
+from autopilot.geometry.frames import quat_ned_frd_from_enu_flu
+from autopilot.geometry.linear import Vec3
 from autopilot.services import identity
 from autopilot.services.files import LOG_ENDING, LOG_FOLDER, Path
 from autopilot.services.snapshot import Snapshot
 from autopilot.wire import ulog
+from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.ulog import Topic, UlogWriter
@@ -48,7 +50,8 @@ class Sample(NamedTuple):
 
     snapshot: Snapshot
     imu: ImuReading | None
-    estimator: EstimatorState
+    accel_quad: Vec3  # m/s^2, ENU
+    estimator: Callable[[], EstimatorState]  # for the slow topics
 
 
 class LogChunk(NamedTuple):
@@ -69,7 +72,7 @@ def _local_position(s: Sample) -> Numbers:
         *(home.latitude_deg, home.longitude_deg),
         *ned_from_enu(v.x_quad),
         *ned_from_enu(v.v_quad),
-        *ned_from_enu(s.estimator.vehicle.accel_quad),
+        *ned_from_enu(s.accel_quad),
         *(home.altitude_m, v.horizontal_std, v.vertical_std),
         *(v.estimator_flags != 0,) * 6,
     )
@@ -157,7 +160,8 @@ def _rotor_forces(s: Sample) -> Numbers:
 
 
 def _estimator(s: Sample) -> Numbers:
-    vehicle, load = s.estimator.vehicle, s.estimator.load
+    estimator = s.estimator()
+    vehicle, load = estimator.vehicle, estimator.load
     return (
         *frd_from_flu(vehicle.gyro_bias),
         *frd_from_flu(vehicle.accel_bias),

@@ -30,7 +30,7 @@ from autopilot.geometry.packed import pack, packed, unpack
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
-from autopilot.onboard.snapshot import Options, make_snapshot
+from autopilot.onboard.snapshot import Moment, Moments, Options
 from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.heartbeat import heartbeat_message
@@ -48,7 +48,6 @@ from autopilot.services.records import (
     WorldSaved,
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
-from autopilot.services.snapshot import Snapshot
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
@@ -147,6 +146,7 @@ class Onboard:
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
+        self._moments = Moments(self.core, options, parameters)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
@@ -286,7 +286,8 @@ class Onboard:
 
     def log_sample(self) -> Sample:
         """What the flight log records at this tick."""
-        return Sample(self._snapshot(), self._sensors.sample, self.core.estimator)
+        moment = self._snapshot()
+        return Sample(moment, self._sensors.sample, moment.accel_quad, lambda: moment.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:
@@ -360,9 +361,9 @@ class Onboard:
 
     def stranded_heartbeat(self, link: Link) -> bytes:
         """A heartbeat of a vehicle whose sensors are silent, for a shell whose clock stands."""
-        snapshot = self._snapshot()._replace(system_status=mavlink.MAV_STATE_CRITICAL)
-        if snapshot.armed:
-            snapshot = snapshot._replace(system_status=mavlink.MAV_STATE_EMERGENCY)
+        snapshot = self._snapshot()
+        critical, emergency = mavlink.MAV_STATE_CRITICAL, mavlink.MAV_STATE_EMERGENCY
+        snapshot.system_status = emergency if snapshot.armed else critical
         return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
 
     def rehearse(self) -> None:
@@ -457,14 +458,7 @@ class Onboard:
         plan = replace(flight.mission.plan, prepared=prepared)
         self.core.change(replace(flight, mission=replace(flight.mission, plan=plan)))
 
-    def _snapshot(self) -> Snapshot:
-        return make_snapshot(
-            self.core,
-            self._options,
-            self.endpoint.mission,
-            unpack(Condition, self._health, 0),
-            self._battery,
-            unpack(HilGps, self._sensors.fix, 0) if self._fixed else None,
-            self.parameters["MAV_FAKE_GPS"] == 1.0,
-            self.now_us,
-        )
+    def _snapshot(self) -> Moment:
+        condition = unpack(Condition, self._health, 0)
+        fix = unpack(HilGps, self._sensors.fix, 0) if self._fixed else None
+        return Moment(self._moments, self.endpoint.mission, condition, self._battery, fix, self.now_us)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf, nan, sqrt
+from operator import itemgetter
+from typing import Any, get_type_hints
 
 from autopilot.control.load_motion import Drag
 from autopilot.core.flight_core import FlightCore
 from autopilot.core.health import BatteryConstants, Condition, remaining, sensors, vibration, voltage
+from autopilot.core.tick import Pilot, Seen
 from autopilot.estimation.records import TRACKER, EstimatorState
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
+from autopilot.geometry.packed import Row, width
 from autopilot.geometry.so3 import quat_from_rotation
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, asked_jet
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Run, asked_jet
 from autopilot.services import identity, snapshot
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.snapshot import GpsFix, Snapshot
@@ -24,10 +30,12 @@ from autopilot.supervisor.state import (
     Guide,
     Phase,
     Selected,
+    View,
     leg_time_s,
 )
 from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameter_table import ParameterTable
 
 FRESH_S = 0.5  # a tracker is healthy while its last reading is no older
 _NO_COUNT = 255  # satellites of a fix that no receiver gave
@@ -124,16 +132,22 @@ def mission_state(flight: Flight, items: int) -> int:
     return mavlink.MISSION_STATE_NOT_STARTED
 
 
+def tracked(estimator: EstimatorState) -> bool:
+    """Whether a tracker tells where the vehicle is, and of late."""
+    vehicle, load = estimator.vehicle, estimator.load
+    return vehicle.source == TRACKER and vehicle.age_s < FRESH_S and load.age_s < FRESH_S
+
+
 def sensor_bits(
     condition: Condition, estimator: EstimatorState, ready: bool, fake_gps: bool, now_us: int
 ) -> tuple[int, int]:
     """Sensors present and healthy, as bits of SYS_STATUS; a tracker stands in for what it makes needless."""
     present, healthy = (bits | _ALWAYS for bits in sensors(condition, now_us))
     if estimator.vehicle.source == TRACKER:
-        tracked = snapshot.TRACKER | (_BY_TRACKER & ~present if fake_gps else 0)
-        present |= tracked
-        if estimator.vehicle.age_s < FRESH_S and estimator.load.age_s < FRESH_S:
-            healthy |= tracked
+        by_tracker = snapshot.TRACKER | (_BY_TRACKER & ~present if fake_gps else 0)
+        present |= by_tracker
+        if tracked(estimator):
+            healthy |= by_tracker
     if ready:
         healthy |= snapshot.PREARM
     return present, healthy
@@ -150,125 +164,246 @@ def wind(push: Vec3, drag: Drag) -> Vec3:
     return scale(1.0 / slope, push) if slope > 0.0 else (nan, nan, nan)
 
 
-def make_snapshot(
-    core: FlightCore,
-    options: Options,
-    mission: StoredMission,
-    condition: Condition,
-    battery: BatteryConstants,
-    gps: HilGps | None,
-    fake_gps: bool,
-    now_us: int,
-) -> Snapshot:
-    """All that telemetry tells of this instant."""
-    flight, estimator, pilot, setup = core.flight, core.estimator, core.pilot, core.setup
-    command, control, view = pilot.command, core.state, core.view(now_us)
-    ready = not arming_complaints(flight, view, core.settings)
-    present, healthy = sensor_bits(condition, estimator, ready, fake_gps, now_us)
-    tracked = estimator.vehicle.source == TRACKER and healthy & snapshot.TRACKER
-    fix = _fix(gps)
-    if fix is None and fake_gps and tracked:
-        accuracy = (estimator.doubt.horizontal, estimator.doubt.vertical)
-        fixed = mavlink.GPS_FIX_TYPE_3D_FIX
-        fix = GpsFix(now_us, fixed, control.x_quad, control.v_quad, *accuracy, _NO_COUNT)
+class Moments:
+    """Makes the snapshots of one flight core; remembers what follows from a flight record while it lasts."""
 
-    leg = flight.legs[0] if flight.legs else None
-    x_d, v_d, a_d, x_quad_d = control.x_load, ZERO, ZERO, (nan, nan, nan)
-    x_asked, v_asked = x_d, v_d
-    elapsed, duration = (now_us - flight.phase_start_us) * 1e-6, nan
-    if leg is not None:
-        elapsed = leg_time_s(flight, now_us)
-        duration = leg.duration_s if leg.duration_s < inf else nan
+    def __init__(self, core: FlightCore, options: Options, parameters: ParameterTable) -> None:
+        self.core = core
+        self.options = options
+        self.parameters = parameters
+        self._flight: Flight | None = None
+        self._items = 0
+        self._told: tuple[Any, ...] = ()
+
+    def told(self, flight: Flight, items: int) -> tuple[Any, ...]:
+        """The fields of `_flight`, of a flight record with a mission of so many items."""
+        if flight is not self._flight or items != self._items:
+            self._flight, self._items = flight, items
+            area, sequence = flight.area, flight.mission.plan.sequence
+            seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
+            self._told = (
+                *(area.home, area.breach, area.breaches, area.breach_us),
+                *(flight.phase not in (Phase.DISARMED, Phase.FAILSAFE), int(flight.phase), *mode_of(flight)),
+                _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
+                *(seq, seq, items, mission_state(flight, items), flight.cable.reel_rate),
+            )
+        return self._told
+
+
+class Moment(Snapshot):
+    """The instant at which the flight core stands; to be read before anything changes there.
+
+    Its fields are made when they are first read, each with those of its part below: at most instants few of
+    them are sent.
+    """
+
+    def __init__(
+        self,
+        moments: Moments,
+        mission: StoredMission,
+        condition: Condition,
+        battery: BatteryConstants,
+        receiver: HilGps | None,
+        now_us: int,
+    ) -> None:
+        self.now_us = now_us
+        self.boot_unix_us = moments.options.boot_unix_us
+        self.home = moments.options.home
+        self.moments = moments
+        self.core = moments.core
+        self.flight = moments.core.flight
+        self.items = len(mission.items)
+        self.condition = condition
+        self.battery = battery
+        self.receiver = receiver
+
+    accel_quad: Vec3  # inertial acceleration, ENU: for the flight log
+
+    @cached_property
+    def estimator(self) -> EstimatorState:
+        """The estimate."""
+        return self.core.estimator
+
+    @cached_property
+    def view(self) -> View:
+        """What the supervisor sees."""
+        return self.core.view(self.now_us)
+
+    @cached_property
+    def ready(self) -> bool:
+        """Whether the vehicle may be armed."""
+        return not arming_complaints(self.flight, self.view, self.core.settings)
+
+    @property
+    def fake_gps(self) -> bool:
+        """Whether the tracker is shown as a receiver where there is none."""
+        return self.moments.parameters["MAV_FAKE_GPS"] == 1.0
+
+
+Part = Callable[[Moment], tuple[Any, ...]]
+
+
+class _Field:
+    """A field of a `Moment` that is not made yet: it is with those beside it in its part."""
+
+    def __init__(self, part: Part, names: tuple[str, ...], name: str) -> None:
+        self._part, self._names, self._name = part, names, name
+
+    def __get__(self, moment: Moment, owner: Any) -> Any:
+        made = moment.__dict__
+        made.update(zip(self._names, self._part(moment), strict=True))
+        return made[self._name]
+
+
+def _makes(*names: str) -> Callable[[Part], Part]:
+    """The part gives the values of these fields."""
+
+    def decorate(part: Part) -> Part:
+        for name in names:
+            setattr(Moment, name, _Field(part, names, name))
+        return part
+
+    return decorate
+
+
+def _slot(record: Any, *path: str) -> slice | int:
+    """Where in a packed record the numbers of a field lie: of a vector all, of a number its place."""
+    first, kind = 0, record
+    for name in path:
+        hints = get_type_hints(kind)
+        first += sum(width(hints[one]) for one in kind._fields[: kind._fields.index(name)])
+        kind = hints[name]
+    return first if width(kind) == 1 else slice(first, first + width(kind))
+
+
+def _reader(record: Any, *paths: str) -> Callable[[Row], Any]:
+    """Reads the fields of a packed record that lie at these paths, a.b for the field b of the field a."""
+    take = itemgetter(*(_slot(record, *path.split(".")) for path in paths))
+    # of a tuple even a part is a tuple
+    return lambda row: take(tuple(row.tolist()))
+
+
+_read_seen = _reader(
+    Seen,
+    *(f"state.{name}" for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad")),
+    *("state.omega_body", "taut"),
+)
+_read_estimator = _reader(
+    EstimatorState,
+    *("vehicle.quat_wxyz", "load.tension", "doubt.horizontal", "doubt.vertical", "vehicle.accel_quad"),
+)
+_read_pilot = _reader(
+    Pilot,
+    *("control_mode", "slack_events", "mixed.saturated", "mixed.forces"),
+    *(f"command.{name}" for name in ("e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q")),
+    *(f"command.{name}" for name in ("q_c", "thrust", "moment")),
+)
+
+
+_read_attitude_asked = _reader(Pilot, "command.R_c")
+
+
+@_makes(
+    *("launch", "breach", "breaches", "breach_us", "armed", "phase", "main_mode", "sub_mode"),
+    *("landed_state", "seq", "mission_current", "mission_total", "mission_state", "reel_rate"),
+    "system_status",
+)
+def _flight(m: Moment) -> tuple[Any, ...]:
+    told, flight = m.moments.told(m.flight, m.items), m.flight
+    return (*told, system_status(flight, flight.phase == Phase.DISARMED and m.ready))
+
+
+@_makes("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad", "omega_body", "taut", "distance")
+def _motion(m: Moment) -> tuple[Any, ...]:
+    x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, taut = _read_seen(m.core.rows.seen)
+    distance = norm(sub(x_load, x_quad))
+    return x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, taut != 0.0, distance
+
+
+@_makes("quat_wxyz", "tension", "horizontal_std", "vertical_std", "accel_quad")
+def _estimate(m: Moment) -> tuple[Any, ...]:
+    return _read_estimator(m.core.rows.estimator)  # type: ignore[no-any-return]
+
+
+@_makes("estimator_flags")
+def _flags(m: Moment) -> tuple[Any, ...]:
+    return (0 if m.view.complaints else _ESTIMATING,)
+
+
+@_makes(
+    *("control_mode", "slack_events", "saturated", "forces", "e_x", "e_v"),
+    *("e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q", "q_cable_c", "thrust", "moment"),
+)
+def _command(m: Moment) -> tuple[Any, ...]:
+    mode, slack_events, saturated, forces, e_x, e_v, *others = _read_pilot(m.core.rows.pilot)
+    if m.flight.phase not in CARRYING:
+        e_x = e_v = ZERO
+    return (int(mode), int(slack_events), int(saturated), forces, e_x, e_v, *others)
+
+
+@_makes("quat_c_wxyz")
+def _attitude_asked(m: Moment) -> tuple[Any, ...]:
+    r = _read_attitude_asked(m.core.rows.pilot)
+    return (quat_from_rotation((r[0:3], r[3:6], r[6:9])),)
+
+
+@_makes(
+    *("elapsed_s", "duration_s", "x_load_d", "v_load_d", "a_load_d", "x_load_asked", "v_load_asked"),
+    "x_quad_d",
+)
+def _setpoint(m: Moment) -> tuple[Any, ...]:
+    flight, now_us, x_load, nowhere = m.flight, m.now_us, m.x_load, (nan, nan, nan)
+    if not flight.legs:
+        elapsed = (now_us - flight.phase_start_us) * 1e-6
+        return elapsed, nan, x_load, ZERO, ZERO, x_load, ZERO, nowhere
+    leg, elapsed = flight.legs[0], leg_time_s(flight, now_us)
+    duration = leg.duration_s if leg.duration_s < inf else nan
+    if leg.control_mode == LOAD_POSITION:
         jet = leg.jet(elapsed)
-        if leg.control_mode == LOAD_POSITION:
-            x_d, v_d, a_d = jet[0], jet[1], jet[2]
-            asked = asked_jet(leg, elapsed)
-            x_asked, v_asked = asked[0], asked[1]
-        elif leg.control_mode == QUAD_POSITION:
-            x_quad_d = jet[0]
-    sequence = flight.mission.plan.sequence
-    seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
-    carrying = flight.phase in CARRYING
-    return Snapshot(
-        now_us=now_us,
-        boot_unix_us=options.boot_unix_us,
-        home=options.home,
-        launch=flight.area.home,
-        breach=flight.area.breach,
-        breaches=flight.area.breaches,
-        breach_us=flight.area.breach_us,
-        armed=flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
-        phase=int(flight.phase),
-        main_mode=mode_of(flight)[0],
-        sub_mode=mode_of(flight)[1],
-        landed_state=_LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
-        system_status=system_status(flight, ready),
-        x_quad=control.x_quad,
-        v_quad=control.v_quad,
-        quat_wxyz=estimator.vehicle.quat_wxyz,
-        omega_body=control.omega_body,
-        estimator_flags=0 if view.complaints else _ESTIMATING,
-        horizontal_std=estimator.doubt.horizontal,
-        vertical_std=estimator.doubt.vertical,
-        x_load=control.x_load,
-        v_load=control.v_load,
-        q_cable=control.q_cable,
-        q_cable_dot=control.q_cable_dot,
-        distance=norm(sub(control.x_load, control.x_quad)),
-        tension=estimator.load.tension,
-        taut=view.taut,
-        slack_events=pilot.slack_events,
-        control_mode=pilot.control_mode,
-        seq=seq,
-        elapsed_s=elapsed,
-        duration_s=duration,
-        x_load_d=x_d,
-        v_load_d=v_d,
-        a_load_d=a_d,
-        x_load_asked=x_asked,
-        v_load_asked=v_asked,
-        q_cable_c=command.q_c,
-        x_quad_d=x_quad_d,
-        quat_c_wxyz=quat_from_rotation(command.R_c),
-        e_x=command.e_x if carrying else ZERO,
-        e_v=command.e_v if carrying else ZERO,
-        e_q=command.e_q,
-        e_q_dot=command.e_q_dot,
-        e_R=command.e_R,
-        e_Omega=command.e_Omega,
-        psi_R=command.psi_R,
-        psi_q=command.psi_q,
-        thrust=command.thrust,
-        moment=command.moment,
-        forces=pilot.mixed.forces,
-        rotor_min=setup.vehicle.rotor_min if setup.limited else -inf,
-        rotor_max=setup.vehicle.rotor_max if setup.limited else inf,
-        saturated=pilot.mixed.saturated,
-        sensors_present=present,
-        sensors_healthy=healthy,
-        gps=fix,
-        vibration=vibration(condition),
-        wind=wind(pilot.observed.push, setup.drag) if flight.phase in IN_AIR else (nan, nan, nan),
-        battery_voltage=voltage(condition, battery),
-        battery_current=condition.current,
-        battery_used_mah=condition.used_as / 3.6,
-        battery_remaining=remaining(condition, battery),
-        mission_current=seq,
-        mission_total=len(mission.items),
-        mission_state=mission_state(flight, len(mission.items)),
-        reel_rate=flight.cable.reel_rate,
-    )
+        asked = (
+            asked_jet(leg, elapsed) if isinstance(leg, Run) else jet
+        )  # a second time only where it differs
+        return elapsed, duration, jet[0], jet[1], jet[2], asked[0], asked[1], nowhere
+    x_quad_d = leg.jet(elapsed)[0] if leg.control_mode == QUAD_POSITION else nowhere
+    return elapsed, duration, x_load, ZERO, ZERO, x_load, ZERO, x_quad_d
 
 
-def _fix(gps: HilGps | None) -> GpsFix | None:
-    if gps is None:
-        return None
-    return GpsFix(
-        gps.time_us,
-        gps.fix_type,
-        gps.position,
-        gps.velocity,
-        gps.horizontal_std,
-        gps.vertical_std,
-        gps.satellites,
-    )
+@_makes("rotor_min", "rotor_max")
+def _limits(m: Moment) -> tuple[Any, ...]:
+    setup = m.core.setup
+    return (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
+
+
+@_makes("sensors_present", "sensors_healthy")
+def _sensors(m: Moment) -> tuple[Any, ...]:
+    return sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us)
+
+
+@_makes("gps")
+def _gps(m: Moment) -> tuple[Any, ...]:
+    gps = m.receiver
+    if gps is not None:
+        place = (gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std)
+        return (GpsFix(gps.time_us, gps.fix_type, *place, gps.satellites),)
+    if m.fake_gps and tracked(m.estimator):
+        fixed, accuracy = mavlink.GPS_FIX_TYPE_3D_FIX, (m.horizontal_std, m.vertical_std)
+        return (GpsFix(m.now_us, fixed, m.x_quad, m.v_quad, *accuracy, _NO_COUNT),)
+    return (None,)
+
+
+@_makes("vibration")
+def _vibration(m: Moment) -> tuple[Any, ...]:
+    return (vibration(m.condition),)
+
+
+@_makes("wind")
+def _wind(m: Moment) -> tuple[Any, ...]:
+    felt = m.flight.phase in IN_AIR
+    return (wind(m.core.pilot.observed.push, m.core.setup.drag) if felt else (nan, nan, nan),)
+
+
+@_makes("battery_voltage", "battery_current", "battery_used_mah", "battery_remaining")
+def _battery(m: Moment) -> tuple[Any, ...]:
+    condition = m.condition
+    used_mah = condition.used_as / 3.6
+    return voltage(condition, m.battery), condition.current, used_mah, remaining(condition, m.battery)

@@ -58,7 +58,7 @@ from autopilot.services.requests import (
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
-from autopilot.services.streams import DEFAULT, OFF
+from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import GROUPS, LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
 from autopilot.services.timesync import answer_ping, answer_timesync
 from autopilot.services.virtual_files import information_message, made_files, metadata_message
@@ -126,14 +126,19 @@ class VehicleEndpoint:
         )
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
-        self._table: dict[int, Stream] = dict(STREAMS)
-        if identity.load_system:
-            self._table |= LOAD_STREAMS
-        self._defaults = {key: stream.interval_us for key, stream in self._table.items()}
+        table: dict[int, Stream] = STREAMS | (LOAD_STREAMS if identity.load_system else {})
+        self._defaults = {key: stream.interval_us for key, stream in table.items()}
+        self._built_by = {
+            key: ((identity.load_system if key & LOAD_SYSTEM else identity.system, row.component), row.build)
+            for key, row in table.items()
+        }
+        self._own = (identity.system, AUTOPILOT_COMPONENT)
         self._watched: dict[int, Any] = {}
         self._asked_mode: int | None = None
         self._consequences: list[Output] = []  # of a decision
         self._work = False  # something waits in a queue
+        self._stirred = False  # timers may have been set since it was noted:
+        self._timer_us = self._next_us = 0  # when a service has something to do, and when anything is due
         self._events: list[Event] = []  # of `poll`, until they are taken
         self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
         self.handlers = self._handler_table()  # by message id
@@ -172,8 +177,9 @@ class VehicleEndpoint:
     def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
         """Handle a datagram of `link`; answers leave with the next `poll`. Malformed input never raises."""
         events: list[Event] = []
+        self._stirred = True
         for received in decode(datagram)[0]:
-            message_id = received.message.get_msgId()  # some messages have a field called id
+            message_id = received.id
             if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
             state = self._heard(link, now_us)
@@ -222,47 +228,65 @@ class VehicleEndpoint:
 
     def datagram(self, link: Link, message: Any) -> bytes:
         """One message of the autopilot for a link, now, in the link's sequence."""
-        return self._links[link].frame(((self.identity.system, AUTOPILOT_COMPONENT), message))
+        return self._links[link].frame(self._own, message)
 
     def due(self, now_us: int) -> bool:
         """Whether `poll` has anything to do."""
-        return (
-            self._work
-            or (self._reached_left > 0 and (self._reached_us is None or now_us >= self._reached_us))
-            or any(state.streams.next_us <= now_us for state in self._links.values())
-            or any(service.next_timer() <= now_us for service in self._timed)
-        )
+        return self._work or now_us >= min(self._next_timer(), self._next_stream())
+
+    def _next_timer(self) -> int:
+        """When a service, or the end of a mission, has something to do."""
+        timers = [service.next_timer() for service in self._timed]
+        if self._reached_left:
+            timers.append(self._reached_us or 0)
+        return min(timers)
+
+    def _next_stream(self) -> int:
+        return min((state.streams.next_us for state in self._links.values()), default=NEVER_US)
 
     def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:
         """All that is due now: answers first, then streams, packed into datagrams by link."""
-        if not self.due(now_us):
+        if self._stirred:
+            self._look_ahead()
+        if now_us < self._next_us and not self._work:
             return []
         self._forget_silent(now_us)
-        for service in self._timed:
-            self._do(service.poll(now_us), self._events)
-        self._follow_up(self._events)
-        self._say_reached_again(now_us)
-        self._work = False
-        taken = {link: state.streams.take_due(now_us) for link, state in self._links.items()}
-        if any(taken.values()) or any(state.announced for state in self._links.values()):
-            plans = [self._missions.plan_id(kind) for kind in PLANS]
-            snapshot = make_snapshot()._replace(
-                asked_mode=self._asked_mode, plan_ids=(plans[0], plans[1], plans[2])
-            )
-            self._watch(snapshot)
+        if self._work or now_us >= self._timer_us or self._signing.signing is not None:
+            for service in self._timed:
+                self._do(service.poll(now_us), self._events)
+            self._follow_up(self._events)
+            self._say_reached_again(now_us)
+            self._work, self._stirred = False, True
+        keys = {
+            link: [*state.announced, *state.streams.take_due(now_us)] for link, state in self._links.items()
+        }
         datagrams: list[tuple[Link, bytes]] = []
+        if any(keys.values()):
+            plans = [self._missions.plan_id(kind) for kind in PLANS]
+            snapshot = make_snapshot()
+            snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, (plans[0], plans[1], plans[2])
+            self._watch(snapshot)
         built: dict[int, list[Outgoing]] = {}
-        own = (self.identity.system, AUTOPILOT_COMPONENT)
         for link, state in self._links.items():
-            outgoing: list[Outgoing] = [(own, message) for message in state.queue]
-            for key in dict.fromkeys((*state.announced, *taken[link])):
-                if key not in built:
-                    built[key] = self._build(key, snapshot)
-                outgoing += built[key]
+            outgoing: list[Outgoing] = [(self._own, message) for message in state.queue]
+            # what was announced just now is in its order before the streams
+            for key in dict.fromkeys((*state.announced, *keys[link])):
+                made = built.get(key)
+                if made is None:
+                    made = built[key] = self._build(key, snapshot)
+                outgoing += made
             state.queue.clear()
             state.announced.clear()
-            datagrams += [(link, datagram) for datagram in state.datagrams(outgoing)]
+            if outgoing:
+                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing)]
+        self._next_us = min(self._timer_us, self._next_stream())
         return datagrams
+
+    def _look_ahead(self) -> None:
+        """Note when there is something to do next, if nothing comes in before."""
+        self._stirred = False
+        self._timer_us = self._next_timer()
+        self._next_us = min(self._timer_us, self._next_stream())
 
     def _say_reached_again(self, now_us: int) -> None:
         if not self._reached_left:
@@ -276,10 +300,8 @@ class VehicleEndpoint:
     # ---- sending
 
     def _build(self, key: int, snapshot: Snapshot) -> list[Outgoing]:
-        stream = self._table[key]
-        system = self.identity.load_system if key & LOAD_SYSTEM else self.identity.system
-        source = (system, stream.component)
-        return [(source, message) for message in stream.build(snapshot, self.identity)]
+        source, build = self._built_by[key]
+        return [(source, message) for message in build(snapshot, self.identity)]
 
     def _watch(self, snapshot: Snapshot) -> None:
         """Announce what changed since it was last looked at."""

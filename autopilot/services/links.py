@@ -36,26 +36,28 @@ class LinkState:
         # streamed messages out of turn, in their order
         self.announced: dict[int, None] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: None}
 
-    def frame(self, outgoing: Outgoing) -> bytes:
-        """The next frame of a source on this link."""
-        source, message = outgoing
+    def frame(self, source: tuple[int, int], message: Any) -> bytes:
+        """The next frame of a source, (system, component), on this link."""
+        return self._writer(source).frame(message, self.signer(self.number))
+
+    def _writer(self, source: tuple[int, int]) -> FrameWriter:
         writer = self.writers.get(source)
         if writer is None:
             writer = self.writers[source] = FrameWriter(*source)
-        return writer.frame(message, self.signer(self.number))
+        return writer
 
     def datagrams(self, outgoing: Iterable[Outgoing]) -> list[bytes]:
         """Frames in their order, as many in a datagram as go in."""
         datagrams: list[bytes] = []
         frames: list[bytes] = []
-        size = 0
-        for one in outgoing:
-            frame = self.frame(one)
-            if size + len(frame) > DATAGRAM_BYTES:
-                datagrams.append(b"".join(frames))
-                frames, size = [], 0
-            frames.append(frame)
+        size, sign, writers = 0, self.signer(self.number), self.writers
+        for source, message in outgoing:
+            frame = (writers.get(source) or self._writer(source)).frame(message, sign)
             size += len(frame)
+            if size > DATAGRAM_BYTES:
+                datagrams.append(b"".join(frames))
+                frames, size = [], len(frame)
+            frames.append(frame)
         if frames:
             datagrams.append(b"".join(frames))
         return datagrams

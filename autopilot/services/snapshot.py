@@ -1,11 +1,12 @@
 """The flight at one instant, as telemetry needs it: SI, world ENU from home, body FLU.
 
-The flight core fills one where `VehicleEndpoint.poll` asks for it; no service reaches into the core.
+The onboard software gives one where `VehicleEndpoint.poll` asks for it; no service reaches into the core.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from autopilot.geometry.linear import ZERO, Vec3
@@ -42,8 +43,12 @@ class GpsFix(NamedTuple):
     satellites: int
 
 
-class Snapshot(NamedTuple):
-    """One instant of the flight. The defaults are a vehicle that stands at home and has measured nothing."""
+@dataclass
+class Snapshot:
+    """One instant of the flight. The defaults are a vehicle that stands at home and has measured nothing.
+
+    A snapshot belongs to its reader, who may set fields. An heir may make fields when they are first read.
+    """
 
     now_us: int
     boot_unix_us: int

@@ -20,8 +20,15 @@ class Streams:
         """`defaults`: interval in us by message id, OFF for messages sent on request only."""
         self._defaults = defaults
         self._interval = dict(defaults)
-        self._due = {key: _at_or_after(interval, now_us) for key, interval in defaults.items()}
-        self.next_us = min(self._due.values(), default=NEVER_US)
+        self._order = {key: number for number, key in enumerate(defaults)}
+        # streams of one interval are due together: (interval, when due next): their keys
+        self._groups: dict[tuple[int, int], list[int]] = {}
+        for key, interval in defaults.items():
+            self._groups.setdefault((interval, _at_or_after(interval, now_us)), []).append(key)
+        self._look_ahead()
+
+    def _look_ahead(self) -> None:
+        self.next_us = min((due_us for _, due_us in self._groups), default=NEVER_US)
 
     def interval(self, key: int) -> int | None:
         """Interval in us, OFF, or None for a message that is never streamed."""
@@ -31,17 +38,23 @@ class Streams:
         """Change the interval of a known stream: DEFAULT, OFF or us."""
         interval = self._defaults[key] if interval_us == DEFAULT else interval_us
         self._interval[key] = interval
-        self._due[key] = _at_or_after(interval, now_us)
-        self.next_us = min(self._due.values())
+        groups = {slot: [one for one in keys if one != key] for slot, keys in self._groups.items()}
+        groups.setdefault((interval, _at_or_after(interval, now_us)), []).append(key)
+        self._groups = {slot: keys for slot, keys in groups.items() if keys}
+        self._look_ahead()
 
     def take_due(self, now_us: int) -> list[int]:
         """What is due at this tick; each of them is due again at its next multiple."""
         if now_us < self.next_us:
             return []
-        taken = [key for key, due_us in self._due.items() if due_us <= now_us]
-        for key in taken:
-            self._due[key] = _at_or_after(self._interval[key], now_us + 1)
-        self.next_us = min(self._due.values())
+        taken: list[int] = []
+        for slot in [slot for slot in self._groups if slot[1] <= now_us]:
+            keys = self._groups.pop(slot)
+            taken += keys
+            interval = slot[0]
+            self._groups.setdefault((interval, _at_or_after(interval, now_us + 1)), []).extend(keys)
+        taken.sort(key=self._order.__getitem__)
+        self._look_ahead()
         return taken
 
 

@@ -1,8 +1,8 @@
 """What is streamed: one table from message id to sender, default interval and builder.
 
-A builder makes its messages from one `Snapshot`; numbers too large for a scaled field saturate. Messages of
-the private dialect leave from their own component, so that ground stations that do not know them do not count
-them as losses of the autopilot.
+A builder makes its messages from one `Snapshot`, as fields if they are sent often; numbers too large for a
+scaled field saturate. Messages of the private dialect leave from their own component, so that ground stations
+that do not know them do not count them as losses of the autopilot.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from autopilot.geometry.frames import ned_from_enu
 from autopilot.geometry.linear import cross, dot
 from autopilot.services.heartbeat import HEARTBEAT_US, heartbeat_message, load_heartbeat_message
 from autopilot.services.identity import (
@@ -26,6 +25,7 @@ from autopilot.services.identity import (
 )
 from autopilot.services.snapshot import PREARM, Snapshot
 from autopilot.services.streams import OFF
+from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import (
     ROTOR_FMAX,
     altitude_message,
@@ -48,9 +48,15 @@ from autopilot.wire.convert import (
     vfr_hud_message,
     winch_status_message,
 )
+from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 
 Builder = Callable[[Snapshot, Identity], tuple[Any, ...]]
+
+_ATTITUDE = layout_of(mavlink.MAVLink_attitude_message)
+_SERVO_OUTPUT_RAW = layout_of(mavlink.MAVLink_servo_output_raw_message)
+_DEBUG_VECT = layout_of(mavlink.MAVLink_debug_vect_message)
+_NAMED_VALUE_FLOAT = layout_of(mavlink.MAVLink_named_value_float_message)
 
 _UINT16 = 0xFFFF  # "unknown" in most unsigned fields
 _INT16 = 0x7FFF  # "unknown" temperature
@@ -267,8 +273,9 @@ def _attitude_target(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 def _servo_output_raw(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     span = _PWM_FULL - _PWM_STOP
     pwm = [saturated(_PWM_STOP + span * _force_fraction(f, s), _PWM_STOP, _PWM_FULL) for f in s.forces]
-    pwm += [0] * 4
-    return (mavlink.MAVLink_servo_output_raw_message(s.now_us & _UINT32, 0, *pwm),)
+    return (
+        (_SERVO_OUTPUT_RAW, (s.now_us & _UINT32, *pwm, *(0,) * 13)),
+    )  # the first port; others give nothing
 
 
 def _debug_vect(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -278,9 +285,7 @@ def _debug_vect(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
         (b"CABLE_Q", s.q_cable),
         (b"LOAD_ERR", s.e_x),
     )
-    return tuple(
-        mavlink.MAVLink_debug_vect_message(name, s.now_us, *ned_from_enu(vector)) for name, vector in vectors
-    )
+    return tuple((_DEBUG_VECT, (s.now_us, *ned_from_enu(vector), name)) for name, vector in vectors)
 
 
 def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -292,9 +297,7 @@ def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
         (b"PSI_R", s.psi_R),
         (b"PSI_Q", s.psi_q),
     )
-    return tuple(
-        mavlink.MAVLink_named_value_float_message(boot_ms(s.now_us), name, value) for name, value in values
-    )
+    return tuple((_NAMED_VALUE_FLOAT, (boot_ms(s.now_us), value, name)) for name, value in values)
 
 
 def _winch_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -341,7 +344,7 @@ def _load_attitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     omega = cross(d, d_dot)
     x_axis = (math.cos(pitch), 0.0, -math.sin(pitch))
     rates = (dot(omega, x_axis), dot(omega, cross(d, x_axis)), 0.0)
-    return (mavlink.MAVLink_attitude_message(boot_ms(s.now_us), roll, pitch, 0.0, *rates),)
+    return ((_ATTITUDE, (boot_ms(s.now_us), roll, pitch, 0.0, *rates)),)
 
 
 class Stream(NamedTuple):

@@ -49,7 +49,7 @@ from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.tcp_server import TcpServer
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
 from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import Field, FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
@@ -61,6 +61,9 @@ _BEAT_S = 1.0  # between two heartbeats while the clock stands
 _SLOW_SHARE = 0.8  # of the wall clock, below which the vehicle's is slow
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _GROUND_RESEND_S = 0.5
+_TS1 = Field(mavlink.MAVLink_timesync_message, "ts1")
+_LONGEST_SILENCE_US = 1_000_000  # that a ground station which shares our clock can promise
+_MOST_SAID = 32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
 _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
@@ -149,26 +152,44 @@ class GroundStations:
             self._tcp.close()
 
 
+def _answers_before(datagram: bytes, stamp: int) -> bool:
+    """Whether this is but the answer to a question before that of `stamp`, for which nobody waited."""
+    received, _ = decode(datagram)
+    timesync = mavlink.MAVLINK_MSG_ID_TIMESYNC
+    return len(received) == 1 and received[0].id == timesync and _TS1.of(received[0].frame) < stamp
+
+
 class GroundInStep:
-    """One ground station that shares our clock: every 20 ms we wait until it has caught up."""
+    """One ground station that shares our clock: every 20 ms we wait until it has caught up.
+
+    It does nothing with what it hears until it is asked: what is said in a window goes with the question.
+    Where it has promised to say nothing for a while, we ask and go on.
+    """
 
     def __init__(self, address: Address) -> None:
         self._socket = _open(address, "ground station")
         self._address = address
+        self._silent_until_us = 0  # it says nothing before
+        self._said: list[bytes] = []  # in this window
+        self._size = 0
 
     def join(self, onboard: Onboard) -> None:
         """Serve the link from now on."""
         onboard.add_link(_GROUND_LINK)
+        self._silent_until_us = 0
         set_timeout(self._socket, _GROUND_RESEND_S)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
-        """Send what is due; at the end of a window wait for the ground station's word on it."""
+        """Say what is due; at the end of a window wait for the ground station's word on it."""
         for _, datagram in onboard.ground_datagrams():
-            self._send(datagram)
+            self._say(datagram)
         ask = onboard.question(_GROUND_LINK)
         if ask is None:
             return
-        self._send(ask)
+        self._say(ask)
+        self._flush()
+        if onboard.now_us < self._silent_until_us:
+            return
         stamp = onboard.now_us * 1000
         asked = time.monotonic()
         while True:
@@ -179,12 +200,27 @@ class GroundInStep:
                     raise AutopilotError(f"the ground station was silent for {_GROUND_GONE_S:g} s; stopping")
                 self._send(ask)
                 continue
-            if arrived[1] != self._address:
+            if arrived[1] != self._address or _answers_before(arrived[0], stamp):
                 continue
             events = onboard.receive_ground(arrived[0], _GROUND_LINK)
             handle(events)
-            if any(isinstance(event, TimesyncAnswered) and event.ts1 == stamp for event in events):
-                return
+            for event in events:
+                if isinstance(event, TimesyncAnswered) and event.ts1 == stamp:
+                    promised_us = (event.tc1 - stamp) // 1000
+                    if promised_us <= _LONGEST_SILENCE_US:  # else it is a clock of its own
+                        self._silent_until_us = onboard.now_us + promised_us
+                    return
+
+    def _say(self, datagram: bytes) -> None:
+        if self._size + len(datagram) > _MOST_SAID:
+            self._flush()
+        self._said.append(datagram)
+        self._size += len(datagram)
+
+    def _flush(self) -> None:
+        self._send(b"".join(self._said))
+        self._said.clear()
+        self._size = 0
 
     def _send(self, datagram: bytes) -> None:
         with suppress(OSError):

@@ -1,17 +1,19 @@
 """MAVLink frames from messages and back: bytes in, bytes out, no state but a sequence counter.
 
 Layouts (struct format, field order, CRC_EXTRA) are read from pymavlink's own generated classes, so the frames
-are byte for byte those of pymavlink, at a fifth of its time. Every datagram is parsed afresh: no rubbish can
-reach over its end and swallow what comes next.
+are byte for byte those of pymavlink. What is sent often is given as `Fields`, the values of a message in the
+order of the wire, and becomes a frame without ever being an object; what is received becomes one when it is
+asked for. Every datagram is parsed afresh: no rubbish can reach over its end and swallow what comes next.
 """
 
 from __future__ import annotations
 
 import math
+import re
 import struct
 from collections.abc import Callable
 from operator import attrgetter, itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
 
@@ -29,25 +31,15 @@ _SIGNED = 0x01  # the only incompatibility flag that is defined
 
 _HEADER2 = struct.Struct("<BBBBBBBHB")  # the MAVLink 2 header; the message id is 24 bits, low part first
 _FLOAT32_MAX = 3.4028234663852886e38
-_CHECKSUM = struct.Struct("<H")
 
 
-class Received(NamedTuple):
-    """One message with its origin; `frame` is the whole frame as it arrived."""
-
-    message: Any  # pymavlink's class of the message
-    system: int
-    component: int
-    sequence: int
-    frame: bytes
-
-
-class _Layout:
-    """How one message class lies in a payload."""
+class Layout:
+    """How one message class lies in a payload, and in a frame."""
 
     __slots__ = (
         "attributes",
         "crc_extra",
+        "extra",
         "has_text",
         "id_high",
         "id_low",
@@ -68,10 +60,13 @@ class _Layout:
         text = {name for name in fields if types[name] == "char"}
 
         self.type = message_type
-        self.crc_extra = bytes((message_type.crc_extra,))
+        self.crc_extra: int = message_type.crc_extra
+        self.extra = bytes((self.crc_extra,))
         self.id_low = message_type.id & 0xFFFF
         self.id_high = message_type.id >> 16
-        self.pack: Callable[..., bytes] = message_type.unpacker.pack
+        payload: str = message_type.unpacker.format
+        # from behind the magic byte to CRC_EXTRA: all that the checksum is taken of
+        self.pack: Callable[..., bytes] = struct.Struct(f"<BBBBBBHB{payload[1:]}B").pack
         self.unpack_from: Callable[[bytes, int], tuple[Any, ...]] = message_type.unpacker.unpack_from
         self.size: int = message_type.unpacker.size
         self.single = len(fields) == 1
@@ -99,17 +94,22 @@ class _Layout:
                 first += count or 1
             self.places = tuple(places[order] for order in orders)
 
-    def payload(self, message: Any) -> bytes:
-        """The fields of `message`, in wire order, not truncated."""
-        values: Any = [self.attributes(message)] if self.single else self.attributes(message)
-        if self.spread:
-            values = list(values)
-            for place, length in self.spread:
-                values[place : place + 1] = values[place][:length]
-        try:
-            return self.pack(*values)
-        except OverflowError:  # a float that no float32 holds
-            return self.pack(*map(_within_float32, values))
+    def values(self, message: Any) -> tuple[Any, ...]:
+        """The values of pymavlink's object in the order of the wire, arrays spread out."""
+        if self.single:
+            return (self.attributes(message),)
+        if not self.spread:
+            return self.attributes(message)
+        values = list(self.attributes(message))
+        for place, length in self.spread:
+            values[place : place + 1] = values[place][:length]
+        return tuple(values)
+
+    def number(self, name: str) -> tuple[int, struct.Struct]:
+        """Where in the payload a field that is one number begins, and how it is read."""
+        kinds = re.findall(r"\d*[a-zA-Z]", self.type.unpacker.format)
+        place = self.type.ordered_fieldnames.index(name)
+        return struct.calcsize("<" + "".join(kinds[:place])), struct.Struct("<" + kinds[place])
 
     def message(self, payload: bytes, start: int) -> Any:
         """pymavlink's object for the full-length payload at `start`."""
@@ -124,8 +124,16 @@ class _Layout:
         return self.type(*values)
 
 
-_BY_ID = {message_id: _Layout(message_type) for message_id, message_type in mavlink.mavlink_map.items()}
+# A message as the values of its fields in the order of the wire, arrays spread out.
+Fields = tuple[Layout, tuple[Any, ...]]
+
+_BY_ID = {message_id: Layout(message_type) for message_id, message_type in mavlink.mavlink_map.items()}
 _BY_TYPE = {layout.type: layout for layout in _BY_ID.values()}
+
+
+def layout_of(message_type: Any) -> Layout:
+    """The layout of one of pymavlink's classes of our dialect."""
+    return _BY_TYPE[message_type]
 
 
 def _within_float32(value: Any) -> Any:
@@ -145,28 +153,30 @@ class FrameWriter:
     def frame(self, message: Any, sign: Callable[[bytes], bytes] | None = None) -> bytes:
         """The frame of a message of our dialect, trailing zeros of its payload cut; signed by `sign`.
 
-        A float beyond float32 is sent as infinite. An integer outside its field raises struct.error, as in
-        pymavlink; the builders of `convert` and `telemetry` saturate.
+        `message` is `Fields` or an object of pymavlink's. A float beyond float32 is sent as infinite. An
+        integer outside its field raises struct.error, as in pymavlink; the builders of `convert` and
+        `telemetry` saturate.
         """
-        layout = _BY_TYPE[type(message)]
-        payload = layout.payload(message).rstrip(b"\0") or b"\0"
-        sequence = self.sequence
-        frame = (
-            _HEADER2.pack(
-                _MAGIC_V2,
-                len(payload),
-                0 if sign is None else _SIGNED,
-                0,
-                sequence,
-                self.system,
-                self.component,
-                layout.id_low,
-                layout.id_high,
-            )
-            + payload
+        layout: Layout
+        if type(message) is tuple:
+            layout, values = message
+        else:
+            layout = _BY_TYPE[type(message)]
+            values = layout.values(message)
+        size, extra, sequence = layout.size, layout.crc_extra, self.sequence
+        head = (
+            *(size, 0 if sign is None else _SIGNED, 0, sequence, self.system, self.component),
+            *(layout.id_low, layout.id_high),
         )
+        try:
+            body = layout.pack(*head, *values, extra)
+        except OverflowError:  # a float that no float32 holds
+            body = layout.pack(*head, *map(_within_float32, values), extra)
+        if not body[-2]:
+            kept = body[_HEADER_V2 - 1 : -1].rstrip(b"\0") or b"\0"
+            body = b"%c%b%b%c" % (len(kept), body[1 : _HEADER_V2 - 1], kept, extra)
         self.sequence = (sequence + 1) & 0xFF
-        frame += _CHECKSUM.pack(mcrf4xx(frame[1:] + layout.crc_extra))
+        frame = b"\xfd%b%b" % (body[:-1], mcrf4xx(body).to_bytes(2, "little"))
         return frame if sign is None else sign(frame)
 
 
@@ -193,55 +203,60 @@ def whole_frames(stream: bytes) -> int:
     return start
 
 
-# bytes of header, payload and signature; incompatibility flags, sequence, system, component, message id
-_Header = tuple[int, int, int, int, int, int, int, int]
+class Received:
+    """One message with its origin; `frame` is the whole frame as it arrived, its checksum found right."""
+
+    __slots__ = ("_message", "component", "frame", "id", "sequence", "system")
+
+    def __init__(self, message_id: int, system: int, component: int, sequence: int, frame: bytes) -> None:
+        self.id = message_id
+        self.system = system
+        self.component = component
+        self.sequence = sequence
+        self.frame = frame
+        self._message: Any = None
+
+    @property
+    def message(self) -> Any:
+        """pymavlink's object of the message; made when it is first asked for."""
+        if self._message is None:
+            self._message = self._decoded()
+        return self._message
+
+    def _decoded(self) -> Any:
+        frame, layout = self.frame, _BY_ID[self.id]
+        body = _HEADER_V2 if frame[0] == _MAGIC_V2 else _HEADER_V1
+        payload = frame[1]
+        tail = body + payload
+        if payload < layout.size:
+            message = layout.message(frame[body:tail].ljust(layout.size, b"\0"), 0)
+        else:
+            message = layout.message(frame, body)
+        origin = message._header
+        origin.mlen = payload
+        origin.incompat_flags = frame[2] if body == _HEADER_V2 else 0
+        origin.seq = self.sequence
+        origin.srcSystem = self.system
+        origin.srcComponent = self.component
+        message._crc = frame[tail] | frame[tail + 1] << 8
+        message._msgbuf = frame
+        return message
 
 
-def _header(datagram: bytes, start: int, end: int) -> _Header | None:
-    """The frame header at `start`, if there is one and its frame ends within the datagram."""
-    length = announced_length(datagram, start)
-    if not length or start + length > end:
-        return None
-    if datagram[start] == _MAGIC_V1:
-        _, payload, sequence, system, component, message_id = datagram[start : start + _HEADER_V1]
-        return _HEADER_V1, payload, 0, 0, sequence, system, component, message_id
-    _, payload, flags, _, sequence, system, component, low, high = _HEADER2.unpack_from(datagram, start)
-    if flags & ~_SIGNED:
-        return None  # laid out in a way that is not known
-    return (
-        _HEADER_V2,
-        payload,
-        _SIGNATURE if flags else 0,
-        flags,
-        sequence,
-        system,
-        component,
-        low | high << 16,
-    )
+class Field:
+    """Reads one number of a message from its frame, without the rest."""
 
+    def __init__(self, message_type: Any, name: str) -> None:
+        self._offset, self._number = _BY_TYPE[message_type].number(name)
 
-def _received(datagram: bytes, start: int, header: _Header, layout: _Layout) -> Received | None:
-    """The message of the frame at `start`, or None if its checksum is wrong."""
-    header_length, payload, signature, flags, sequence, system, component, _ = header
-    body = start + header_length
-    tail = body + payload
-    checksum = mcrf4xx(datagram[start + 1 : tail] + layout.crc_extra)
-    if checksum != datagram[tail] | datagram[tail + 1] << 8:
-        return None
-    if payload < layout.size:
-        message = layout.message(datagram[body:tail].ljust(layout.size, b"\0"), 0)
-    else:
-        message = layout.message(datagram, body)
-    frame = datagram[start : tail + _CRC + signature]
-    origin = message._header
-    origin.mlen = payload
-    origin.incompat_flags = flags
-    origin.seq = sequence
-    origin.srcSystem = system
-    origin.srcComponent = component
-    message._crc = checksum
-    message._msgbuf = frame
-    return Received(message, system, component, sequence, frame)
+    def of(self, frame: bytes) -> Any:
+        """The field of a whole frame; what was cut off the payload is zero."""
+        body = _HEADER_V2 if frame[0] == _MAGIC_V2 else _HEADER_V1
+        begin = body + self._offset
+        end = begin + self._number.size
+        if end > body + frame[1]:
+            return self._number.unpack(frame[begin : body + frame[1]].ljust(self._number.size, b"\0"))[0]
+        return self._number.unpack_from(frame, begin)[0]
 
 
 def decode(datagram: bytes) -> tuple[list[Received], int]:
@@ -256,21 +271,35 @@ def decode(datagram: bytes) -> tuple[list[Received], int]:
     good = 0
     start = 0
     while start < end:
-        header = _header(datagram, start, end)
-        if header is None:
+        magic = datagram[start]
+        if magic == _MAGIC_V2 and start + _HEADER_V2 + _CRC <= end:
+            _, payload, flags, _, sequence, system, component, low, high = _HEADER2.unpack_from(
+                datagram, start
+            )
+            message_id = low | high << 16
+            tail = start + _HEADER_V2 + payload
+            stop = tail + _CRC + (_SIGNATURE if flags else 0)
+            legible = not flags or flags == _SIGNED  # else laid out in a way that is not known
+        elif magic == _MAGIC_V1 and start + _HEADER_V1 + _CRC <= end:
+            _, payload, sequence, system, component, message_id = datagram[start : start + _HEADER_V1]
+            tail = start + _HEADER_V1 + payload
+            stop = tail + _CRC
+            legible = True
+        else:
             start += 1
             continue
-        length = header[0] + header[1] + _CRC + header[2]
-        layout = _BY_ID.get(header[7])
+        if stop > end or not legible:
+            start += 1
+            continue
+        layout = _BY_ID.get(message_id)
         if layout is None:
-            after = start + length
-            start = after if after == end or datagram[after] in MAGICS else start + 1
+            start = stop if stop == end or datagram[stop] in MAGICS else start + 1
             continue
-        one = _received(datagram, start, header, layout)
-        if one is None:
+        checksum = mcrf4xx(layout.extra, mcrf4xx(datagram[start + 1 : tail]))
+        if checksum != datagram[tail] | datagram[tail + 1] << 8:
             start += 1
             continue
-        received.append(one)
-        good += length
-        start += length
+        received.append(Received(message_id, system, component, sequence, datagram[start:stop]))
+        good += stop - start
+        start = stop
     return received, end - good

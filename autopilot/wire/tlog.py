@@ -22,9 +22,10 @@ class TlogWriter:
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
 
-    def write(self, unix_us: int, frame: bytes) -> None:
-        """One record."""
-        self._file.write(_STAMP.pack(unix_us) + frame)
+    def write(self, unix_us: int, *frames: bytes) -> None:
+        """A record for each frame, all of the same time."""
+        stamp = _STAMP.pack(unix_us)
+        self._file.write(b"".join([stamp + frame for frame in frames]))
 
 
 def read_tlog(source: Path | str | BinaryIO) -> Iterator[tuple[int, Received]]:

@@ -18,8 +18,8 @@ LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: lockstep has no wal
 class FrameLog(Protocol):
     """What the capture writes into: autopilot.wire.tlog.TlogWriter."""
 
-    def write(self, unix_us: int, frame: bytes) -> None:
-        """Append one record."""
+    def write(self, unix_us: int, *frames: bytes) -> None:
+        """Append a record of this time for each frame."""
 
 
 class Capture:
@@ -48,10 +48,15 @@ class Capture:
     def flush(self, now_us: int) -> None:
         """Write the window that ends at `now_us`, time since boot."""
         unix_us = self._boot_unix_us + now_us
-        for datagrams in (self._truth, self._vehicle, self._sent):
-            for datagram in datagrams:
-                for one in messages(datagram)[0]:
-                    if one.message.get_msgId() != mavlink.MAVLINK_MSG_ID_TIMESYNC:
-                        self._log.write(unix_us, one.frame)
-                        self.records += 1
-            datagrams.clear()
+        frames = [
+            one.frame
+            for datagram in (*self._truth, *self._vehicle, *self._sent)
+            for one in messages(datagram)[0]
+            if one.id != mavlink.MAVLINK_MSG_ID_TIMESYNC
+        ]
+        if frames:
+            self._log.write(unix_us, *frames)
+            self.records += len(frames)
+        self._truth.clear()
+        self._vehicle.clear()
+        self._sent.clear()

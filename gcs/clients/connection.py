@@ -39,9 +39,11 @@ class Connection:
         self.junk_bytes += junk
         ours = []
         for one in received:
-            if not self._hears(one):
+            if self._signing is not None and not self._signing.accepts(
+                one.frame, one.id, one.system, one.component
+            ):
                 continue
-            if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT and _is_vehicle(one.message):
+            if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and _is_vehicle(one.message):
                 if self.target is None:
                     self.target = Target(one.system, one.component)
                 if self.target == (one.system, one.component):
@@ -49,6 +51,11 @@ class Connection:
             if self.target is not None and one.system == self.target.system:
                 ours.append(one)
         return ours
+
+    @property
+    def next_heartbeat_us(self) -> int:
+        """When `poll` has something to send again."""
+        return self._next_heartbeat_us or 0
 
     def poll(self, now_us: int) -> list[bytes]:
         """Our heartbeat, once a second."""
@@ -68,11 +75,6 @@ class Connection:
     def frame(self, message: Any) -> bytes:
         """`message` as one datagram of ours."""
         return self._writer.frame(message, self._sign)
-
-    def _hears(self, one: Received) -> bool:
-        if self._signing is None:
-            return True
-        return self._signing.accepts(one.frame, one.message.get_msgId(), one.system, one.component)
 
     def lost(self, now_us: int) -> bool:
         """True when the vehicle was there and has been silent for longer than the link may be."""

@@ -12,6 +12,9 @@ _REMEMBERED = 128
 
 @lru_cache(maxsize=_REMEMBERED)
 def messages(datagram: bytes) -> tuple[tuple[Received, ...], int]:
-    """`decode(datagram)`: the messages, not to be changed, and how many bytes were none."""
+    """`decode(datagram)`: the messages, not to be changed, and how many bytes were none.
+
+    What is only recorded, or only the newest of which counts, is never made an object of.
+    """
     received, junk = decode(datagram)
     return tuple(received), junk

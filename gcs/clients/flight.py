@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
 
+from autopilot.wire.codec import Field, Received
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients import command
 from gcs.clients.connection import LINK_TIMEOUT_US, Connection
-from gcs.clients.datagrams import messages
 from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Status
 from gcs.clients.vehicle_view import VehicleView
@@ -43,7 +43,6 @@ AFTERMATH_US = 2_000_000  # captured after the autopilot has given up, for the p
 TIME_FACTOR = 1.5  # a flight may take this many times what was expected,
 TIME_MARGIN_S = 60.0  # and this much more
 
-Source = Literal["vehicle", "truth"]
 OutcomeName = Literal["completed", "diverged", "refused", "timeout", "lost", "interrupted"]
 
 
@@ -123,26 +122,23 @@ class FlightClient:
         self._was_airborne = False
         self._mission_over = False
         self._item_flown = 0  # the last one in the air
+        self._setpoint: tuple[int, int] | None = None  # phase and item that were watched last
         self._given_up_us: int | None = None  # the vehicle's clock at the failure
         self._pending: Outcome | None = None  # the outcome, once the aftermath is captured
 
     # ---- in and out
 
-    def receive(self, datagram: bytes, source: Source, now_us: int) -> None:
-        """Take a datagram in, of the vehicle or of the simulated world."""
-        if source == "truth":
-            for one in messages(datagram)[0]:
-                self.view.update_truth(one.message)
-            return
+    def receive(self, datagram: bytes, now_us: int) -> None:
+        """Take a datagram of the vehicle in."""
         for one in self.connection.receive(datagram, now_us):
-            if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT and (
+            if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and (
                 one.component != getattr(self.connection.target, "component", None)
             ):
                 continue
-            self.view.update(one.message, now_us)
+            self.view.update(one, now_us)
             if self._operations:
                 self._operations[0].receive(one.message, now_us)
-            if self.stage is Stage.FLY and one.message.get_type() in _WATCHED:
+            if self.stage is Stage.FLY and one.id in _WATCHED and self._is_news(one):
                 self._watch()
 
     def poll(self, now_us: int) -> list[bytes]:
@@ -159,6 +155,11 @@ class FlightClient:
         if self._operations:
             datagrams += [self.connection.frame(message) for message in self._operations[0].poll(now_us)]
         return datagrams
+
+    @property
+    def silent_until_us(self) -> int:
+        """Until when, by our clock, `poll` sends nothing, whatever is received; 0: that is not known."""
+        return self.connection.next_heartbeat_us if self.stage is Stage.FLY else 0
 
     def interrupt(self, reason: str = "stopped by the user") -> None:
         """End the flight from outside, if it is not over."""
@@ -239,6 +240,13 @@ class FlightClient:
         self._operations = []
 
     # ---- the flight itself
+
+    def _is_news(self, one: Received) -> bool:
+        """Whether a watched message may tell something else than the last of its kind did."""
+        if one.id != mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
+            return True
+        before, self._setpoint = self._setpoint, (_PHASE.of(one.frame), _SEQ.of(one.frame))
+        return self._setpoint != before
 
     def _watch(self) -> None:
         """Note what one message may have told and the next may hide."""
@@ -337,7 +345,14 @@ class FlightClient:
 
 _FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
 _GROUND_PHASES = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
-_WATCHED = {"HEARTBEAT", "LOAD_SETPOINT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "STATUSTEXT"}
+_WATCHED = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+}
+_PHASE, _SEQ = (Field(mavlink.MAVLink_load_setpoint_message, name) for name in ("phase", "seq"))
 _LANDING_PHASES = {mavlink.PLUMBLINE_PHASE_LOWER, mavlink.PLUMBLINE_PHASE_SET_DOWN}
 
 

@@ -1,17 +1,28 @@
 """The ground's half of lockstep: the vehicle's TIMESYNC opens our turn, our answer ends it.
 
-The vehicle stands still between its question (tc1 = 0, ts1 = its time in ns) and our answer (tc1 = ts1 + 1),
-so whatever we send before the answer is handled at that very tick.
+The vehicle stands still between its question (tc1 = 0, ts1 = its time in ns) and our answer (tc1 > ts1), so
+whatever we send before the answer is handled at that very tick. A later tc1 is a promise that we send nothing
+before that time: until then the vehicle asks, but does not wait for our answers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import Field, FrameWriter, layout_of
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
+from gcs.clients.flight import FlightClient
 from gcs.clients.operation import GROUND
+
+_TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
+_TC1, _TS1 = (Field(mavlink.MAVLink_timesync_message, name) for name in ("tc1", "ts1"))
+_TIMES = {
+    message_id: Field(kind, "time_usec")
+    for message_id, kind in mavlink.mavlink_map.items()
+    if "time_usec" in kind.fieldnames
+}
 
 
 class LockstepTurns:
@@ -29,9 +40,8 @@ class LockstepTurns:
     def question(self, datagram: bytes) -> int | None:
         """The vehicle's time in ns if `datagram` holds its question, else None."""
         for one in messages(datagram)[0]:
-            message = one.message
-            if message.get_msgId() == mavlink.MAVLINK_MSG_ID_TIMESYNC and message.tc1 == 0:
-                return int(message.ts1)
+            if one.id == mavlink.MAVLINK_MSG_ID_TIMESYNC and _TC1.of(one.frame) == 0:
+                return int(_TS1.of(one.frame))
         return None
 
     def repeated(self, question_ns: int) -> bytes | None:
@@ -40,11 +50,11 @@ class LockstepTurns:
             return None
         return self._answer if question_ns == self._answered_ns else b""
 
-    def answer(self, question_ns: int) -> bytes:
-        """The datagram that ends our turn."""
-        message = mavlink.MAVLink_timesync_message(tc1=question_ns + 1, ts1=question_ns)
+    def answer(self, question_ns: int, silent_until_us: int = 0) -> bytes:
+        """The datagram that ends our turn, and the promise to send nothing before a time."""
         self._answered_ns = question_ns
-        self._answer = self._writer.frame(message)
+        silent_until_ns = max(question_ns + 1, silent_until_us * 1000)
+        self._answer = self._writer.frame((_TIMESYNC, (silent_until_ns, question_ns)))
         return self._answer
 
 
@@ -62,7 +72,7 @@ class TruthQueue:
         """Take datagrams in, in the order of their arrival."""
         for datagram in datagrams:
             received, _ = messages(datagram)
-            times = [one.message.time_usec for one in received if hasattr(one.message, "time_usec")]
+            times = [_TIMES[one.id].of(one.frame) for one in received if one.id in _TIMES]
             self._waiting.append((max(times, default=0), datagram))
 
     def until(self, now_us: int) -> list[bytes]:
@@ -70,3 +80,18 @@ class TruthQueue:
         ready = [datagram for time_us, datagram in self._waiting if time_us <= now_us]
         self._waiting = [(time_us, datagram) for time_us, datagram in self._waiting if time_us > now_us]
         return ready
+
+
+def ground_turn(
+    client: FlightClient, capture: Capture, truth: list[bytes], vehicle: list[bytes], now_us: int
+) -> list[bytes]:
+    """The ground station's turn: hears the vehicle, answers, and keeps a record of both and of the truth."""
+    for datagram in truth:
+        capture.on_truth(datagram)
+    for datagram in vehicle:
+        client.receive(datagram, now_us)
+        capture.on_vehicle(datagram)
+    sent = client.poll(now_us)
+    for datagram in sent:
+        capture.on_sent(datagram)
+    return sent

@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from autopilot.wire.codec import Field, Received
 from autopilot.wire.dialect import plumbline as mavlink
 
 BOOT_CLOCK = "SYSTEM_TIME"
 _TEXT_LENGTH = 50  # of one STATUSTEXT; a longer text comes in chunks
+
+_STATUSTEXT = mavlink.MAVLINK_MSG_ID_STATUSTEXT
+_IDS = {kind.msgname: message_id for message_id, kind in mavlink.mavlink_map.items()}
+_CLOCKS = [
+    (kind.id, Field(kind, "time_usec"))
+    for kind in (mavlink.MAVLink_load_setpoint_message, mavlink.MAVLink_cascade_errors_message)
+]
+_SOURCES = {
+    message_id: Field(kind, "source")
+    for message_id, kind in mavlink.mavlink_map.items()
+    if "source" in kind.fieldnames
+}
 
 _AUTO = 4
 _MAIN_MODES = {
@@ -72,28 +86,50 @@ def mode_name(custom_mode: int) -> str:
     return names.get(key, f"mode {main}.{sub}")
 
 
+class Newest(Mapping[str, Any]):
+    """The newest message of each name; it is decoded when it is looked at."""
+
+    def __init__(self) -> None:
+        self._received: dict[int, Received] = {}
+
+    def put(self, received: Received) -> None:
+        """It takes the place of the one before."""
+        self._received[received.id] = received
+
+    def frame(self, message_id: int) -> bytes | None:
+        """The newest as it came."""
+        received = self._received.get(message_id)
+        return None if received is None else received.frame
+
+    def __getitem__(self, name: str) -> Any:
+        return self._received[_IDS[name]].message
+
+    def __iter__(self) -> Iterator[str]:
+        return (mavlink.mavlink_map[message_id].msgname for message_id in self._received)
+
+    def __len__(self) -> int:
+        return len(self._received)
+
+
 class VehicleView:
     """Kept up to date by `update`; every property is None until the vehicle has told it."""
 
     def __init__(self) -> None:
-        self.latest: dict[str, Any] = {}  # of the vehicle, by message name
-        self.truth: dict[str, Any] = {}  # of the simulated world, by message name
+        self.latest = Newest()  # of the vehicle
+        self.truth = Newest()  # of the simulated world
         self.texts: list[Text] = []
         self._chunks: dict[int, list[str]] = {}
 
-    def update(self, message: Any, now_us: int) -> None:
+    def update(self, received: Received, now_us: int) -> None:
         """Take one message of the vehicle in."""
-        name = message.get_type()
-        if name == "STATUSTEXT":
-            self._text(message, now_us)
-        elif getattr(message, "source", None) == mavlink.PLUMBLINE_SOURCE_TRUTH:
-            self.truth[name] = message
+        if received.id == _STATUSTEXT:
+            self._text(received.message, now_us)
+            return
+        source = _SOURCES.get(received.id)
+        if source is not None and source.of(received.frame) == mavlink.PLUMBLINE_SOURCE_TRUTH:
+            self.truth.put(received)
         else:
-            self.latest[name] = message
-
-    def update_truth(self, message: Any) -> None:
-        """Take one message of the simulated world in."""
-        self.truth[message.get_type()] = message
+            self.latest.put(received)
 
     def _text(self, message: Any, now_us: int) -> None:
         if not message.id:
@@ -156,11 +192,8 @@ class VehicleView:
     @property
     def time_us(self) -> int | None:
         """The vehicle's clock since boot, as its fastest messages tell it."""
-        times = [
-            message.time_usec
-            for name in ("LOAD_SETPOINT", "CASCADE_ERRORS")
-            if (message := self.latest.get(name)) is not None
-        ]
+        frames = [(clock, self.latest.frame(message_id)) for message_id, clock in _CLOCKS]
+        times = [clock.of(frame) for clock, frame in frames if frame is not None]
         if times:
             return int(max(times))
         clock = self.latest.get(BOOT_CLOCK)

@@ -52,6 +52,11 @@ class LiveBars:
         """Columns of the bars."""
         raise NotImplementedError
 
+    @property
+    def due(self) -> bool:
+        """Whether it is time to show anything."""
+        return not self._quiet and time.monotonic() >= self._next_s
+
     def _show(
         self,
         rows: Callable[[], Mapping[str, Row]],

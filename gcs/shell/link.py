@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import select
 import socket
+import struct
 import time
 from dataclasses import dataclass, field
 
@@ -63,7 +64,7 @@ class UdpSocket:
             self._socket.close()
             raise GcsError(_bind_problem(host, port, error)) from None
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
-        self._socket.setblocking(False)
+        self._waits_s = 0.0  # a receive that waits
 
     @property
     def address(self) -> str:
@@ -79,19 +80,32 @@ class UdpSocket:
         datagrams: list[bytes] = []
         while True:
             try:
-                datagram, self._peer = self._socket.recvfrom(_DATAGRAM)
+                datagram, self._peer = self._socket.recvfrom(_DATAGRAM, socket.MSG_DONTWAIT)
             except ConnectionError:  # the peer's port was closed when we last sent; it may come back
                 continue
             except BlockingIOError:
                 return datagrams
             datagrams.append(datagram)
 
+    def wait(self, timeout_s: float) -> list[bytes]:
+        """The next datagram, if one comes within the time; by one system call where `select` needs three."""
+        if timeout_s != self._waits_s:
+            self._waits_s = timeout_s
+            whole = int(timeout_s)
+            value = struct.pack("ll", whole, round((timeout_s - whole) * 1e6))
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
+        try:
+            datagram, self._peer = self._socket.recvfrom(_DATAGRAM)
+        except (ConnectionError, BlockingIOError):
+            return []
+        return [datagram]
+
     def send(self, datagram: bytes) -> None:
         """Send to the peer; nothing if there is none yet or it does not listen."""
         if self._peer is None:
             return
         try:
-            self._socket.sendto(datagram, self._peer)
+            self._socket.sendto(datagram, socket.MSG_DONTWAIT, self._peer)
         except (ConnectionError, BlockingIOError):
             return  # UDP: the protocols above ask again
         except OSError as error:

@@ -110,18 +110,20 @@ class Processes:
         return ""
 
     def share_one_core(self) -> None:
-        """Keep ourselves and the children on one core: in lockstep only one of us has work at a time.
+        """Keep the children on one core: in lockstep only one of them has work at a time.
 
-        Handing over on one core is a mere switch, between two it wakes a sleeping one. Nothing is done where
-        the system has no such call.
+        Handing over on one core is a mere switch, between two it wakes a sleeping one. We ourselves, for whom
+        they seldom wait, keep to the other cores, if there are any. Nothing is done where the system has no
+        such call.
         """
         if not hasattr(os, "sched_setaffinity"):
             return
         self._cpus_before = os.sched_getaffinity(0)
-        core = _current_core(self._cpus_before)
-        for pid in (0, *(child.pid for child in self._children if child.running)):
+        core = {_current_core(self._cpus_before)}
+        moved = [(child.pid, core) for child in self._children if child.running]
+        for pid, cores in (*moved, (0, self._cpus_before - core or core)):
             try:
-                os.sched_setaffinity(pid, {core})
+                os.sched_setaffinity(pid, cores)
             except OSError:  # it has just ended, or may not be moved
                 continue
 

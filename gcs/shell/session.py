@@ -139,18 +139,17 @@ class Session:
             if self.on_truth is not None:
                 self.on_truth(datagram, now_us)
             for one in messages(datagram)[0]:
-                self.view.update_truth(one.message)
+                self.view.truth.put(one)
         for datagram in self._socket.drain():
             if self.on_received is not None:
                 self.on_received(datagram, now_us)
             for one in self._connection.receive(datagram, now_us):
-                message = one.message
-                is_heartbeat = message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
+                is_heartbeat = one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT
                 if is_heartbeat and one.component != self.target.component:
                     continue
-                self.view.update(message, now_us)
+                self.view.update(one, now_us)
                 if operation is not None:
-                    operation.receive(message, now_us)
+                    operation.receive(one.message, now_us)
 
     def close(self) -> None:
         self._socket.close()

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient
-from gcs.clients.lockstep import LockstepTurns, TruthQueue
+from gcs.clients.lockstep import LockstepTurns, TruthQueue, ground_turn
 from gcs.errors import NoVehicleError
 from gcs.shell.display import FlightDisplay
-from gcs.shell.link import UdpSocket, monotonic_us, wait
+from gcs.shell.link import UdpSocket, monotonic_us
 from gcs.shell.stopping import StopRequest
 
 _WAIT_S = 0.2
@@ -39,10 +39,10 @@ def run_lockstep(
     truth_queue = TruthQueue()
     pending: list[bytes] = []
     started = False
+    promised_us = 0  # how far the vehicle may go by itself
     heard_s = time.monotonic()
     while client.outcome is None:
-        wait([vehicle], _WAIT_S)
-        datagrams = vehicle.drain()
+        datagrams = vehicle.wait(_WAIT_S)
         if stop:
             client.interrupt()
         elif not datagrams:
@@ -54,7 +54,7 @@ def run_lockstep(
                 raise NoVehicleError(reason)
             if reason:
                 client.lose(reason)
-            display.update(client.progress)
+            _show(display, client)
             continue
         heard_s = time.monotonic()
         for datagram in datagrams:
@@ -72,32 +72,30 @@ def run_lockstep(
             pending.append(datagram)
             now_us = question_ns // 1000
             truth_queue.put(truth.drain())
-            _turn(client, capture, truth_queue.until(now_us), pending, now_us, vehicle)
+            for sent in ground_turn(client, capture, truth_queue.until(now_us), pending, now_us):
+                vehicle.send(sent)
             pending.clear()
-            vehicle.send(turns.answer(question_ns))
+            promised_us = max(promised_us, client.silent_until_us)
+            vehicle.send(turns.answer(question_ns, client.silent_until_us))
             capture.flush(now_us)
-            display.update(client.progress)
+            _show(display, client)
             if client.outcome is not None:
                 break
+    _let_stand(vehicle, turns, promised_us)
 
 
-def _turn(
-    client: FlightClient,
-    capture: Capture,
-    truth: list[bytes],
-    vehicle: list[bytes],
-    now_us: int,
-    link: UdpSocket,
-) -> None:
-    for datagram in truth:
-        client.receive(datagram, "truth", now_us)
-        capture.on_truth(datagram)
-    for datagram in vehicle:
-        client.receive(datagram, "vehicle", now_us)
-        capture.on_vehicle(datagram)
-    for datagram in client.poll(now_us):
-        link.send(datagram)
-        capture.on_sent(datagram)
+def _let_stand(vehicle: UdpSocket, turns: LockstepTurns, promised_us: int) -> None:
+    """Wait until the vehicle waits for us, so that its own log of the flight ends at the same tick always."""
+    while datagrams := vehicle.wait(_WAIT_S):
+        for datagram in datagrams:
+            question_ns = turns.question(datagram)
+            if question_ns is not None and question_ns >= promised_us * 1000:
+                return
+
+
+def _show(display: FlightDisplay, client: FlightClient) -> None:
+    if display.due:
+        display.update(client.progress)
 
 
 def run_wall_clock(
@@ -115,12 +113,14 @@ def run_wall_clock(
     while client.outcome is None:
         time.sleep(_TICK_S)
         now_us = monotonic_us()
-        _turn(client, capture, truth.drain() if truth else [], vehicle.drain(), now_us, vehicle)
+        told = truth.drain() if truth else []
+        for sent in ground_turn(client, capture, told, vehicle.drain(), now_us):
+            vehicle.send(sent)
         capture.flush(client.view.time_us or 0)
         if not started and client.connection.target is not None:
             started = True
             first_word()
-        display.update(client.progress)
+        _show(display, client)
         if stop:
             client.interrupt()
         reason = ended()

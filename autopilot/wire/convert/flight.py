@@ -1,4 +1,7 @@
-"""The dialect's telemetry: load, setpoint, errors of the cascade, rotors."""
+"""The dialect's telemetry: load, setpoint, errors of the cascade, rotors.
+
+Builders give fields as they are sent.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,19 @@ from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
-from autopilot.geometry.frames import enu_from_ned, flu_from_frd, frd_from_flu, ned_from_enu
+from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
+from autopilot.wire.codec import Fields, layout_of
+from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.convert.scaling import uint16
 from autopilot.wire.convert.simulator import Forces
 from autopilot.wire.dialect import plumbline as mavlink
+
+_LOAD_STATE = layout_of(mavlink.MAVLink_load_state_message)
+_LOAD_SETPOINT = layout_of(mavlink.MAVLink_load_setpoint_message)
+_CASCADE_ERRORS = layout_of(mavlink.MAVLink_cascade_errors_message)
+_WIND_STATE = layout_of(mavlink.MAVLink_wind_state_message)
+_ROTOR_STATE = layout_of(mavlink.MAVLink_rotor_state_message)
 
 
 class LoadState(NamedTuple):
@@ -57,10 +68,9 @@ def load_state_values(
     )
 
 
-def load_state_message(*record: Any) -> Any:
+def load_state_message(*record: Any) -> Fields:
     """LOAD_STATE, see `LoadState`."""
-    values: Any = load_state_values(*record)
-    return mavlink.MAVLink_load_state_message(*values)
+    return _LOAD_STATE, load_state_values(*record)
 
 
 def read_load_state(m: Any) -> LoadState:
@@ -109,9 +119,9 @@ def load_setpoint_message(
     duration: float,
     asked_position: Vec3,
     asked_velocity: Vec3,
-) -> Any:
+) -> Fields:
     """LOAD_SETPOINT, see `LoadSetpoint`."""
-    return mavlink.MAVLink_load_setpoint_message(
+    return _LOAD_SETPOINT, (
         time_us,
         *ned_from_enu(position),
         *ned_from_enu(velocity),
@@ -175,20 +185,20 @@ def cascade_errors_message(
     psi_q: float,
     thrust: float,
     moment: Vec3,
-) -> Any:
+) -> Fields:
     """CASCADE_ERRORS, see `CascadeErrors`."""
-    return mavlink.MAVLink_cascade_errors_message(
+    return _CASCADE_ERRORS, (
         time_us,
-        ned_from_enu(e_x),
-        ned_from_enu(e_v),
-        ned_from_enu(e_q),
-        ned_from_enu(e_q_dot),
-        frd_from_flu(e_R),
-        frd_from_flu(e_Omega),
+        *ned_from_enu(e_x),
+        *ned_from_enu(e_v),
+        *ned_from_enu(e_q),
+        *ned_from_enu(e_q_dot),
+        *frd_from_flu(e_R),
+        *frd_from_flu(e_Omega),
         psi_R,
         psi_q,
         thrust,
-        frd_from_flu(moment),
+        *frd_from_flu(moment),
         control_mode,
     )
 
@@ -219,9 +229,9 @@ class WindState(NamedTuple):
     gust: Vec3
 
 
-def wind_state_message(time_us: int, wind: Vec3, gust: Vec3) -> Any:
+def wind_state_message(time_us: int, wind: Vec3, gust: Vec3) -> Fields:
     """WIND_STATE, see `WindState`."""
-    return mavlink.MAVLink_wind_state_message(time_us, ned_from_enu(wind), ned_from_enu(gust))
+    return _WIND_STATE, (time_us, *ned_from_enu(wind), *ned_from_enu(gust))
 
 
 def read_wind_state(m: Any) -> WindState:
@@ -248,10 +258,9 @@ def rotor_state_values(
     return (time_us, *forces, force_min, force_max, saturated, source)
 
 
-def rotor_state_message(*record: Any) -> Any:
+def rotor_state_message(*record: Any) -> Fields:
     """ROTOR_STATE, see `RotorState`."""
-    values: Any = rotor_state_values(*record)
-    return mavlink.MAVLink_rotor_state_message(values[0], values[1:5], *values[5:])
+    return _ROTOR_STATE, rotor_state_values(*record)
 
 
 def read_rotor_state(m: Any) -> RotorState:

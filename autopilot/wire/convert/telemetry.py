@@ -1,6 +1,7 @@
 """Common telemetry of a vehicle, built from ENU and FLU; any ground station reads it.
 
-`now_us` is the time since boot. Read back is what our own ground station reads: attitude and local position.
+Builders give fields as they are sent. `now_us` is the time since boot. Read back is what our own ground
+station reads: attitude and local position.
 """
 
 from __future__ import annotations
@@ -11,18 +12,32 @@ from typing import Any, NamedTuple
 from autopilot.geometry.frames import (
     enu_from_ned,
     flu_from_frd,
-    frd_from_flu,
-    ned_from_enu,
     quat_enu_flu_from_ned_frd,
     quat_ned_frd_from_enu_flu,
 )
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.so3 import Quat
+from autopilot.wire.codec import Fields, layout_of
+from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.convert.scaling import course_cdeg, int16, int32, saturated, uint16
 from autopilot.wire.dialect import plumbline as mavlink
 
-_UPRIGHT = [1.0, 0.0, 0.0, 0.0]
+_UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
+_NO_OFFSET: Quat = (0.0, 0.0, 0.0, 0.0)  # ATTITUDE_QUATERNION.repr_offset_q: none is given
+_NOTHING_MORE = (0,) * 6  # GPS_RAW_INT: its accuracies are in the dilutions, and it has no heading
+_ATTITUDE = layout_of(mavlink.MAVLink_attitude_message)
+_ATTITUDE_QUATERNION = layout_of(mavlink.MAVLink_attitude_quaternion_message)
+_LOCAL_POSITION_NED = layout_of(mavlink.MAVLink_local_position_ned_message)
+_GLOBAL_POSITION_INT = layout_of(mavlink.MAVLink_global_position_int_message)
+_GPS_RAW_INT = layout_of(mavlink.MAVLink_gps_raw_int_message)
+_ALTITUDE = layout_of(mavlink.MAVLink_altitude_message)
+_VFR_HUD = layout_of(mavlink.MAVLink_vfr_hud_message)
+_HOME_POSITION = layout_of(mavlink.MAVLink_home_position_message)
+_GPS_GLOBAL_ORIGIN = layout_of(mavlink.MAVLink_gps_global_origin_message)
+_POSITION_TARGET_LOCAL_NED = layout_of(mavlink.MAVLink_position_target_local_ned_message)
+_ATTITUDE_TARGET = layout_of(mavlink.MAVLink_attitude_target_message)
+_WINCH_STATUS = layout_of(mavlink.MAVLink_winch_status_message)
 _POSITION_VELOCITY_ACCELERATION = 0xC00  # POSITION_TARGET_TYPEMASK: yaw and yaw rate are not given
 
 
@@ -47,11 +62,9 @@ def heading_cdeg(quat_wxyz: Quat) -> int:
     return 0xFFFF if math.isnan(yaw) else round(math.degrees(yaw) * 100.0) % 36000
 
 
-def attitude_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Any:
+def attitude_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
     """ATTITUDE."""
-    return mavlink.MAVLink_attitude_message(
-        boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body)
-    )
+    return _ATTITUDE, (boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body))
 
 
 class AttitudeQuaternion(NamedTuple):
@@ -62,10 +75,13 @@ class AttitudeQuaternion(NamedTuple):
     omega_body: Vec3
 
 
-def attitude_quaternion_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Any:
+def attitude_quaternion_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
     """ATTITUDE_QUATERNION."""
-    return mavlink.MAVLink_attitude_quaternion_message(
-        boot_ms(now_us), *quat_ned_frd_from_enu_flu(quat_wxyz), *frd_from_flu(omega_body)
+    return _ATTITUDE_QUATERNION, (
+        boot_ms(now_us),
+        *quat_ned_frd_from_enu_flu(quat_wxyz),
+        *frd_from_flu(omega_body),
+        *_NO_OFFSET,
     )
 
 
@@ -86,11 +102,9 @@ class LocalPosition(NamedTuple):
     velocity: Vec3
 
 
-def local_position_ned_message(now_us: int, position: Vec3, velocity: Vec3) -> Any:
+def local_position_ned_message(now_us: int, position: Vec3, velocity: Vec3) -> Fields:
     """LOCAL_POSITION_NED."""
-    return mavlink.MAVLink_local_position_ned_message(
-        boot_ms(now_us), *ned_from_enu(position), *ned_from_enu(velocity)
-    )
+    return _LOCAL_POSITION_NED, (boot_ms(now_us), *ned_from_enu(position), *ned_from_enu(velocity))
 
 
 def read_local_position_ned(m: Any) -> LocalPosition:
@@ -100,11 +114,11 @@ def read_local_position_ned(m: Any) -> LocalPosition:
 
 def global_position_int_message(
     now_us: int, position: Vec3, velocity: Vec3, quat_wxyz: Quat | None, home: Home
-) -> Any:
+) -> Fields:
     """GLOBAL_POSITION_INT; without an attitude the heading is unknown."""
     latitude, longitude, altitude = geodetic_from_enu(position, home)
     north, east, down = ned_from_enu(velocity)
-    return mavlink.MAVLink_global_position_int_message(
+    return _GLOBAL_POSITION_INT, (
         boot_ms(now_us),
         latitude,
         longitude,
@@ -126,13 +140,12 @@ def gps_raw_int_message(
     vertical_std: float,
     satellites: int,
     home: Home,
-) -> Any:
+) -> Fields:
     """GPS_RAW_INT, its dilutions given as standard deviations in cm, as PX4 does."""
     latitude, longitude, altitude = geodetic_from_enu(position, home)
     north, east, _ = ned_from_enu(velocity)
-    return mavlink.MAVLink_gps_raw_int_message(
+    return _GPS_RAW_INT, (
         now_us,
-        fix_type,
         latitude,
         longitude,
         altitude,
@@ -140,79 +153,89 @@ def gps_raw_int_message(
         saturated(vertical_std * 100.0, 0, 0xFFFE),
         saturated(math.hypot(north, east) * 100.0, 0, 0xFFFE),
         course_cdeg(north, east),
+        fix_type,
         saturated(satellites, 0, 255),
+        *_NOTHING_MORE,
     )
 
 
-def altitude_message(now_us: int, height: float, home: Home) -> Any:
+def altitude_message(now_us: int, height: float, home: Home) -> Fields:
     """ALTITUDE for a height in m above home; the ground is flat at home's altitude."""
     above_sea = home.altitude_m + height
-    return mavlink.MAVLink_altitude_message(
-        now_us, height, above_sea, height, height, home.altitude_m, height
-    )
+    return _ALTITUDE, (now_us, height, above_sea, height, height, home.altitude_m, height)
 
 
-def vfr_hud_message(velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home) -> Any:
+def vfr_hud_message(velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home) -> Fields:
     """VFR_HUD; `throttle` is a fraction, speeds are taken through still air."""
     heading = heading_cdeg(quat_wxyz)
-    return mavlink.MAVLink_vfr_hud_message(
+    return _VFR_HUD, (
         math.hypot(*velocity),
         math.hypot(velocity[0], velocity[1]),
-        0 if heading == 0xFFFF else heading // 100,
-        uint16(min(1.0, max(0.0, throttle)) * 100.0),
         home.altitude_m + height,
         velocity[2],
+        0 if heading == 0xFFFF else heading // 100,
+        uint16(min(1.0, max(0.0, throttle)) * 100.0),
     )
 
 
-def home_position_message(now_us: int, launch: Vec3, home: Home) -> Any:
+def home_position_message(now_us: int, launch: Vec3, home: Home) -> Fields:
     """HOME_POSITION: where a return leads, ENU from the origin of the world."""
     north, east, down = ned_from_enu(launch)
-    return mavlink.MAVLink_home_position_message(
-        *geodetic_from_enu(launch, home), north, east, down, _UPRIGHT, 0.0, 0.0, 0.0, now_us
+    return _HOME_POSITION, (
+        *geodetic_from_enu(launch, home),
+        north,
+        east,
+        down,
+        *_UPRIGHT,
+        0.0,
+        0.0,
+        0.0,
+        now_us,
     )
 
 
-def gps_global_origin_message(now_us: int, home: Home) -> Any:
+def gps_global_origin_message(now_us: int, home: Home) -> Fields:
     """GPS_GLOBAL_ORIGIN: the origin of LOCAL_POSITION_NED."""
-    return mavlink.MAVLink_gps_global_origin_message(*geodetic_from_enu(ZERO, home), now_us)
+    return _GPS_GLOBAL_ORIGIN, (*geodetic_from_enu(ZERO, home), now_us)
 
 
-def position_target_local_ned_message(now_us: int, position: Vec3, velocity: Vec3, acceleration: Vec3) -> Any:
+def position_target_local_ned_message(
+    now_us: int, position: Vec3, velocity: Vec3, acceleration: Vec3
+) -> Fields:
     """POSITION_TARGET_LOCAL_NED: the setpoint in force."""
-    return mavlink.MAVLink_position_target_local_ned_message(
+    return _POSITION_TARGET_LOCAL_NED, (
         boot_ms(now_us),
-        mavlink.MAV_FRAME_LOCAL_NED,
-        _POSITION_VELOCITY_ACCELERATION,
         *ned_from_enu(position),
         *ned_from_enu(velocity),
         *ned_from_enu(acceleration),
         0.0,
         0.0,
+        _POSITION_VELOCITY_ACCELERATION,
+        mavlink.MAV_FRAME_LOCAL_NED,
     )
 
 
-def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float) -> Any:
+def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float) -> Fields:
     """ATTITUDE_TARGET: what the inner loop is asked for."""
-    return mavlink.MAVLink_attitude_target_message(
+    return _ATTITUDE_TARGET, (
         boot_ms(now_us),
-        0,
-        quat_ned_frd_from_enu_flu(quat_wxyz),
+        *quat_ned_frd_from_enu_flu(quat_wxyz),
         *frd_from_flu(omega_body),
         thrust_fraction,
+        0,
     )
 
 
-def winch_status_message(now_us: int, cable_length: float, tension: float, rate: float = 0.0) -> Any:
+def winch_status_message(now_us: int, cable_length: float, tension: float, rate: float = 0.0) -> Fields:
     """WINCH_STATUS: `rate` in m/s at which the cable gets longer; voltage and current are unknown."""
     moving = mavlink.MAV_WINCH_STATUS_MOVING if rate != 0.0 else 0
-    return mavlink.MAVLink_winch_status_message(
+    return _WINCH_STATUS, (
         now_us,
         cable_length,
         rate,
         tension,
         math.nan,
         math.nan,
-        0x7FFF,
         mavlink.MAV_WINCH_STATUS_HEALTHY | moving,
+        0x7FFF,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture
@@ -53,6 +53,17 @@ def test_a_question_is_answered_once_and_its_repetition_with_the_same_bytes():
     assert turns.repeated(20_000_000) == b"", "a question that is older still needs no answer"
     assert turns.repeated(60_000_000) is None
     assert turns.question(answer) is None, "an answer is no question"
+
+
+def test_an_answer_promises_silence_and_at_least_that_it_is_one():
+    turns = LockstepTurns()
+    for question_ns, silent_until_us, tc1 in (
+        (20_000_000, 0, 20_000_001),
+        (40_000_000, 1_020_000, 1_020_000_000),
+        (1_040_000_000, 1_020_000, 1_040_000_001),
+    ):
+        (received,), _ = decode(turns.answer(question_ns, silent_until_us))
+        assert (received.message.tc1, received.message.ts1) == (tc1, question_ns)
 
 
 def test_truth_of_a_later_tick_waits_for_its_window():

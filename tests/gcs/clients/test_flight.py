@@ -60,7 +60,7 @@ def fly(world, items):
         stages = [client.stage]
 
         def receive(datagram, now_us):
-            client.receive(datagram, "vehicle", now_us)
+            client.receive(datagram, now_us)
 
         for _ in world.ticks(receive, client.poll, seconds):
             if client.stage is not stages[-1]:
@@ -292,7 +292,7 @@ def test_the_same_flight_says_the_same_bytes(new_world, items):
             said.extend(datagrams)
             return datagrams
 
-        for _ in world.ticks(lambda d, now: client.receive(d, "vehicle", now), poll, 60.0):
+        for _ in world.ticks(client.receive, poll, 60.0):
             if client.outcome is not None:
                 break
         assert client.outcome is not None and client.outcome.name == "completed"

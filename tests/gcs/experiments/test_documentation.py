@@ -27,8 +27,8 @@ class Frames:
     def __init__(self):
         self.records = []
 
-    def write(self, unix_us, frame):
-        self.records.append((unix_us, decode(frame)[0][0]))
+    def write(self, unix_us, *frames):
+        self.records += [(unix_us, decode(frame)[0][0]) for frame in frames]
 
 
 def documented(law):

@@ -272,14 +272,24 @@ def test_the_prefix_of_the_program_is_said_once(tmp_path):
         assert child.obituary().startswith("timeit was killed by SIGKILL: ")
 
 
-def test_children_share_our_core_and_we_get_ours_back(tmp_path):
+@pytest.mark.parametrize("cores", [1, 2])
+def test_children_share_a_core_and_we_get_ours_back(tmp_path, cores):
     before = os.sched_getaffinity(0)
-    with Processes() as processes:
-        child = processes.start("timeit", LASTING, tmp_path / "log")
-        processes.share_one_core()
-        assert os.sched_getaffinity(child.pid) == os.sched_getaffinity(0)
-        assert len(os.sched_getaffinity(0)) == 1
-    assert os.sched_getaffinity(0) == before
+    if len(before) < cores:
+        pytest.skip("there is one core")
+    few = set(sorted(before)[:cores])
+    os.sched_setaffinity(0, few)
+    try:
+        with Processes() as processes:
+            children = [processes.start("timeit", LASTING, tmp_path / name) for name in ("one", "other")]
+            processes.share_one_core()
+            theirs, others = (os.sched_getaffinity(child.pid) for child in children)
+            assert theirs == others
+            assert len(theirs) == 1
+            assert os.sched_getaffinity(0) == (few - theirs or few)
+        assert os.sched_getaffinity(0) == few
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="PR_SET_PDEATHSIG is Linux's")

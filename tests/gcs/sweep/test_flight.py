@@ -26,7 +26,7 @@ STOP_ROTORS, LAND = 4.0, 5.0  # GF_ACTION
 
 
 class NoLog:
-    def write(self, unix_us: int, frame: bytes) -> None:
+    def write(self, unix_us: int, *frames: bytes) -> None:
         pass
 
 
