@@ -6,6 +6,7 @@ import numpy as np
 
 from autopilot.core.flight_core import FlightCore, Setup
 from autopilot.core.tick import control_tick, fly_tick
+from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance.layout import jets_ahead
@@ -33,6 +34,7 @@ def rehearse(setup: Setup) -> None:
         begin_following((load, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), 1.0),
     )
     tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
+    enu_from_ned(ZERO)  # for setpoints of a companion computer
     for leg in legs:
         leg.jet(0.5)
         jets_ahead((leg,), np.array([0.5]))

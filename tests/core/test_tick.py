@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 
 from autopilot.control.laws import LAWS
 from autopilot.core.flight_core import FlightCore
-from autopilot.core.sensor_inbox import Tick, fill
 from autopilot.core.tick import FLOWN, TO_DECIDE, control_tick, fly_tick, sense
 from autopilot.estimation import inbox as box
 from autopilot.estimation.filter import complaints
@@ -223,7 +222,10 @@ def test_more_readings_than_the_inbox_has_room_for_are_all_heard() -> None:
     pose = PoseReading(0.0, over, IDENTITY_QUAT, ZERO, 0.001, 0.001, -1.0)
     readings = ((box.IMU, BEGIN_US, imu), *((box.POSE, BEGIN_US, pose),) * 1000)
     assert len(readings) > len(core.rows.inbox)
-    core.take_inbox(fill(core.rows.inbox, Tick(BEGIN_US, readings, imu, None, 0, ())))
+    larger = box.new_inbox(len(readings))
+    for at, reading in enumerate(readings):
+        box.put_reading(larger, at, *reading)
+    core.take_inbox(larger)
     core.step(len(readings), BEGIN_US, 0, 0.0)
     heard = core.rows.history.consistency[0, 0]
     assert heard == 999.0, "the first one starts the estimate"
