@@ -14,6 +14,7 @@ from contextlib import suppress
 
 import click
 
+from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
     Address,
     Stop,
@@ -357,9 +358,14 @@ def main(
         def build() -> HilSimulator:
             return HilSimulator.build(vehicle, sensors, seed, dict(settings), home, lockstep, truth_every)
 
+        compiled = SIMULATOR.ready
+        if not compiled:
+            say(ONCE)
         warm = build()  # compiles, or loads, every kernel
         warm.truth_datagram()
         warm.advance()
+        if not compiled:
+            SIMULATOR.done()
         simulator = build()
         if cpu is not None:
             _run_on(cpu)

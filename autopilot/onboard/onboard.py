@@ -57,7 +57,7 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
-from missions.model import ReturnHome, Step, Waypoint
+from missions.model import ReturnHome, Step
 
 GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
@@ -336,8 +336,6 @@ class Onboard:
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self.core.setup)
-        waypoints = (Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0))
-        Work(waypoints, (0, 1), self.core.setup.settings.limits).done()
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):

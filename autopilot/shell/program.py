@@ -27,6 +27,7 @@ from autopilot.services.records import (
     TimesyncAnswered,
     WorldSaved,
 )
+from autopilot.shell.compiling import ONCE, autopilot_parts, ready
 from autopilot.shell.options import (
     Address,
     Stop,
@@ -46,7 +47,7 @@ from autopilot.shell.path_worker import Aside
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.tcp_server import TcpServer
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
-from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
+from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -466,6 +467,10 @@ def main(
             print(f"autopilot: {trouble}", file=sys.stderr)
         apply_settings(table, settings)
         table.freeze()
+        parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
+        compiled = ready(parts)
+        if not compiled:
+            say(ONCE)
         mission, trouble = kept.load_mission(place)
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
@@ -494,6 +499,9 @@ def main(
             print(f"autopilot: {trouble}", file=sys.stderr)
         program.take_areas(areas)
         program.onboard.rehearse()
+        if not compiled:
+            for part in parts:
+                part.done()
         be_punctual()
         with StopRequest() as stop:
             program.run(stop)

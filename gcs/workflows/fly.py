@@ -27,6 +27,7 @@ from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.own_flight import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, Stopwatch, fly_own
 from gcs.workflows.report import TLOG_FILE, make_report
 from gcs.workflows.running_flight import fly_running
+from gcs.workflows.warmup import warm_up
 from missions.model import Mission
 
 _EXIT = {
@@ -61,8 +62,14 @@ def fly(options: FlightOptions) -> Flight:
         options.mission, options.vehicle, options.force or options.tries_anyway, options.law == "plumbline"
     )
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    hint = "stopping; Ctrl-C again abandons the report"
-    with _Folder(out, options.overwrite) as folder, StopRequest(hint) as stop:
+    with _Folder(out, options.overwrite) as folder:
+        if options.connect is None:
+            warm_up((options.law,), options.quiet)
+        return _fly(mission, options, out, folder)
+
+
+def _fly(mission: Mission, options: FlightOptions, out: Path, folder: _Folder) -> Flight:
+    with StopRequest("stopping; Ctrl-C again abandons the report") as stop:
         watch = Stopwatch()
         tlog = out / TLOG_FILE
         with tlog.open("wb") as file:

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from autopilot.geometry import kernel
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.convert import Home
@@ -18,7 +17,7 @@ from autopilot.wire.tlog import TlogWriter
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient
-from gcs.shell.display import FlightDisplay, say
+from gcs.shell.display import FlightDisplay
 from gcs.shell.link import LOOPBACK, UdpSocket, free_port, unix_us
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
@@ -28,7 +27,6 @@ from missions.model import Mission
 
 ONBOARD_LOG = "flight.ulg"
 SIMULATOR_LOG, AUTOPILOT_LOG = "sitl.log", "autopilot.log"
-_LAST_COMPILED = Path(kernel.__file__).parents[1] / "core" / "tick.py"
 _WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 
 
@@ -116,8 +114,6 @@ def _log_kept(storage: Path, out: Path) -> Iterator[None]:
 def _start(
     processes: Processes, options: FlightOptions, out: Path, storage: Path, ground: str, truth: str
 ) -> None:
-    if not options.quiet and not kernel.is_compiled(_LAST_COMPILED):
-        say("the first flight compiles the kernels of simulator and autopilot: a minute or two")
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
     both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS.index(options.law)}"]
