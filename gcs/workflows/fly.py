@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -39,6 +40,8 @@ _EXIT = {
     "lost": EXIT_ERROR,
 }
 
+Told = Callable[[Record, Outcome], None]
+
 
 @dataclass(frozen=True)
 class Flight:
@@ -54,8 +57,9 @@ class Flight:
         return EXIT_INTERRUPTED if self.stopped else _EXIT[self.outcome.name]
 
 
-def fly(options: FlightOptions) -> Flight:
-    """The whole flight; GcsError if there was none."""
+def fly(options: FlightOptions, told: Told) -> Flight:
+    """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
+    the report are drawn."""
     if options.connect is None:
         check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings))
     mission = load_checked(
@@ -65,10 +69,10 @@ def fly(options: FlightOptions) -> Flight:
     with _Folder(out, options.overwrite) as folder:
         if options.connect is None:
             warm_up((options.law,), options.quiet)
-        return _fly(mission, options, out, folder)
+        return _fly(mission, options, out, folder, told)
 
 
-def _fly(mission: Mission, options: FlightOptions, out: Path, folder: _Folder) -> Flight:
+def _fly(mission: Mission, options: FlightOptions, out: Path, folder: _Folder, told: Told) -> Flight:
     with StopRequest("stopping; Ctrl-C again abandons the report") as stop:
         watch = Stopwatch()
         tlog = out / TLOG_FILE
@@ -86,7 +90,8 @@ def _fly(mission: Mission, options: FlightOptions, out: Path, folder: _Folder) -
             raise GcsError(outcome.reason or "the vehicle said nothing")
         folder.keep()
         try:
-            record = make_report(tlog, out, _meta(mission, options, outcome, wall_s), options.quiet)
+            meta = _meta(mission, options, outcome, wall_s)
+            record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
         except KeyboardInterrupt:
             say(f"report abandoned; the telemetry is in {tlog}")
             raise

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.geometry import machine_code
+from autopilot.geometry import machine_code, s2
+from missions import model
+from sitl import hil
 
 ROOT = Path(__file__).parents[2]
 # prints what it compiles, begins on a line of input, and compiles in the order of its arguments
@@ -104,19 +106,19 @@ def test_what_is_ready_is_known_by_its_sources_and_its_part(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
     monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", "")
-    source = ROOT / "autopilot/geometry/s2.py"
+    source = Path(s2.__file__)
     assert not machine_code.is_ready(source, ("tick",))
     machine_code.mark_ready(source, ("tick", "law"))
     assert machine_code.is_ready(source, ("tick", "law"))
     assert not machine_code.is_ready(source, ("tick", "paths"))
-    assert not machine_code.is_ready(ROOT / "missions/model.py", ("tick",))
+    assert not machine_code.is_ready(Path(model.__file__), ("tick",))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
     assert not machine_code.is_ready(source, ("tick",))
 
 
 def test_nothing_is_to_be_compiled_where_numba_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    assert machine_code.is_ready(ROOT / "sitl/hil.py", ("no such part",))
+    assert machine_code.is_ready(Path(hil.__file__), ("no such part",))
 
 
 def test_a_directory_that_cannot_be_written_is_no_error(
@@ -125,6 +127,6 @@ def test_a_directory_that_cannot_be_written_is_no_error(
     (tmp_path / "file").touch()
     monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", str(tmp_path / "file"))
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    source = ROOT / "autopilot/geometry/s2.py"
+    source = Path(s2.__file__)
     machine_code.mark_ready(source, ("tick",))
     assert not machine_code.is_ready(source, ("tick",))
