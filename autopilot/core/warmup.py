@@ -12,6 +12,7 @@ from autopilot.guidance.layout import jets_ahead
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, Run, transfer_leg
 from autopilot.guidance.setpoint_follower import begin_following
 from autopilot.trajectory.prepare import prepare
+from autopilot.trajectory.rotor_demand import demand
 from autopilot.trajectory.shaping import shape
 from missions.model import Signals, Sine, Term, Waypoint
 
@@ -46,7 +47,9 @@ def rehearse_paths(setup: Setup) -> None:
     for leg in legs:
         leg.jet(0.5)
         jets_ahead((leg,), np.array([0.5]))
-    prepare((Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0)), (0, 1), setup.settings.limits)
+    limits = setup.settings.limits
+    prepare((Waypoint(1.0, 0.0, 2.0, 1.0),), (0,), limits)
+    demand(np.zeros((7, 1, 3)), limits.body)  # of paths through waypoints
 
 
 PARTS = {"tick": rehearse_tick, "law": rehearse_law, "paths": rehearse_paths}

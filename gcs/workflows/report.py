@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from gcs.analysis.record import FlightMeta, Record
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
+
+if TYPE_CHECKING:
+    from gcs.analysis.record import FlightMeta, Record
 
 TLOG_FILE = "flight.tlog"  # in a directory of gcs fly or gcs capture
 
