@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from autopilot.vehicle.file import VEHICLES
 from autopilot.wire.tlog import TlogWriter
 from gcs.errors import (
     EXIT_DONE,
@@ -29,6 +30,7 @@ from gcs.workflows.report import TLOG_FILE, make_report
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.warmup import warm_up
 from missions.model import Mission
+from sitl.sensors.shipped import PROFILES
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
@@ -63,6 +65,10 @@ class Flight:
 def fly(options: FlightOptions, told: Told) -> Flight:
     """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
     the report are drawn."""
+    if options.connect is None and not _as_shipped(options):
+        from gcs.workflows.flight_inputs import check_flight_inputs
+
+        check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings))
     mission = load(options.mission)
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with _Folder(out, options.overwrite) as folder:
@@ -80,15 +86,19 @@ def fly(options: FlightOptions, told: Told) -> Flight:
             return _end(mission, options, client, watch.stop(), out, folder, stop, told)
 
 
+def _as_shipped(options: FlightOptions) -> bool:
+    """Nothing is asked for that could be refused; to know more, most of the simulator would be loaded."""
+    return (
+        options.vehicle in VEHICLES.names() and options.sensors in PROFILES.names() and not options.settings
+    )
+
+
 def _fly_own(
     mission: Mission, options: FlightOptions, log: TlogWriter, out: Path, stop: StopRequest, watch: Stopwatch
 ) -> FlightClient:
     with own_vehicle(options, out) as own:
-        # while they load
-        from gcs.workflows.flight_inputs import check_flight_inputs
-        from gcs.workflows.own_flight import fly_own
+        from gcs.workflows.own_flight import fly_own  # while they load
 
-        check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings))
         _check(mission, options)
         return fly_own(mission, options, log, own, stop, watch)
 
