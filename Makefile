@@ -4,8 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
-# pip would compile all bytecode of every package; Python does it for what is imported
+# pip would compile the bytecode of whole packages; Python does it for what is imported, and keeps it
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: help install fly test lint types thesis robustness bench clean
 
