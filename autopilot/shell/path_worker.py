@@ -12,41 +12,65 @@ from autopilot.trajectory.prepare import Prepared
 
 
 class Aside:
-    """Work for which the control loop must not wait, done by a process of its own."""
+    """Work for which the control loop must not wait, done by a process of its own that is kept ready."""
 
     def __init__(self) -> None:
-        self._work: Work | None = None
+        self._work: Work | None = None  # what it is at
         self._process: SpawnProcess | None = None
-        self._answer: Connection | None = None
+        self._pipe: Connection | None = None
+
+    def start(self, rehearsal: Work) -> None:
+        """Have the process load what it needs, which it does by `rehearsal`; takes a second."""
+        context = get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(rehearsal, theirs), daemon=True)
+        self._process.start()
+        theirs.close()
 
     def attend(self, onboard: Onboard) -> None:
         """Begin what waits; hand over what is done."""
         if onboard.work is not None and onboard.work is not self._work:
-            self.close()
+            if self._work is not None:  # what it is at is of no use any more
+                self.close()
+            if self._pipe is None:
+                self.start(onboard.rehearsal)
             self._work = onboard.work
-            context = get_context("spawn")
-            self._answer, theirs = context.Pipe(duplex=False)
-            self._process = context.Process(target=_work_aside, args=(onboard.work, theirs), daemon=True)
-            self._process.start()
-            theirs.close()
-        if self._answer is not None and self._work is not None and self._answer.poll():
+            self._send(onboard.work)
+        if self._work is not None and self._pipe is not None and self._pipe.poll():
+            work, self._work = self._work, None
             try:
-                onboard.finish(self._work, self._answer.recv())
-            except EOFError:
+                onboard.finish(work, self._pipe.recv())
+            except (EOFError, OSError):
                 text = "the process that prepares paths has died"
-                onboard.finish(self._work, Prepared(refusal=text, notes=(text,)))
-            self.close()
+                onboard.finish(work, Prepared(refusal=text, notes=(text,)))
+                self.close()
+
+    def _send(self, work: Work) -> None:
+        if self._pipe is not None:
+            try:
+                self._pipe.send(work)
+            except OSError:  # it has died idle, and another takes its place
+                self.close()
+                self.start(work)
+                self._work = work
+                self._pipe.send(work)
 
     def close(self) -> None:
         """End what goes on."""
         if self._process is not None:
             self._process.kill()
             self._process.join()
-        if self._answer is not None:
-            self._answer.close()
-        self._work = self._process = self._answer = None
+        if self._pipe is not None:
+            self._pipe.close()
+        self._work = self._process = self._pipe = None
 
 
-def _work_aside(work: Work, answer: Connection) -> None:
+def _serve(rehearsal: Work, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
-    answer.send(work.done())
+    rehearsal.done()
+    while True:
+        try:
+            work: Work = pipe.recv()
+        except (EOFError, OSError):  # our parent is gone
+            return
+        pipe.send(work.done())

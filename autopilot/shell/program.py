@@ -238,6 +238,8 @@ class Program:
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
         silent, lost, beaten = True, False, 0.0
+        if isinstance(self._ground, GroundStations):  # our clock does not wait
+            self._aside.start(self.onboard.rehearsal)
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         while True:
