@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import signal
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from autopilot.onboard.onboard import Onboard, Work
+from autopilot.shell.options import StopRequest
 from autopilot.trajectory.prepare import Prepared
+
+_LOOK_S = 0.1  # between two looks at a request to stop
 
 
 class Aside:
@@ -27,6 +31,11 @@ class Aside:
         self._process.start()
         theirs.close()
 
+    def wait(self, stop: StopRequest) -> None:
+        """Until the process has loaded what it needs: a vehicle that is armed does not wait for it."""
+        while self._pipe is not None and not self._pipe.poll(_LOOK_S):
+            stop.check()
+
     def attend(self, onboard: Onboard) -> None:
         """Begin what waits; hand over what is done."""
         if onboard.work is not None and onboard.work is not self._work:
@@ -37,13 +46,16 @@ class Aside:
             self._work = onboard.work
             self._send(onboard.work)
         if self._work is not None and self._pipe is not None and self._pipe.poll():
-            work, self._work = self._work, None
+            work = self._work
             try:
-                onboard.finish(work, self._pipe.recv())
+                prepared = self._pipe.recv()
             except (EOFError, OSError):
                 text = "the process that prepares paths has died"
-                onboard.finish(work, Prepared(refusal=text, notes=(text,)))
+                prepared = Prepared(refusal=text, notes=(text,))
                 self.close()
+            if prepared is not None:
+                self._work = None
+                onboard.finish(work, prepared)
 
     def _send(self, work: Work) -> None:
         if self._pipe is not None:
@@ -68,9 +80,8 @@ class Aside:
 def _serve(rehearsal: Work, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
     rehearsal.done()
-    while True:
-        try:
+    with suppress(EOFError, OSError):  # our parent is gone
+        pipe.send(None)  # ready
+        while True:
             work: Work = pipe.recv()
-        except (EOFError, OSError):  # our parent is gone
-            return
-        pipe.send(work.done())
+            pipe.send(work.done())

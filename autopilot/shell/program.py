@@ -226,6 +226,8 @@ class Program:
         self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
+        if isinstance(ground, GroundStations):  # our clock does not wait for paths
+            self._aside.start(self.onboard.rehearsal)
         self._ground.join(self.onboard)
 
     def take_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
@@ -238,8 +240,7 @@ class Program:
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
         silent, lost, beaten = True, False, 0.0
-        if isinstance(self._ground, GroundStations):  # our clock does not wait
-            self._aside.start(self.onboard.rehearsal)
+        self._aside.wait(stop)
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         while True:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from autopilot.onboard.onboard import Work
+from autopilot.shell.options import Stop, StopRequest
 from autopilot.shell.path_worker import Aside
 from autopilot.trajectory.prepare import Prepared
 from missions.model import Waypoint
@@ -55,12 +56,21 @@ def attend(aside: Aside, onboard: Any, until: Callable[[], bool]) -> None:
 def test_one_process_does_one_work_after_the_other(aside: Aside) -> None:
     onboard = Waiting()
     aside.start(onboard.rehearsal)
+    aside.wait(StopRequest())
     (process,) = multiprocessing.active_children()
     for east_m in (1.0, 2.0):
         work = onboard.ask(east_m)
         attend(aside, onboard, lambda: onboard.work is None)
         assert onboard.finished[-1] == (work, work.done())
     assert multiprocessing.active_children() == [process]
+
+
+def test_who_waits_for_the_process_can_be_stopped(aside: Aside) -> None:
+    stop = StopRequest()
+    stop.asked = True
+    aside.start(Waiting().rehearsal)
+    with pytest.raises(Stop):
+        aside.wait(stop)
 
 
 def test_what_is_asked_for_later_takes_the_place_of_what_goes_on(aside: Aside) -> None:
