@@ -9,63 +9,60 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from autopilot.onboard.onboard import Onboard, Work
-from autopilot.shell.options import StopRequest
+from autopilot.supervisor.state import ON_GROUND
 from autopilot.trajectory.prepare import Prepared
-
-_LOOK_S = 0.1  # between two looks at a request to stop
 
 
 class Aside:
-    """Work for which the control loop must not wait, done by a process of its own that is kept ready."""
+    """Work for which the control loop must not wait, done by a process of its own that is kept ready.
+
+    Until that has loaded, which takes a second or two, a vehicle on the ground does its work itself.
+    """
 
     def __init__(self) -> None:
         self._work: Work | None = None  # what it is at
+        self._loaded = False
         self._process: SpawnProcess | None = None
         self._pipe: Connection | None = None
 
     def start(self, rehearsal: Work) -> None:
-        """Have the process load what it needs, which it does by `rehearsal`; takes a second."""
+        """Have the process load what it needs, which it does by `rehearsal`."""
         context = get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(rehearsal, theirs), daemon=True)
         self._process.start()
         theirs.close()
 
-    def wait(self, stop: StopRequest) -> None:
-        """Until the process has loaded what it needs: a vehicle that is armed does not wait for it."""
-        while self._pipe is not None and not self._pipe.poll(_LOOK_S):
-            stop.check()
-
     def attend(self, onboard: Onboard) -> None:
         """Begin what waits; hand over what is done."""
-        if onboard.work is not None and onboard.work is not self._work:
-            if self._work is not None:  # what it is at is of no use any more
-                self.close()
-            if self._pipe is None:
-                self.start(onboard.rehearsal)
-            self._work = onboard.work
-            self._send(onboard.work)
-        if self._work is not None and self._pipe is not None and self._pipe.poll():
-            work = self._work
-            try:
-                prepared = self._pipe.recv()
-            except (EOFError, OSError):
-                text = "the process that prepares paths has died"
-                prepared = Prepared(refusal=text, notes=(text,))
-                self.close()
-            if prepared is not None:
-                self._work = None
-                onboard.finish(work, prepared)
+        if (self._work is not None or not self._loaded) and self._pipe is not None and self._pipe.poll():
+            self._hear(self._pipe, onboard)
+        if onboard.work is None or self._work is not None:
+            return  # what it is at may be of no use any more, but does not take long
+        if not self._loaded and onboard.phase in ON_GROUND:
+            onboard.finish(onboard.work, onboard.work.done())
+            return
+        if self._pipe is None:
+            self.start(onboard.rehearsal)
+        self._work = onboard.work
+        with suppress(OSError):  # it has died idle: the next look finds that out
+            self._pipe.send(self._work)  # type: ignore[union-attr]
 
-    def _send(self, work: Work) -> None:
-        if self._pipe is not None:
-            try:
-                self._pipe.send(work)
-            except OSError:  # it has died idle, and another takes its place
-                self.close()
-                self.start(work)
-                self._work = work
-                self._pipe.send(work)
+    def _hear(self, pipe: Connection, onboard: Onboard) -> None:
+        try:
+            prepared = pipe.recv()
+        except (EOFError, OSError):
+            work = self._work
+            self.close()
+            if work is not None:
+                text = "the process that prepares paths has died"
+                onboard.finish(work, Prepared(refusal=text, notes=(text,)))
+            return
+        if not self._loaded:
+            self._loaded = True  # its first word
+        elif self._work is not None:
+            work, self._work = self._work, None
+            onboard.finish(work, prepared)
 
     def close(self) -> None:
         """End what goes on."""
@@ -75,6 +72,7 @@ class Aside:
         if self._pipe is not None:
             self._pipe.close()
         self._work = self._process = self._pipe = None
+        self._loaded = False
 
 
 def _serve(rehearsal: Work, pipe: Connection) -> None:

@@ -240,7 +240,6 @@ class Program:
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
         silent, lost, beaten = True, False, 0.0
-        self._aside.wait(stop)
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         while True:

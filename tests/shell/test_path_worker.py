@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from autopilot.onboard.onboard import Work
-from autopilot.shell.options import Stop, StopRequest
 from autopilot.shell.path_worker import Aside
+from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import Prepared
 from missions.model import Waypoint
 from tests.doubles.craft import Craft
@@ -22,7 +22,8 @@ LIMIT_S = 60.0  # for what takes a second on an idle machine
 class Waiting:
     """What `Aside` knows of the autopilot, with work to be done."""
 
-    def __init__(self) -> None:
+    def __init__(self, phase: Phase = Phase.HOLD) -> None:
+        self.phase = phase
         self.rehearsal = Craft().onboard.rehearsal
         self.work: Work | None = None
         self.finished: list[tuple[Work, Prepared]] = []
@@ -56,7 +57,6 @@ def attend(aside: Aside, onboard: Any, until: Callable[[], bool]) -> None:
 def test_one_process_does_one_work_after_the_other(aside: Aside) -> None:
     onboard = Waiting()
     aside.start(onboard.rehearsal)
-    aside.wait(StopRequest())
     (process,) = multiprocessing.active_children()
     for east_m in (1.0, 2.0):
         work = onboard.ask(east_m)
@@ -65,21 +65,20 @@ def test_one_process_does_one_work_after_the_other(aside: Aside) -> None:
     assert multiprocessing.active_children() == [process]
 
 
-def test_who_waits_for_the_process_can_be_stopped(aside: Aside) -> None:
-    stop = StopRequest()
-    stop.asked = True
-    aside.start(Waiting().rehearsal)
-    with pytest.raises(Stop):
-        aside.wait(stop)
-
-
-def test_what_is_asked_for_later_takes_the_place_of_what_goes_on(aside: Aside) -> None:
+def test_what_is_asked_for_later_is_done_when_what_goes_on_is_over(aside: Aside) -> None:
     onboard = Waiting()
-    onboard.ask(1.0)
+    first = onboard.ask(1.0)
     aside.attend(onboard)  # type: ignore[arg-type]
     later = onboard.ask(2.0)
     attend(aside, onboard, lambda: onboard.work is None)
-    assert [work for work, _ in onboard.finished] == [later]
+    assert [work for work, _ in onboard.finished] == [first, later]
+
+
+def test_on_the_ground_nobody_waits_for_a_process_that_still_loads(aside: Aside) -> None:
+    onboard = Waiting(Phase.DISARMED)
+    work = onboard.ask(1.0)
+    aside.attend(onboard)  # type: ignore[arg-type]
+    assert onboard.finished == [(work, work.done())]
 
 
 def test_a_process_that_dies_at_its_work_is_a_refusal(aside: Aside) -> None:
