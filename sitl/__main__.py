@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import click
 
+from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
     Address,
     Stop,
@@ -355,10 +356,15 @@ def main(
         def build() -> HilSimulator:
             return HilSimulator.build(vehicle, sensors, seed, dict(settings), home, lockstep, truth_every)
 
+        compiled = SIMULATOR.ready
+        if not compiled:
+            say(ONCE)
         warm = build()  # compiles, or loads, every kernel
         warm.truth_datagram()
         warm.receive(b"")
         warm.advance()
+        if not compiled:
+            SIMULATOR.done()
         simulator = build()
         if cpu is not None:
             _run_on(cpu)

@@ -50,7 +50,7 @@ from autopilot.services.records import (
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
+from autopilot.supervisor.state import MissionPlan, Phase
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM
@@ -61,14 +61,13 @@ from autopilot.wire.items import WireItem, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 from autopilot.wire.simulator_frames import put_answer
-from missions.model import ReturnHome, Step, Waypoint
+from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MOST_NAMED = 8  # items in one text
-AT_ONCE_STEPS = 30  # of a mission that is prepared between two ticks on the ground; some 0.4 s
 LEAP_US = 5_000_000  # larger jumps are rejected
 
 
@@ -366,6 +365,13 @@ class Onboard:
         snapshot.system_status = emergency if snapshot.armed else critical
         return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
 
+    @property
+    def rehearsal(self) -> Work:
+        """Work for nothing, by which a process loads what work needs."""
+        path = Signals(1.0, (Term("x", 0.01, 0.0, 0.5, None, 0.0),))
+        steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0), path)
+        return Work(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
+
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self.core.setup)
@@ -373,8 +379,6 @@ class Onboard:
         self._put_answer(0)
         health = packed(Condition())
         follow(health, self._sensors.imu, self.core.force_row, self._battery_row, 0, False, 0, 0.0)
-        waypoints = (Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0))
-        Work(waypoints, (0, 1), self.core.setup.settings.limits).done()
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):
@@ -435,13 +439,12 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
 
     def _prepare(self) -> None:
-        """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
+        """Have the paths of the plan made: at once where the clock waits, else by who takes `work`."""
         plan, limits = self.core.flight.mission.plan, self.core.setup.settings.limits
         self._prepared_for = limits
         self.work = Work(plan.steps, plan.sequence, limits, self.core.flight.area.home)
         self._have_prepared(PENDING)
-        short = self.core.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
-        if self._options.clock_waits or short:
+        if self._options.clock_waits or not plan.steps:
             self.finish(self.work, self.work.done())
 
     def finish(self, work: Work, prepared: Prepared) -> None:

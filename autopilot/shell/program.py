@@ -27,6 +27,7 @@ from autopilot.services.records import (
     TimesyncAnswered,
     WorldSaved,
 )
+from autopilot.shell.compiling import ONCE, autopilot_parts, ready
 from autopilot.shell.options import (
     LARGEST_DATAGRAM,
     Address,
@@ -48,7 +49,7 @@ from autopilot.shell.path_worker import Aside
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.tcp_server import TcpServer
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
-from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
+from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from autopilot.wire.codec import Field, FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -265,6 +266,8 @@ class Program:
         self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
+        if isinstance(ground, GroundStations):  # our clock does not wait for paths
+            self._aside.start(self.onboard.rehearsal)
         self._ground.join(self.onboard)
 
     def take_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
@@ -517,6 +520,10 @@ def main(
             print(f"autopilot: {trouble}", file=sys.stderr)
         apply_settings(table, settings)
         table.freeze()
+        parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
+        compiled = ready(parts)
+        if not compiled:
+            say(ONCE)
         mission, trouble = kept.load_mission(place)
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
@@ -545,6 +552,9 @@ def main(
             print(f"autopilot: {trouble}", file=sys.stderr)
         program.take_areas(areas)
         program.onboard.rehearse()
+        if not compiled:
+            for part in parts:
+                part.done()
         be_punctual(real_time=not in_step)
         with StopRequest() as stop:
             program.run(stop)
