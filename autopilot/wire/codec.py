@@ -305,26 +305,6 @@ def decode(datagram: bytes) -> tuple[list[Received], int]:
     return received, end - good
 
 
-class Origin(NamedTuple):
-    """What the header of a frame says of its message."""
-
-    message_id: int
-    system: int
-    component: int
-
-
-def origin_of(frame: bytes) -> Origin | None:
-    """The origin of a frame that is whole, undamaged and of a known id, its message not read; or None."""
-    header = _header(frame, 0, len(frame))
-    if header is None or header[0] + header[1] + _CRC + header[2] != len(frame):
-        return None
-    layout = _BY_ID.get(header[7])
-    tail = header[0] + header[1]
-    if layout is None or mcrf4xx(frame[1:tail] + layout.crc_extra) != frame[tail] | frame[tail + 1] << 8:
-        return None
-    return Origin(header[7], header[5], header[6])
-
-
 def payload_of(frame: bytes) -> bytes:
     """The payload of a whole frame; MAVLink 2 cuts its trailing zeros."""
     begin = _HEADER_V1 if frame[0] == _MAGIC_V1 else _HEADER_V2

@@ -6,16 +6,14 @@ The format of MAVProxy, Mission Planner and QGroundControl; `pymavlink.mavutil.m
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import BinaryIO
 
-from autopilot.wire.codec import LONGEST_FRAME, MAGICS, Origin, Received, announced_length, decode, origin_of
+from autopilot.wire.codec import LONGEST_FRAME, MAGICS, Received, announced_length, decode
 
 _STAMP = struct.Struct(">Q")
 _CHUNK = 1 << 16
-
-T = TypeVar("T")
 
 
 class TlogWriter:
@@ -35,44 +33,23 @@ def read_tlog(source: Path | str | BinaryIO) -> Iterator[tuple[int, Received]]:
 
     A record cut off at the end is left out. Damaged stretches are stepped over, as are frames of unknown ids.
     """
-    return _from(source, _message)
-
-
-def read_frames(source: Path | str | BinaryIO) -> Iterator[tuple[int, tuple[Origin, bytes]]]:
-    """(unix_us, (origin, frame)) of the same records, their messages unread."""
-    return _from(source, _frame)
-
-
-def _message(frame: bytes) -> Received | None:
-    received, junk = decode(frame)
-    return received[0] if received and not junk else None
-
-
-def _frame(frame: bytes) -> tuple[Origin, bytes] | None:
-    origin = origin_of(frame)
-    return None if origin is None else (origin, frame)
-
-
-def _from(source: Path | str | BinaryIO, read: Callable[[bytes], T | None]) -> Iterator[tuple[int, T]]:
     if isinstance(source, Path | str):
         with Path(source).open("rb") as file:
-            yield from _read(file, read)
+            yield from _read(file)
     else:
-        yield from _read(source, read)
+        yield from _read(source)
 
 
-def _read(file: BinaryIO, read: Callable[[bytes], T | None]) -> Iterator[tuple[int, T]]:
+def _read(file: BinaryIO) -> Iterator[tuple[int, Received]]:
     buffer = b""
     while chunk := file.read(_CHUNK):
         buffer += chunk
-        used = yield from _records(buffer, len(buffer) - _STAMP.size - LONGEST_FRAME, read)
+        used = yield from _records(buffer, len(buffer) - _STAMP.size - LONGEST_FRAME)
         buffer = buffer[used:]
-    yield from _records(buffer, len(buffer), read)
+    yield from _records(buffer, len(buffer))
 
 
-def _records(
-    buffer: bytes, before: int, read: Callable[[bytes], T | None]
-) -> Generator[tuple[int, T], None, int]:
+def _records(buffer: bytes, before: int) -> Generator[tuple[int, Received], None, int]:
     """The records that begin before offset `before`; returns the offset behind the last."""
     start = 0
     while start < before:
@@ -82,9 +59,9 @@ def _records(
         if not length or end > len(buffer):
             start += 1
             continue
-        found = read(buffer[begin:end])
-        if found is not None:
-            yield _STAMP.unpack_from(buffer, start)[0], found
+        received, junk = decode(buffer[begin:end])
+        if received and not junk:
+            yield _STAMP.unpack_from(buffer, start)[0], received[0]
             start = end
         elif end + _STAMP.size < len(buffer) and buffer[end + _STAMP.size] in MAGICS:
             start = end  # a frame that is damaged or unknown, but whole

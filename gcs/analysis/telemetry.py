@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.wire.codec import Origin, Received, decode
+from autopilot.wire.codec import Received
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
 from gcs.analysis.columns import Columns
@@ -38,17 +38,9 @@ _MICRO = 1e-6
 
 def load_telemetry(tlog: Path) -> Telemetry:
     """The flight in a .tlog file; a torn tail is left out."""
-    from autopilot.wire.tlog import read_frames
+    from autopilot.wire.tlog import read_tlog
 
-    return _telemetry((unix_us, *record) for unix_us, record in read_frames(tlog))
-
-
-def telemetry_of(records: Iterable[Record]) -> Telemetry:
-    """The flight of one vehicle; what other systems sent (ground stations, the load) is left out."""
-    return _telemetry(
-        (unix_us, Origin(type(one.message).id, one.system, one.component), one.frame)
-        for unix_us, one in records
-    )
+    return telemetry_of(read_tlog(tlog))
 
 
 _READ = (
@@ -70,20 +62,20 @@ _HEARD = (
 )
 
 
-def _telemetry(records: Iterable[tuple[int, Origin, bytes]]) -> Telemetry:
-    """From the time of capture (microseconds since 1970), the origin and the frame of each message."""
+def telemetry_of(records: Iterable[Record]) -> Telemetry:
+    """The flight of one vehicle; what other systems sent (ground stations, the load) is left out."""
     frames: dict[int, list[bytes]] = {message_id: [] for message_id in (*_READ, *_HEARD)}
     stamps: dict[int, list[int]] = {message_id: [] for message_id in frames}
     texts: list[tuple[int, Any]] = []
-    for unix_us, (message_id, system, component), frame in records:
-        if system != VEHICLE_SYSTEM:
+    for unix_us, received in records:
+        if received.system != VEHICLE_SYSTEM:
             continue
-        if message_id not in frames:
-            if message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
-                texts.append((unix_us, decode(frame)[0][0].message))
-        elif component == AUTOPILOT_COMPONENT or message_id not in _HEARD:
-            frames[message_id].append(frame)
-            stamps[message_id].append(unix_us)
+        if received.id not in frames:
+            if received.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+                texts.append((unix_us, received.message))
+        elif received.component == AUTOPILOT_COMPONENT or received.id not in _HEARD:
+            frames[received.id].append(received.frame)
+            stamps[received.id].append(unix_us)
     columns = {message_id: Columns(message_id, found) for message_id, found in frames.items()}
     waited_us = stamps[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]
     if waited_us:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.tlog import TlogWriter, read_frames, read_tlog
+from autopilot.wire.tlog import TlogWriter, read_tlog
 
 BOOT_US = 1_767_225_600_000_000  # 2026-01-01, as in lockstep flights
 quick = settings(max_examples=100, deadline=None, derandomize=True)
@@ -40,12 +40,7 @@ def _written(records: list[tuple[int, bytes]]) -> bytes:
 
 
 def _read(data: bytes) -> list[tuple[int, bytes]]:
-    """The records, which read the same with their messages and without."""
-    read = [(unix_us, received) for unix_us, received in read_tlog(io.BytesIO(data))]
-    assert list(read_frames(io.BytesIO(data))) == [
-        (unix_us, ((type(one.message).id, one.system, one.component), one.frame)) for unix_us, one in read
-    ]
-    return [(unix_us, received.frame) for unix_us, received in read]
+    return [(unix_us, received.frame) for unix_us, received in read_tlog(io.BytesIO(data))]
 
 
 def test_what_was_written_is_read(tmp_path: Path) -> None:
