@@ -1,6 +1,17 @@
 """`python -m autopilot`: the `autopilot` program."""
 
-from autopilot.shell.program import main
+from __future__ import annotations
+
+import os
+
+
+def main() -> None:
+    """Run the program."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of matrices this small threads only cost time
+    from autopilot.shell.program import main as run
+
+    run()
+
 
 if __name__ == "__main__":
     main()

@@ -10,10 +10,10 @@ import socket
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
 
 import click
 
+from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
     Address,
     Stop,
@@ -24,6 +24,7 @@ from autopilot.shell.options import (
     home_option,
     reason,
     receive,
+    send,
     set_timeout,
     setting_option,
     shown,
@@ -89,15 +90,13 @@ class Link:
     def send(self, simulator: HilSimulator) -> None:
         """The sensors of the present tick to the autopilot. What cannot be sent counts as lost on the way."""
         if self.peer is not None:
-            with suppress(OSError):
-                self._socket.sendto(simulator.sensor_datagram(), self.peer)
+            send(self._socket, simulator.sensor_datagram(), self.peer)
 
     def send_truth(self, simulator: HilSimulator) -> None:
         """The truth of the present tick, if there is any."""
         truth = simulator.truth_datagram()
         if truth is not None:
-            with suppress(OSError):
-                self._truth_socket.sendto(truth, self._truth)
+            send(self._truth_socket, truth, self._truth)
 
     def take(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
         """Hand a datagram on. True if it is a heartbeat whose sender is served from now on.
@@ -357,13 +356,20 @@ def main(
         def build() -> HilSimulator:
             return HilSimulator.build(vehicle, sensors, seed, dict(settings), home, lockstep, truth_every)
 
+        compiled = SIMULATOR.ready
+        if not compiled:
+            say(ONCE)
         warm = build()  # compiles, or loads, every kernel
         warm.truth_datagram()
+        warm.receive(b"")
         warm.advance()
+        if not compiled:
+            SIMULATOR.done()
         simulator = build()
         if cpu is not None:
             _run_on(cpu)
-        be_punctual()
+        # where it would wait spinning for most of the time, it would keep others from their work
+        be_punctual(not lockstep and simulator.tick_us * 1000 / factor > 4 * _SPIN_NS)
         mode = f"at {factor:g} x real time"
         if lockstep:
             mode = "in lockstep" if speed is None else f"in lockstep, at most {mode[3:]}"

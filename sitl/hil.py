@@ -6,40 +6,52 @@ docs/sensors.md describes the link for those who connect an autopilot of their o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import isfinite, nan
+from collections.abc import Callable, Mapping
+from math import isfinite
 from typing import Any, NamedTuple
 
-from autopilot.geometry.linear import Vec3, apply_transposed, norm, sub
-from autopilot.geometry.so3 import rotation_from_quat
+import numpy as np
+
+from autopilot.geometry.entry import entry_of
+from autopilot.geometry.linear import ZERO
+from autopilot.geometry.packed import Row, packed
 from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
+from autopilot.wire.simulator_frames import answer_in
+from sitl.messages import (
+    CAMERA,
+    ENCODER,
+    NOTHING_NEW,
+    SIMULATOR_COMPONENT,
+    TRUTH_FRAMES,
+    VEHICLE_SYSTEM,
+    Statement,
+    put_sensors,
+    put_truth,
+)
 from sitl.parameter_server import ParameterServer
 from sitl.plant.records import Rotors, Truth
+from sitl.sensors.barometer import BarometerReading
 from sitl.sensors.files import load_profile
-from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
 from sitl.settings import SECOND_US, settings_of
-from sitl.sim_core import STOPPED, Readings, SimCore
+from sitl.sim_core import STOPPED, SimCore
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
-VEHICLE_SYSTEM = 1
-SIMULATOR_COMPONENT = 26
 STATUS_PERIOD_US = 200_000
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
 COMMAND_TIMEOUT_US = 500_000
 LEAST_SNAP = 1e-3  # m/s, closing speed from which a cable that comes taut is told of
 
-_ZERO: Vec3 = (0.0, 0.0, 0.0)
 _DIVERGED = mavlink.MAVLink_statustext_message(
     mavlink.MAV_SEVERITY_CRITICAL, b"Simulation stopped: outside its model"
 )
-_TRACKER, _CAMERA, _ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
 _FIX = {"3d": mavlink.GPS_FIX_TYPE_3D_FIX, "rtk": mavlink.GPS_FIX_TYPE_RTK_FIXED}
 
 
@@ -57,16 +69,6 @@ class PacingFigures(NamedTuple):
     late_p50_us: int = 0
     late_p99_us: int = 0
     late_max_us: int = 0
-
-
-def _measured(v: Vec3) -> Vec3 | None:
-    """A vector, or None if the sensor does not measure it (nan)."""
-    return v if v[0] == v[0] else None
-
-
-def pressure_pa(altitude_m: float) -> float:
-    """International standard atmosphere below 11 km; altitude above mean sea level."""
-    return float(101_325.0 * max(1.0 - 2.25577e-5 * altitude_m, 0.0) ** 5.25588)
 
 
 class HilSimulator:
@@ -91,10 +93,8 @@ class HilSimulator:
         self._home = home
         self._lockstep = lockstep
         self._truth_every = truth_every
-        self._fix = _FIX[profile.gnss.fix] if profile.gnss else 0
-        self._satellites = profile.gnss.satellites if profile.gnss else 0
-        encoder = profile.cable_sensor is not None and profile.cable_sensor.kind == "encoder"
-        self._cable_id = _ENCODER if encoder else _CAMERA
+        self._put_sensors: Callable[..., tuple[int, int]] | None = None  # its machine code, once it was run
+        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._begin()
@@ -108,18 +108,20 @@ class HilSimulator:
         self.rejected = 0  # controls that were not numbers
         self.answered = False  # the present tick was
         self.core = core
-        self._stated = stated_of(self._profile, settings.noise_scale)
+        self._statement = self._stating(settings.noise_scale)
         self._command: Rotors = STOPPED
         self._gripper_open = False
         self._reel_rate = 0.0
         self._command_us = -1  # the tick that the last command answers
-        self._inertial = ImuReading(_ZERO, _ZERO)
-        self._field = _ZERO
-        self._height = core.state.x_quad[2]
-        self._sensors = self._sensor_frames(core.readings)
+        height = BarometerReading(core.state.x_quad[2])
+        self._newest = packed(NOTHING_NEW._replace(height=height))
+        sensors, waiting, _ = core.rows.queue.shape
+        # a frame of each reading that can be on its way, and HIL_SENSOR
+        self._buffer = np.zeros((sensors * waiting + 1) * FRAME_ROOM, np.uint8)
+        self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
         self._truth_made = False
-        self._gust_told = _ZERO
+        self._gust_told = ZERO
         self._reboot = False  # asked for
 
     @classmethod
@@ -186,28 +188,20 @@ class HilSimulator:
         ignored: other messages, systems and ticks, rubbish.
         In real time a late command is still the newest one, and is used.
         """
+        answer = answer_in(datagram, VEHICLE_SYSTEM, self._payload)
+        if answer[0]:
+            self._take(*answer[1:])
+            return self.answered
         was_answered = self.answered
         aside = []
         for one in decode(datagram)[0]:
             if one.system != VEHICLE_SYSTEM:
                 continue
-            if one.message.get_msgId() != mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
-                aside.append(one.message)
-                continue
-            answer = convert.read_hil_actuator_controls(one.message)
-            current = answer.time_us == self.core.now_us
-            if not current and (self._lockstep or not self._command_us < answer.time_us < self.core.now_us):
-                continue
-            if current and self.answered:
-                continue
-            if all(map(isfinite, answer.forces)):
-                self._command = answer.forces if answer.armed else STOPPED
+            if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
+                said = convert.read_hil_actuator_controls(one.message)
+                self._take(said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)
             else:
-                self.rejected += 1
-            self._gripper_open = answer.gripper_open
-            self._reel_rate = answer.reel_rate
-            self._command_us = answer.time_us
-            self.answered = self.answered or current
+                aside.append(one.message)
         if self.answered and not was_answered:  # a repeated datagram changes nothing
             for message in aside:
                 if _asks_reboot(message):
@@ -215,6 +209,23 @@ class HilSimulator:
                 if self.parameters.receive(message):
                     self._retune()
         return self.answered
+
+    def _take(self, time_us: int, forces: Rotors, armed: bool, gripper_open: bool, reel_rate: float) -> None:
+        """Take an answer, if it is the one of this tick or, in real time, the newest of those before."""
+        now_us = self.core.now_us
+        if time_us == now_us:
+            if self.answered:
+                return
+            self.answered = True
+        elif self._lockstep or not self._command_us < time_us < now_us:
+            return
+        if not all(map(isfinite, forces)):
+            self.rejected += 1
+        else:
+            self._command = forces if armed else STOPPED
+        self._gripper_open = gripper_open
+        self._reel_rate = reel_rate
+        self._command_us = time_us
 
     def _retune(self) -> None:
         """A parameter has changed."""
@@ -225,7 +236,19 @@ class HilSimulator:
             self.parameters.tell("SIM_GUST_NOW", 0.0)
         settings = settings_of(table)
         self.core.retune(apply_parameters(self._file_truth, table), settings)
-        self._stated = stated_of(self._profile, settings.noise_scale)
+        self._statement = self._stating(settings.noise_scale)
+
+    def _stating(self, noise_scale: float) -> Row:
+        gnss, cable = self._profile.gnss, self._profile.cable_sensor
+        return packed(
+            Statement(
+                stated_of(self._profile, noise_scale),
+                self._home,
+                _FIX[gnss.fix] if gnss else 0,
+                gnss.satellites if gnss else 0,
+                ENCODER if cable is not None and cable.kind == "encoder" else CAMERA,
+            )
+        )
 
     def advance(self) -> None:
         """Move the world to the next tick under the last command, or back to its beginning if so asked."""
@@ -238,78 +261,20 @@ class HilSimulator:
             if self.core.now_us - self._command_us > COMMAND_TIMEOUT_US:
                 self._command = STOPPED
         self.answered = False
-        self._sensors = self._sensor_frames(
-            self.core.tick(self._command, self._gripper_open, self._reel_rate)
-        )
+        self.core.tick(self._command, self._gripper_open, self._reel_rate)
+        self._sensors = self._sensor_frames()
         self._truth_made = False
 
-    def _sensor_frames(self, readings: Readings) -> bytes:
-        frame = self._sensor_writer.frame
-        stated = self._stated
-        frames = [frame(message) for message in self.parameters.take()]
-        for time_us, pose in readings.mocap:
-            message = convert.odometry_message(
-                time_us,
-                pose.position,
-                pose.quat_wxyz,
-                _measured(pose.velocity),
-                _measured(pose.omega_body),
-                stated.mocap_position,
-                stated.mocap_attitude,
-                stated.mocap_velocity,
-            )
-            frames.append(frame(message))
-        for time_us, load in readings.load_tracker:
-            velocity = _measured(load.velocity)
-            velocity_std = nan if velocity is None else stated.load_velocity
-            message = convert.load_sensor_message(
-                time_us, load.position, velocity, None, stated.load_position, velocity_std, nan, _TRACKER
-            )
-            frames.append(frame(message))
-        for time_us, cable in readings.cable_sensor:
-            if cable.seen > 0.0:
-                message = convert.load_sensor_message(
-                    time_us, None, None, cable.direction_body, nan, nan, stated.direction, self._cable_id
-                )
-                frames.append(frame(message))
-        for time_us, fix in readings.gnss:
-            message = convert.hil_gps_message(
-                time_us,
-                self._fix,
-                fix.position,
-                fix.velocity,
-                stated.gnss_horizontal,
-                stated.gnss_vertical,
-                self._satellites,
-                home=self._home,
-            )
-            frames.append(frame(message))
-        frames.append(frame(self._hil_sensor(readings)))
-        return b"".join(frames)
-
-    def _hil_sensor(self, readings: Readings) -> object:
-        """HIL_SENSOR: what is not new keeps its last value, without its bits in fields_updated."""
-        fields = 0
-        if readings.imu:
-            self._inertial = readings.imu[-1].reading
-            fields |= convert.ACCEL | convert.GYRO
-        if readings.magnetometer:
-            self._field = readings.magnetometer[-1].reading.field_body
-            fields |= convert.MAG
-        if readings.barometer:
-            self._height = readings.barometer[-1].reading.height
-            fields |= convert.PRESSURE | convert.TEMPERATURE
-        altitude = self._home.altitude_m + self._height
-        return convert.hil_sensor_message(
-            self.core.now_us,
-            self._inertial.accel_body,
-            self._inertial.gyro_body,
-            self._field,
-            pressure_pa(altitude),
-            altitude,
-            15.0 - 0.0065 * altitude,
-            fields,
-        )
+    def _sensor_frames(self) -> bytes:
+        writer, core = self._sensor_writer, self.core
+        aside = self.parameters.take()
+        first = b"".join(map(writer.frame, aside)) if aside else b""
+        room = (self._buffer, self._payload)
+        arguments = (core.rows, core.now_us, self._newest, self._statement, *room, writer.sequence)
+        if self._put_sensors is None:
+            self._put_sensors = entry_of(put_sensors, *arguments)
+        length, writer.sequence = self._put_sensors(*arguments)
+        return first + self._buffer[:length].tobytes()
 
     def _truth_frames(self) -> bytes | None:
         core = self.core
@@ -319,52 +284,32 @@ class HilSimulator:
         snapped = core.snap_speed > LEAST_SNAP
         if not (due or wind_due or snapped):
             return None
-        frame = self._truth_writer.frame
-        frames = []
-        now_us, state, truth = core.now_us, core.state, core.truth
+        writer, datagram = self._truth_writer, b""
         if due:
-            a = state.accel_quad
-            force = apply_transposed(rotation_from_quat(state.quat_wxyz), (a[0], a[1], a[2] + truth.gravity))
-            vehicle = convert.hil_state_quaternion_message(
-                now_us,
-                state.quat_wxyz,
-                state.omega_body,
-                state.x_quad,
-                state.v_quad,
-                norm(sub(state.v_quad, core.wind)),
-                force,
-                home=self._home,
-            )
-            load = convert.load_state_message(
-                now_us,
-                mavlink.PLUMBLINE_SOURCE_TRUTH,
-                state.x_load,
-                state.v_load,
-                state.q_cable,
-                state.q_cable_dot,
-                norm(sub(state.x_load, state.x_quad)),
-                state.tension,
-                state.taut > 0.0,
-                int(state.slack_events),
-            )
-            low, high = truth.rotor_min, truth.rotor_max
-            cut = sum(1 << i for i, f in enumerate(core.command) if not low <= f <= high)
-            rotors = convert.rotor_state_message(
-                now_us, mavlink.PLUMBLINE_SOURCE_TRUTH, state.rotor_force, low, high, cut
-            )
-            frames = [frame(vehicle), frame(load), frame(rotors)]
+            room = (self._buffer, self._payload)
+            length = put_truth(core.rows.world, core.rows.model, self._statement, *room, writer.sequence)
+            writer.sequence = (writer.sequence + TRUTH_FRAMES) & 0xFF
+            datagram = self._buffer[:length].tobytes()
+        if wind_due or snapped:
+            datagram += b"".join(map(writer.frame, self._events(wind_due, snapped, status_due)))
+        return datagram
+
+    def _events(self, wind_due: bool, snapped: bool, status_due: bool) -> list[Any]:
+        """What is told now and then beside the state."""
+        core, now_us = self.core, self.core.now_us
+        messages: list[Any] = []
         if wind_due:
             self._gust_told = core.pulse
-            frames.append(frame(convert.wind_state_message(now_us, core.settings.wind, core.pulse)))
+            messages.append(convert.wind_state_message(now_us, core.settings.wind, core.pulse))
         if snapped:
+            truth, speed = core.truth, core.snap_speed
             reduced_mass = truth.quad_mass * truth.load_mass / (truth.quad_mass + truth.load_mass)
-            snap = mavlink.MAVLink_cable_snap_message(now_us, core.snap_speed, reduced_mass * core.snap_speed)
-            frames.append(frame(snap))
+            messages.append(mavlink.MAVLink_cable_snap_message(now_us, speed, reduced_mass * speed))
         if status_due:
-            frames.append(frame(self._status()))
+            messages.append(self._status())
             if self.diverged:
-                frames.append(frame(_DIVERGED))
-        return b"".join(frames)
+                messages.append(_DIVERGED)
+        return messages
 
     def _status(self) -> object:
         pacing, state = self.pacing, self.core.state

@@ -28,13 +28,17 @@ class Pacing:
         self._late_us = array("L")
         self._window_start = 0
         self._window_first = 0  # index of its first tick
-        self._first_ns = self._last_ns = -1
+        self._first_ns = self._last_ns = self._due_ns = -1
+        self._stalls = 0  # ticks that began a whole tick late or later
 
     def record(self, due_ns: int, now_ns: int) -> None:
         """A tick that was due at `due_ns` began at `now_ns`."""
         if self._first_ns < 0:
             self._first_ns = self._window_start = now_ns
         self._last_ns = now_ns
+        if 0 <= self._due_ns < due_ns and now_ns - due_ns >= due_ns - self._due_ns:
+            self._stalls += 1
+        self._due_ns = due_ns
         elapsed = now_ns - self._window_start
         if elapsed >= _WINDOW_NS:
             window = sorted(self._late_us[self._window_first :])
@@ -55,7 +59,10 @@ class Pacing:
         if len(late) < 2:
             return "no ticks"
         rate = (len(late) - 1) * 1e9 / max(self._last_ns - self._first_ns, 1)
-        return (
+        text = (
             f"{rate:.2f} ticks/s, late p50 {percentile(late, 0.50)} p99 {percentile(late, 0.99)} "
             f"max {late[-1]} us, {missed} of {len(late)} commands missed"
         )
+        if self._stalls:
+            text += f"; the machine stalled {self._stalls} times for a tick or longer"
+        return text

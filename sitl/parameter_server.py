@@ -35,7 +35,8 @@ class ParameterServer:
 
     def take(self) -> list[Any]:
         """The messages that go out with this tick."""
-        return [self._waiting.popleft() for _ in range(min(VALUES_PER_TICK, len(self._waiting)))]
+        waiting = self._waiting
+        return [waiting.popleft() for _ in range(min(VALUES_PER_TICK, len(waiting)))] if waiting else []
 
     def tell(self, name: str, value: float) -> None:
         """Change a value ourselves, and say so."""

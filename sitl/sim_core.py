@@ -1,28 +1,24 @@
-"""The simulated world as an object: a tick at a time, its readings and its true state as records.
+"""The simulated world as an object: a tick at a time, and its true state as records.
 
-The work is done by `sitl.world.world_tick`, on flat arrays.
+The work is done by `sitl.world.world_tick`, on flat arrays. What has left the sensors waits there, in
+`rows.queue`, until it is taken out (`sitl.messages`).
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 
-from autopilot.geometry.linear import Vec3
-from autopilot.geometry.packed import pack, unpack
+from autopilot.geometry.entry import entry_of
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.packed import pack, unpack, width
 from sitl.plant.records import PlantState, Rotors, Truth
 from sitl.sensors.profile import Profile
 from sitl.settings import Settings
 from sitl.world import (
-    FITTED,
     LOSS,
-    READING,
-    READINGS,
-    SENSORS,
-    SHOWS,
     World,
-    arrived,
     command_room,
     losses,
     model_of,
@@ -31,28 +27,7 @@ from sitl.world import (
 )
 
 STOPPED: Rotors = (0.0, 0.0, 0.0, 0.0)
-
-
-class Measurement(NamedTuple):
-    """A reading and the instant it shows."""
-
-    time_us: int
-    reading: Any
-
-
-class Readings(NamedTuple):
-    """What leaves the sensors at one tick; a sensor that has nothing new gives an empty tuple.
-
-    In the order of `sitl.world.READINGS`, which are also the types of the readings.
-    """
-
-    imu: tuple[Measurement, ...]
-    mocap: tuple[Measurement, ...]
-    load_tracker: tuple[Measurement, ...]
-    cable_sensor: tuple[Measurement, ...]
-    gnss: tuple[Measurement, ...]
-    barometer: tuple[Measurement, ...]
-    magnetometer: tuple[Measurement, ...]
+_SNAP_SPEED = width(World) - 1  # where it stands among the numbers of the world
 
 
 class SimCore:
@@ -65,8 +40,9 @@ class SimCore:
         self._pulse_at_us = settings.pulse_at_us
         self.rows = new_world(truth, profile, settings, seed)
         self._world: World | None = None
-        self._fitted = tuple(bool(fitted) for fitted in self.rows.clock[:, FITTED])
-        self.readings = self._collect()
+        self._tick: Callable[..., None] | None = None  # the tick's machine code, once it was run
+        self.now_us = 0  # simulated time of this tick
+        self.tick_count = 0  # ticks so far
 
     @property
     def world(self) -> World:
@@ -86,16 +62,6 @@ class SimCore:
         pack(self._world, self.rows.world, 0)
 
     @property
-    def tick_count(self) -> int:
-        """Ticks so far."""
-        return self.world.tick
-
-    @property
-    def now_us(self) -> int:
-        """Simulated time of this tick."""
-        return self.world.now_us
-
-    @property
     def command(self) -> Rotors:
         """Rotor forces in force, N."""
         return self.world.command
@@ -113,7 +79,7 @@ class SimCore:
     @property
     def snap_speed(self) -> float:
         """Speed (m/s) at which the cable came taut in the last tick; 0: it did not."""
-        return self.world.snap_speed
+        return float(self.rows.world[_SNAP_SPEED])
 
     @property
     def cable_length(self) -> float:
@@ -123,17 +89,18 @@ class SimCore:
     @property
     def pulse(self) -> Vec3:
         """The gust pulse that blows from this tick to the next."""
-        settings, now_us = self.settings, self.now_us
         begins_us = self._pulse_at_us
-        blows = begins_us >= 0 and begins_us <= now_us < begins_us + settings.pulse_for_us
-        return settings.pulse if blows else (0.0, 0.0, 0.0)
+        blows = begins_us >= 0 and begins_us <= self.now_us < begins_us + self.settings.pulse_for_us
+        return self.settings.pulse if blows else ZERO
 
-    def tick(self, command: Rotors, gripper_open: bool = False, reel_rate: float = 0.0) -> Readings:
+    def tick(self, command: Rotors, gripper_open: bool = False, reel_rate: float = 0.0) -> None:
         """Integrate to the next tick; see `world_tick`."""
-        world_tick(self.rows, command, gripper_open, reel_rate)
+        if self._tick is None:
+            self._tick = entry_of(world_tick, self.rows, command, gripper_open, reel_rate)
+        self._tick(self.rows, command, gripper_open, reel_rate)
         self._world = None
-        self.readings = self._collect()
-        return self.readings
+        self.now_us += self.settings.tick_us
+        self.tick_count += 1
 
     def retune(self, truth: Truth, settings: Settings) -> None:
         """Go on under another truth and other settings; tick, latency and cable length stay as they were.
@@ -155,15 +122,3 @@ class SimCore:
         commands[:length, 0] += later_us
         rows.command_ring[0] = 0
         self.rows = rows._replace(commands=commands)
-
-    def _collect(self) -> Readings:
-        return Readings(*(self._arrivals(sensor) for sensor in range(SENSORS)))
-
-    def _arrivals(self, sensor: int) -> tuple[Measurement, ...]:
-        if not self._fitted[sensor]:
-            return ()
-        found = []
-        while (at := arrived(sensor, self.now_us, self.rows)) >= 0:
-            row = self.rows.queue[sensor, at]
-            found.append(Measurement(int(row[SHOWS]), unpack(READINGS[sensor], row, READING)))
-        return tuple(found)

@@ -1,12 +1,13 @@
 """The flight software around its compiled tick: the supervisor where it may have something to decide.
 
 `FlightCore` is driven by the simulator link in the processes and by the loop of a sweep: `step` runs a tick,
-`decide` finishes one whose estimate a sweep's loop has made already. The cable as the winch has it enters the
+`decide` is the supervisor's part of one that a sweep's loop flies. The cable as the winch has it enters the
 tick as `Winch`, what is flown and until when as `Stretch` with its setpoints laid out.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
@@ -14,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
-from autopilot.control.actuators.mixer import MixerResult
 from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of
 from autopilot.control.laws.interface import law_of, new_rows
 from autopilot.control.load_motion import Drag
@@ -28,7 +28,6 @@ from autopilot.core.tick import (
     Pilot,
     Seen,
     Winch,
-    control_tick,
     fly_tick,
 )
 from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints
@@ -40,6 +39,7 @@ from autopilot.estimation.records import (
     blank_state,
     new_history,
 )
+from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import IDENTITY, ZERO
 from autopilot.geometry.packed import pack, packed, unpack, width
 from autopilot.guidance.layout import COLUMNS, jets_ahead
@@ -87,6 +87,7 @@ class FlightCore:
         self._cable_m: float | None = None  # that `settings` were made for
         self._dirty = True  # the flight has changed since the winch was told
         self.law_rows = new_rows(setup.law)
+        self._fly: Callable[..., int] | None = None  # the tick's machine code for this law, once it was run
         pilot = Pilot(NO_COMMAND, STOPPED, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
             estimator=packed(blank_state()),
@@ -101,6 +102,9 @@ class FlightCore:
             targets=_NO_ROWS,
             references=_NO_ROWS,
         )
+
+        first = width(Command)  # forces are the first of what the mixer gives
+        self.force_row = self.rows.pilot[first : first + 4]  # what the rotors are to give, N
 
     # ---- what there is
 
@@ -117,8 +121,8 @@ class FlightCore:
     @property
     def forces(self) -> tuple[float, float, float, float]:
         """What the rotors are to give, N."""
-        # asked for at every tick: of the pilot only what lies behind the command
-        return unpack(MixerResult, self.rows.pilot, width(Command)).forces
+        f1, f2, f3, f4 = self.force_row.tolist()
+        return (f1, f2, f3, f4)
 
     @property
     def state(self) -> State:
@@ -155,16 +159,19 @@ class FlightCore:
     def step(self, count: int, now_us: int, tick: int, dt: float) -> Report:
         """One tick of `dt` seconds with the first `count` readings of the inbox."""
         self.move_cable(now_us)
-        if fly_tick(self.rows, self.law_rows, count, now_us, tick, dt) != TO_DECIDE:
+        if self._fly is None:
+            self._fly = entry_of(fly_tick, self.rows, self.law_rows, count, now_us, tick, dt, False)
+        if self._fly(self.rows, self.law_rows, count, now_us, tick, dt, False) != TO_DECIDE:
             return _NOTHING
-        return self.decide(now_us, round(dt * 1e6))
+        report = self.decide(now_us, round(dt * 1e6))
+        self._fly(self.rows, self.law_rows, count, now_us, tick, dt, True)
+        return report
 
     def decide(self, now_us: int, period_us: int) -> Report:
-        """The supervisor's part of a tick that is estimated already, and the law's behind it."""
+        """The supervisor's part of a tick that is estimated already; the law's is still to come."""
         self.flight, report = advance(self.flight, self.view(now_us, pulls=True), self.settings)
         self._dirty = True
         self._lay_out(now_us, period_us)
-        control_tick(self.rows, self.law_rows, 0)
         return report
 
     def move_cable(self, now_us: int) -> None:
@@ -260,6 +267,7 @@ class FlightCore:
             pilot = self.pilot._replace(control_mode=RESTING)
             pack(pilot, self.rows.pilot, 0)
         self.law_rows = rows
+        self._fly = None
         self._follow_cable()
         self.interrupt()
 

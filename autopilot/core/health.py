@@ -10,14 +10,16 @@ square root.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from math import pi, sqrt
 from typing import NamedTuple
 
-from autopilot.core.sensor_inbox import Tick
+from autopilot.estimation.inbox import is_sane
+from autopilot.estimation.records import ImuReading
+from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.services import snapshot
-from autopilot.wire.convert import ACCEL, GYRO, MAG, PRESSURE, Forces
+from autopilot.wire.convert import ACCEL, GYRO, MAG, PRESSURE
 from autopilot.wire.parameter_table import ParameterTable
 
 _FRESH_US = 500_000  # a sensor is healthy while its last word is no older
@@ -31,7 +33,7 @@ _FIELDS = (
 _ELECTRONICS_W = 3.0  # on the ground: flight computer and radio
 # (share of the charge left, open-circuit voltage of a cell); a common lithium-polymer cell
 _CELL = ((0.0, 3.0), (0.05, 3.45), (0.2, 3.68), (0.5, 3.82), (0.9, 4.05), (1.0, 4.2))
-_NEVER: tuple[int, ...] = (-1,) * len(_FIELDS)
+_NEVER = (-1, -1, -1, -1)
 
 
 class BatteryConstants(NamedTuple):
@@ -46,7 +48,7 @@ class BatteryConstants(NamedTuple):
 class Condition(NamedTuple):
     """All that is carried from tick to tick."""
 
-    heard_us: tuple[int, ...] = _NEVER  # when each of _FIELDS was heard last
+    heard_us: tuple[int, int, int, int] = _NEVER  # when each of _FIELDS was heard last
     fix_us: int = -1
     mean: Vec3 = ZERO  # m/s^2, body
     square: Vec3 = ZERO
@@ -63,9 +65,12 @@ def battery_constants(table: ParameterTable) -> BatteryConstants:
     )
 
 
+@kernel
 def open_voltage(charge: float) -> float:
     """Open-circuit voltage of a cell with this share of its charge."""
-    for (low, v_low), (high, v_high) in pairwise(_CELL):
+    for i in range(len(_CELL) - 1):
+        low, v_low = _CELL[i]
+        high, v_high = _CELL[i + 1]
         if charge <= high:
             return v_low + (v_high - v_low) * max(charge - low, 0.0) / (high - low)
     return _CELL[-1][1]
@@ -82,29 +87,45 @@ def voltage(condition: Condition, battery: BatteryConstants) -> float:
     return max(0.0, open_v - battery.resistance * condition.current)
 
 
-def _current(forces: Forces, used_as: float, battery: BatteryConstants) -> float:
-    power = _ELECTRONICS_W + battery.watts_per * sum(max(f, 0.0) ** 1.5 for f in forces)
+@kernel
+def _current(forces: Row, used_as: float, battery: BatteryConstants) -> float:
+    work = 0.0
+    for i in range(4):
+        work += max(forces[i], 0.0) ** 1.5
+    power = _ELECTRONICS_W + battery.watts_per * work
     open_v = battery.cells * open_voltage(max(0.0, 1.0 - used_as / battery.capacity_as))
     # P = (U - R I) I; at most what the battery can give
     root = open_v * open_v - 4.0 * battery.resistance * power
     if battery.resistance == 0.0:
-        return float(power / open_v)
-    return float((open_v - sqrt(max(root, 0.0))) / (2.0 * battery.resistance))
+        return power / open_v
+    return (open_v - sqrt(max(root, 0.0))) / (2.0 * battery.resistance)
 
 
+@kernel
+def _last(heard_us: int, now_us: int, fields: int, field: int) -> int:
+    return now_us if fields & field else heard_us
+
+
+@kernel
 def follow(
-    before: Condition, tick: Tick, forces: Forces, battery: BatteryConstants, now_us: int, dt: float
-) -> Condition:
-    """The condition one tick of `dt` seconds later, with the rotors giving `forces` (N)."""
-    fields = tick.fields_updated
-    heard = tuple(
-        now_us if fields & field else last for last, (field, _) in zip(before.heard_us, _FIELDS, strict=True)
+    condition: Row, imu: Row, forces: Row, battery: Row, fields: int, fixed: bool, now_us: int, dt: float
+) -> None:
+    """Bring a `Condition` to the next tick, `dt` seconds later.
+
+    `imu` is the `ImuReading` of this tick, `forces` what the four rotors give (N), `battery` the
+    `BatteryConstants`; `fields` says what HIL_SENSOR brought, `fixed` whether there was a HIL_GPS.
+    """
+    before, sample = unpack(Condition, condition, 0), unpack(ImuReading, imu, 0)
+    heard = (
+        _last(before.heard_us[0], now_us, fields, ACCEL),
+        _last(before.heard_us[1], now_us, fields, GYRO),
+        _last(before.heard_us[2], now_us, fields, MAG),
+        _last(before.heard_us[3], now_us, fields, PRESSURE),
     )
     mean, square = before.mean, before.square
-    imu = tick.imu
-    if imu is not None and dt > 0.0:
+    if is_sane(sample) and dt > 0.0:
         slow, fast = dt / (dt + 0.5 / (pi * _MEAN_HZ)), dt / (dt + 0.5 / (pi * _SQUARE_HZ))
-        a = imu.accel
+        a = sample.accel
         if before.heard_us[0] < 0:
             mean = a
         mean = (
@@ -118,14 +139,8 @@ def follow(
             square[2] + fast * ((a[2] - mean[2]) ** 2 - square[2]),
         )
     used = before.used_as + before.current * dt
-    return Condition(
-        heard,
-        now_us if tick.gps is not None else before.fix_us,
-        mean,
-        square,
-        used,
-        _current(forces, used, battery),
-    )
+    current = _current(forces, used, unpack(BatteryConstants, battery, 0))
+    pack(Condition(heard, now_us if fixed else before.fix_us, mean, square, used, current), condition, 0)
 
 
 def vibration(condition: Condition) -> Vec3:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from autopilot.estimation.inbox import (
     DIRECTION,
@@ -10,13 +13,14 @@ from autopilot.estimation.inbox import (
     FIX,
     HEIGHT,
     IMU,
+    KIND,
     LOAD,
     NOT_MEASURED,
     POSE,
+    READING,
+    SHOWS,
     is_sane,
     new_inbox,
-    put_reading,
-    put_vector,
 )
 from autopilot.estimation.records import (
     Array,
@@ -26,102 +30,188 @@ from autopilot.estimation.records import (
     LoadReading,
     PoseReading,
 )
+from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.wire.codec import decode
+from autopilot.geometry.packed import Row, pack, packed, unpack, width
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.compiled import PAYLOAD_ROOM, Bytes, frame_end, holds, taken
 from autopilot.wire.convert import (
     MAG,
     PRESSURE,
     HilGps,
+    HilSensor,
     Home,
+    load_sensor_in,
+    odometry_in,
     read_hil_gps,
     read_hil_sensor,
-    read_load_sensor,
-    read_odometry,
 )
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.simulator_frames import HIL_GPS, HIL_SENSOR, LOAD_SENSOR, ODOMETRY
+
+# what `_read` makes of a datagram, instead of a number of readings
+_NOT_PLAIN = -1  # it holds more than whole, plain frames of the sensors
+_NO_TICK = -2  # no HIL_SENSOR
+
+_SENSORS = (
+    mavlink.MAVLINK_MSG_ID_HIL_SENSOR,
+    mavlink.MAVLINK_MSG_ID_ODOMETRY,
+    mavlink.MAVLINK_MSG_ID_LOAD_SENSOR,
+    mavlink.MAVLINK_MSG_ID_HIL_GPS,
+)
+_NO_SENSOR = HilSensor(0, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0, 0, 0)
+_NO_FIX = HilGps(0, 0, ZERO, ZERO, 0.0, 0.0, 0)
 
 
 class Tick(NamedTuple):
-    """All that one datagram of the simulator said; `gps` is None where it held no fix."""
+    """What one datagram of the simulator said, but for the readings, which are in the inbox."""
 
     now_us: int
-    readings: tuple[tuple[int, int, Any], ...]  # (kind, instant shown in us, record or vector)
-    imu: ImuReading | None  # None where the sample was no number or beyond any sensor's range
-    gps: HilGps | None
+    readings: int  # how many
     fields_updated: int  # of HIL_SENSOR
+    fixed: bool  # there was a HIL_GPS
     aside: tuple[Any, ...]  # messages that are no sensor's
 
 
-def read_tick(datagram: bytes, home: Home) -> Tick | None:
-    """The tick in a datagram, or None where there is none (garbage, another message)."""
-    messages, _ = decode(datagram)
-    sensor = None
-    readings: list[tuple[int, int, Any]] = []
-    gps = None
-    aside = []
-    for received in messages:
-        message = received.message
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_HIL_SENSOR:
-                sensor = read_hil_sensor(message)
-            case mavlink.MAVLINK_MSG_ID_ODOMETRY:
-                readings.append(_pose(read_odometry(message)))
-            case mavlink.MAVLINK_MSG_ID_LOAD_SENSOR:
-                readings += _of_load(read_load_sensor(message))
-            case mavlink.MAVLINK_MSG_ID_HIL_GPS:
-                gps = read_hil_gps(message, home)
-            case _:
-                aside.append(message)
-    if sensor is None:
-        return None
-    now_us = sensor.time_us
-    imu = ImuReading(sensor.gyro_body, sensor.accel_body)
-    readings.append((IMU, now_us, imu))
-    if gps is not None and gps.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX:
-        readings.append(_fix(gps))
-    if sensor.fields & PRESSURE:
-        readings.append((HEIGHT, now_us, (sensor.pressure_altitude_m - home.altitude_m,)))
-    if sensor.fields & MAG:
-        readings.append((FIELD, now_us, sensor.mag_body_gauss))
-    return Tick(now_us, tuple(readings), imu if is_sane(imu) else None, gps, sensor.fields, tuple(aside))
+@kernel
+def _put(inbox: Array, at: int, kind: int, shows_us: int, reading: Any) -> int:
+    """Write a reading's record into a row, if there is one left; the next row."""
+    if at < inbox.shape[0]:
+        inbox[at, KIND], inbox[at, SHOWS] = kind, shows_us
+        pack(reading, inbox[at], READING)
+    return at + 1
 
 
-def fill(inbox: Array, tick: Tick) -> Array:
-    """The inbox with the tick's readings in its first rows; a larger one where they would not fit."""
-    if len(tick.readings) > len(inbox):
-        inbox = new_inbox(2 * len(tick.readings))
-    for at, (kind, shows_us, reading) in enumerate(tick.readings):
-        if kind in (HEIGHT, FIELD):
-            put_vector(inbox, at, kind, reading)
-        else:
-            put_reading(inbox, at, kind, shows_us, reading)
-    return inbox
+@kernel
+def _put_vector(inbox: Array, at: int, kind: int, vector: Vec3) -> int:
+    """Write a reading of this instant into a row, if there is one left; the next row."""
+    if at < inbox.shape[0]:
+        inbox[at, KIND] = kind
+        for i in range(3):
+            inbox[at, READING + i] = vector[i]
+    return at + 1
 
 
-def _velocity(velocity: Vec3 | None, std: float) -> tuple[Vec3, float]:
-    """A velocity and its stated deviation, as the inbox has them."""
-    if velocity is None:
-        return ZERO, NOT_MEASURED
-    return velocity, 0.0 if std < 0.0 else std
+@kernel
+def _put_pose(inbox: Array, at: int, m: Any) -> int:
+    said = odometry_in(m)
+    velocity, std = said.velocity, said.velocity_std
+    if isnan(m.velocity_covariance[0]):
+        velocity, std = ZERO, NOT_MEASURED
+    elif std < 0.0:
+        std = 0.0
+    stated = (said.position_std, said.attitude_std, std)
+    reading = PoseReading(0.0, said.position, said.quat_wxyz, velocity, stated[0], stated[1], stated[2])
+    return _put(inbox, at, POSE, said.time_us, reading)
 
 
-def _pose(o: Any) -> tuple[int, int, PoseReading]:
-    velocity, std = _velocity(o.velocity, o.velocity_std)
-    reading = PoseReading(0.0, o.position, o.quat_wxyz, velocity, o.position_std, o.attitude_std, std)
-    return POSE, o.time_us, reading
+@kernel
+def _put_load(inbox: Array, at: int, m: Any) -> int:
+    said = load_sensor_in(m)
+    if m.fields & mavlink.PLUMBLINE_LOAD_POSITION:
+        velocity, std = ZERO, NOT_MEASURED
+        if m.fields & mavlink.PLUMBLINE_LOAD_VELOCITY:
+            velocity, std = said.velocity, 0.0 if said.velocity_std < 0.0 else said.velocity_std
+        reading = LoadReading(0.0, said.position, velocity, said.position_std, std)
+        at = _put(inbox, at, LOAD, said.time_us, reading)
+    if m.fields & mavlink.PLUMBLINE_LOAD_DIRECTION:
+        sight = DirectionReading(0.0, said.direction_body, said.direction_std)
+        at = _put(inbox, at, DIRECTION, said.time_us, sight)
+    return at
 
 
-def _of_load(r: Any) -> list[tuple[int, int, Any]]:
-    found: list[tuple[int, int, Any]] = []
-    if r.position is not None:
-        velocity, std = _velocity(r.velocity, r.velocity_std)
-        found.append((LOAD, r.time_us, LoadReading(0.0, r.position, velocity, r.position_std, std)))
-    if r.direction_body is not None:
-        found.append((DIRECTION, r.time_us, DirectionReading(0.0, r.direction_body, r.direction_std)))
-    return found
-
-
-def _fix(gps: HilGps) -> tuple[int, int, GnssReading]:
+@kernel
+def _put_fix(inbox: Array, at: int, gps: HilGps) -> int:
     rtk = 1.0 if gps.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT else 0.0
-    stated = (gps.horizontal_std, gps.vertical_std)
-    return FIX, gps.time_us, GnssReading(0.0, gps.position, gps.velocity, *stated, rtk)
+    fix = GnssReading(0.0, gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std, rtk)
+    return _put(inbox, at, FIX, gps.time_us, fix)
+
+
+@kernel
+def _read(
+    datagram: bytes, home: Row, since_us: int, inbox: Array, imu: Row, fix: Row, payload: Bytes
+) -> tuple[int, int, int, bool]:
+    """The number of readings that a datagram holds, its time, HIL_SENSOR.fields_updated, and whether there
+    was a HIL_GPS. As many readings as there is room for go into the inbox, in the order in which they are
+    absorbed; the inertial sample also into `imu` and the HIL_GPS into `fix`, if the tick is later than
+    `since_us`.
+    """
+    place = unpack(Home, home, 0)
+    sensor, gps = _NO_SENSOR, _NO_FIX
+    sensed = fixed = False
+    count = start = 0
+    while start < len(datagram):
+        end = frame_end(datagram, start)
+        if end == 0:
+            return (_NOT_PLAIN, 0, 0, False)
+        if holds(HIL_SENSOR, datagram, start, payload):
+            sensor, sensed = read_hil_sensor(taken(HIL_SENSOR, payload)), True
+        elif holds(ODOMETRY, datagram, start, payload):
+            count = _put_pose(inbox, count, taken(ODOMETRY, payload))
+        elif holds(LOAD_SENSOR, datagram, start, payload):
+            count = _put_load(inbox, count, taken(LOAD_SENSOR, payload))
+        elif holds(HIL_GPS, datagram, start, payload):
+            gps, fixed = read_hil_gps(taken(HIL_GPS, payload), place), True
+        else:
+            return (_NOT_PLAIN, 0, 0, False)
+        start = end
+    if not sensed:
+        return (_NO_TICK, 0, 0, False)
+    now_us = sensor.time_us
+    sample = ImuReading(sensor.gyro_body, sensor.accel_body)
+    count = _put(inbox, count, IMU, now_us, sample)
+    if fixed and gps.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX:
+        count = _put_fix(inbox, count, gps)
+    if sensor.fields & PRESSURE:
+        height = sensor.pressure_altitude_m - place.altitude_m
+        count = _put_vector(inbox, count, HEIGHT, (height, 0.0, 0.0))
+    if sensor.fields & MAG:
+        count = _put_vector(inbox, count, FIELD, sensor.mag_body_gauss)
+    if now_us > since_us:
+        pack(sample, imu, 0)
+        if fixed:
+            pack(gps, fix, 0)
+    return (count, now_us, sensor.fields, fixed)
+
+
+class SensorInbox:
+    """Reads datagrams of sensors into the rows that the estimate is made from."""
+
+    def __init__(self, home: Home, rows: Array) -> None:
+        self.rows = rows
+        self._home = packed(home)
+        self.imu = np.full(width(ImuReading), np.nan)  # `ImuReading` of the last tick
+        self.fix = np.zeros(width(HilGps))  # `HilGps`, the last one
+        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
+        self._writer = FrameWriter(1, 1)
+
+    def read(self, datagram: bytes, since_us: int) -> Tick | None:
+        """The tick in a datagram, or None where there is none (garbage, another message).
+
+        Its readings are in the first of `rows`, of which there may be more than before. Only of a tick later
+        than `since_us` the sample and the fix are kept.
+        """
+        aside: tuple[Any, ...] = ()
+        found = self._read(datagram, since_us)
+        if found[0] == _NOT_PLAIN:
+            messages = [one.message for one in decode(datagram)[0]]
+            aside = tuple(message for message in messages if message.get_msgId() not in _SENSORS)
+            sensors = (message for message in messages if message.get_msgId() in _SENSORS)
+            found = self._read(b"".join(map(self._writer.frame, sensors)), since_us)
+        count, now_us, fields, fixed = found
+        if count < 0:
+            return None
+        return Tick(now_us, count, fields, fixed, aside)
+
+    def _read(self, datagram: bytes, since_us: int) -> tuple[int, int, int, bool]:
+        found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+        if found[0] > len(self.rows):
+            self.rows = new_inbox(2 * found[0])
+            found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+        return found
+
+    @property
+    def sample(self) -> ImuReading | None:
+        """The inertial sample of the last tick; None where it was no number or beyond any sensor's range."""
+        imu = unpack(ImuReading, self.imu, 0)
+        return imu if is_sane(imu) else None

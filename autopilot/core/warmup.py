@@ -5,21 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, Setup
-from autopilot.core.tick import control_tick, fly_tick
+from autopilot.core.tick import fly_tick
+from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance.layout import jets_ahead
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, Run, transfer_leg
 from autopilot.guidance.setpoint_follower import begin_following
+from autopilot.trajectory.prepare import prepare
+from autopilot.trajectory.rotor_demand import demand
 from autopilot.trajectory.shaping import shape
-from missions.model import Signals, Sine, Term
+from missions.model import Signals, Sine, Term, Waypoint
 
 
-def rehearse(setup: Setup) -> None:
-    """Run the tick, and lay out each kind of leg, for an instant."""
+def rehearse_tick(setup: Setup) -> None:
+    """Run a tick."""
     core = FlightCore(setup)
-    fly_tick(core.rows, core.law_rows, 0, 0, 0, 0.0)
-    control_tick(core.rows, core.law_rows, 0)
+    fly_tick(core.rows, core.law_rows, 0, 0, 0, 0.0, False)
+
+
+def rehearse_paths(setup: Setup) -> None:
+    """Lay out each kind of leg for an instant, and prepare a short mission."""
     load = (0.0, 0.0, 1.0)
     over = (0.0, 0.0, 1.0 + setup.vehicle.cable_length)
     wave = Signals(
@@ -33,6 +39,19 @@ def rehearse(setup: Setup) -> None:
         begin_following((load, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), 1.0),
     )
     tangent(E3, ZERO)  # for the supervisor, when a swing is calmed
+    enu_from_ned(ZERO)  # for setpoints of a companion computer
     for leg in legs:
         leg.jet(0.5)
         jets_ahead((leg,), np.array([0.5]))
+    limits = setup.settings.limits
+    prepare((Waypoint(1.0, 0.0, 2.0, 1.0),), (0,), limits)
+    demand(np.zeros((7, 1, 3)), limits.body)  # of paths through waypoints
+
+
+PARTS = {"tick": rehearse_tick, "paths": rehearse_paths}
+
+
+def rehearse(setup: Setup) -> None:
+    """All of it."""
+    for part in PARTS.values():
+        part(setup)

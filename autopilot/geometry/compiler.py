@@ -159,13 +159,14 @@ class _Inner(CPUDispatcher):  # type: ignore[misc]
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function with two faces: one for Python, and one for other kernels."""
+    """A compiled function with two faces: one for Python, whose machine code is kept in `cache`, and one for
+    other kernels."""
 
-    def __init__(self, function: Any) -> None:
+    def __init__(self, function: Any, cache: Any) -> None:
         super().__init__(function, targetoptions=dict(_OPTIONS), pipeline_class=_OuterCompiler)
         inner = dict(_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
         self._inner = _Inner(function, targetoptions=inner, pipeline_class=_InnerCompiler)
-        self.enable_caching()
+        self._cache = cache
 
     @property
     def _numba_type_(self) -> Any:

@@ -1,83 +1,30 @@
-"""How every kernel is compiled, and where its machine code is kept.
+"""How every kernel is compiled, by one process at a time, and how its machine code is found again.
 
 numba keys its disk cache by the file of the *outermost* function alone: after a change in a callee, or of a
-constant from another module, it would go on serving the old machine code. Kernels are therefore kept in a
-directory named by a hash over their own source file and all files of this project that it imports, directly
-or not, so that a stale entry cannot be met and a change recompiles only what it can reach. Where the checkout
-lies does not enter the hash: a second clone of the same source finds the machine code of the first.
+constant from another module, it would go on serving the old machine code. Kernels are therefore kept where
+`autopilot.geometry.machine_code` says, by the content of all that their source file imports.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 from collections.abc import Callable
-from functools import cache, update_wrapper
+from functools import update_wrapper
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-from numba.core import caching, config
-from platformdirs import user_cache_path
+from numba.core import caching, config, event
 
 from autopilot.geometry.compiler import Kernel
+from autopilot.geometry.machine_code import CHOSEN_BY_USER, ROOT, folder_of, sources_hash
 
-_ROOT = Path(__file__).resolve().parents[2]
-_IMPORT = re.compile(
-    rb"^\s*from\s+((?:autopilot|sitl|missions|gcs)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)", re.MULTILINE
-)
-_NAME = re.compile(rb"\w+")
-_CHOSEN_BY_USER = "NUMBA_CACHE_DIR" in os.environ
+_LONGEST_S = 600.0  # that another process is waited for; then we compile what it does not deliver
+
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # of a function that is an argument
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-
-@cache
-def _source(path: Path) -> bytes:
-    return path.read_bytes()
-
-
-@cache
-def _packages(path: Path, root: Path) -> tuple[Path, ...]:
-    """The files that make `path`, or what it lies in, packages of the project at `root`."""
-    inside = [parent for parent in (path, *path.parents) if parent.is_relative_to(root)]
-    return tuple(file for file in (parent / "__init__.py" for parent in inside) if file.is_file())
-
-
-@cache
-def _imported(path: Path, root: Path) -> frozenset[Path]:
-    """Files below `root` that the file imports itself."""
-    found: set[Path] = set()
-    for module, names in _IMPORT.findall(_source(path)):
-        base = root.joinpath(*module.decode().split("."))
-        found.update(_packages(base, root))
-        if base.is_dir():
-            parts = (base / name.decode() for name in _NAME.findall(names))
-            found.update(p for q in parts for p in (q.with_suffix(".py"), q / "__init__.py") if p.is_file())
-        elif base.with_suffix(".py").is_file():
-            found.add(base.with_suffix(".py"))
-    if b"iter_modules(__path__)" in _source(path):  # a package that finds its modules by itself
-        found.update(path.parent.glob("*.py"))
-    return frozenset(found)
-
-
-@cache
-def sources_hash(path: Path, root: Path = _ROOT) -> str:
-    """Hash of a source file and of all files of the project at `root` that it imports, directly or not."""
-    seen, ahead = {path}, [path]
-    while ahead:
-        fresh = _imported(ahead.pop(), root) - seen
-        seen |= fresh
-        ahead += fresh
-    digest = hashlib.sha256()
-    for name, file in sorted((os.path.relpath(file, root), file) for file in seen):
-        digest.update(name.encode() + b"\0" + _source(file) + b"\0")
-    return digest.hexdigest()[:16]
-
-
-def _folder(path: Path) -> Path:
-    return user_cache_path("plumbline") / "kernels" / sources_hash(path)
 
 
 class _ContentLocator:
@@ -93,7 +40,7 @@ class _ContentLocator:
     @classmethod
     def from_function(cls, function: Any, file: str) -> _ContentLocator | None:
         """A locator of a function of this project; None for any other, and where nothing can be written."""
-        if _CHOSEN_BY_USER or not Path(file).is_file() or not Path(file).resolve().is_relative_to(_ROOT):
+        if CHOSEN_BY_USER or not Path(file).is_file() or not Path(file).resolve().is_relative_to(ROOT):
             return None
         locator = cls(function, file)
         try:
@@ -108,7 +55,7 @@ class _ContentLocator:
 
     def get_cache_path(self) -> Path:
         """Directory of the machine code."""
-        return _folder(self._path) / self._path.stem
+        return folder_of(self._path) / self._path.stem
 
     def get_source_stamp(self) -> str:
         """What must be unchanged for the machine code to be valid."""
@@ -121,10 +68,87 @@ class _ContentLocator:
 
 caching.CacheImpl._locator_classes.insert(0, _ContentLocator)
 
+# whose compilation goes on here and its lock, outermost first; None where no lock could be had
+_held: list[tuple[_SharedCache, Any]] = []
 
-def is_compiled(path: Path) -> bool:
-    """True if machine code of kernels in this source file is kept from an earlier run, as far as is known."""
-    return _CHOSEN_BY_USER or _folder(path).is_dir()
+
+class _SharedCache(caching.FunctionCache):
+    """numba's disk cache, shared by processes that compile at the same time.
+
+    Whoever misses a function compiles it under a lock; who misses it meanwhile waits, and loads. As a
+    function is locked before what it calls, no two processes can wait for each other. The index of a function
+    is written under a lock too: of two processes that add to it at once, numba would lose the entry of one,
+    or serve its machine code for the other's.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compile result, loaded; None: the caller must compile it, and holds the lock."""
+        found = self._load(sig, target_context)
+        if found is not None:
+            return found
+        types = hashlib.sha256(_ADDRESS.sub("", str(sig)).encode()).hexdigest()[:16]
+        lock = self._lock(f"{self._impl.filename_base}-{types}")
+        found = self._load(sig, target_context)
+        if found is None:
+            _held.append((self, lock))
+        elif lock is not None:
+            lock.release()
+        return found
+
+    def _load(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except (AttributeError, ImportError):
+            # an index that names types which are no longer where they were
+            index = self._lock("index")
+            self.flush()
+            if index is not None:
+                index.release()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compile result, and let others have it."""
+        index = self._lock("index")
+        try:
+            super().save_overload(sig, data)
+        finally:
+            if index is not None:
+                index.release()
+            _release(self)
+
+    def _lock(self, name: str) -> Any:
+        from filelock import FileLock, Timeout
+
+        lock = FileLock(Path(self._cache_path) / f"{name}.lock", timeout=_LONGEST_S, is_singleton=True)
+        try:
+            lock.acquire()
+        except (OSError, Timeout):
+            return None
+        return lock
+
+
+def _release(cache: Any) -> None:
+    """Give up the lock on the function with this cache, the innermost one that is being compiled."""
+    if _held and _held[-1][0] is cache:
+        lock = _held.pop()[1]
+        if lock is not None:
+            lock.release()
+
+
+class _Failures(event.Listener):
+    """Gives up the lock on a function that cannot be compiled for these types; numba then tries others."""
+
+    def on_start(self, event: Any) -> None:
+        """Nothing yet."""
+
+    def on_end(self, event: Any) -> None:
+        """Compiled, or not."""
+        dispatcher = event.data["dispatcher"]
+        if tuple(event.data["args"]) not in dispatcher.overloads:
+            _release(dispatcher._cache)
+
+
+event.register("numba:compile", _Failures())
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:
@@ -135,5 +159,5 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """
     if config.DISABLE_JIT:
         return function
-    compiled: Callable[P, T] = update_wrapper(Kernel(function), function)
+    compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache(function)), function)
     return compiled

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from autopilot.control.believed import (
     believed_actuation,
     believed_drag,
@@ -20,10 +22,11 @@ from autopilot.control.laws import build_law, chosen_law
 from autopilot.core.flight_core import FlightCore, Setup, commanded_rate
 from autopilot.core.health import Condition, battery_constants, follow
 from autopilot.core.scheduler import RateError, divider
-from autopilot.core.sensor_inbox import Tick, fill, read_tick
+from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse
 from autopilot.estimation.filter import estimator_tuning
 from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.packed import pack, packed, unpack
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
@@ -47,23 +50,24 @@ from autopilot.services.records import (
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
+from autopilot.supervisor.state import MissionPlan, Phase
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import HilGps, Home, hil_actuator_controls_message
+from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
+from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
-from missions.model import ReturnHome, Step, Waypoint
+from autopilot.wire.simulator_frames import put_answer
+from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MOST_NAMED = 8  # items in one text
-AT_ONCE_STEPS = 30  # of a mission that is prepared between two ticks on the ground; some 0.4 s
 LEAP_US = 5_000_000  # larger jumps are rejected
 
 
@@ -127,10 +131,12 @@ class Onboard:
         self._options = options
         self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
         self._answer = b""
-        self._last: Tick | None = None
-        self._gps: HilGps | None = None
-        self._condition = Condition()
+        self._fixed = False  # a HIL_GPS was heard
+        self._health = packed(Condition())
         self._battery = battery_constants(parameters)
+        self._battery_row = packed(self._battery)
+        self._frame = np.zeros(FRAME_ROOM, np.uint8)
+        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
@@ -139,6 +145,7 @@ class Onboard:
         self._world = WorldParameters(parameters)
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
+        self._sensors = SensorInbox(options.home, self.core.rows.inbox)
         self._moments = Moments(self.core, options, parameters)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self.core.setup.settings.limits
@@ -156,29 +163,45 @@ class Onboard:
 
         None for anything else: garbage, or a tick that is over.
         """
-        tick = read_tick(datagram, self._options.home)
+        before_us = self.now_us
+        tick = self._sensors.read(datagram, before_us if self.tick >= 0 else -1)
         if tick is None:
             return None
-        if tick.now_us < self.now_us or (self.tick >= 0 and tick.now_us > self.now_us + LEAP_US):
+        now_us = tick.now_us
+        if now_us < before_us or (self.tick >= 0 and now_us > before_us + LEAP_US):
             self.out_of_time += 1
             return None
         self.out_of_time = 0
-        if tick.now_us == self.now_us and self.tick >= 0:
+        if now_us == before_us and self.tick >= 0:
             return self._answer
         self._run(tick)
-        command = hil_actuator_controls_message(
-            tick.now_us,
-            self.core.forces,
-            self.armed,
-            self._options.lockstep,
-            self.core.flight.cable.released,
-            commanded_rate(self.core.flight, tick.now_us, self._shortest_us * 1e-6),
-        )
-        aside = self._world.messages(self.now_us)
+        self._answer = self._put_answer(now_us)
+        writer = self._writer
+        writer.sequence = (writer.sequence + 1) & 0xFF
+        aside = self._world.messages(now_us)
         if self._reboot:
             aside.append(_REBOOT)
-        self._answer = b"".join(map(self._writer.frame, (command, *aside)))
+        if aside:
+            self._answer += b"".join(map(writer.frame, aside))
         return self._answer
+
+    def _put_answer(self, now_us: int) -> bytes:
+        """HIL_ACTUATOR_CONTROLS of this tick."""
+        flight, writer = self.core.flight, self._writer
+        end = put_answer(
+            self._frame,
+            self._payload,
+            writer.sequence,
+            writer.system,
+            writer.component,
+            now_us,
+            self.core.force_row,
+            self.armed,
+            self._options.lockstep,
+            flight.cable.released,
+            commanded_rate(flight, now_us, self._shortest_us * 1e-6),
+        )
+        return self._frame[:end].tobytes()
 
     @property
     def phase(self) -> Phase:
@@ -194,9 +217,8 @@ class Onboard:
         period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
         self.tick += 1
         self.now_us = tick.now_us
-        self._last = tick
-        if tick.gps is not None:
-            self._gps = tick.gps
+        if tick.fixed:
+            self._fixed = True
         for message in tick.aside:
             self._hear_simulator(message)
         if period_us > 0 and not 0 < self._shortest_us <= period_us:
@@ -208,9 +230,20 @@ class Onboard:
         if self.fault:
             return
         dt = period_us * 1e-6
-        self.core.take_inbox(fill(self.core.rows.inbox, tick))
-        report = self.core.step(len(tick.readings), tick.now_us, self.tick, dt)
-        self._condition = follow(self._condition, tick, self.core.forces, self._battery, tick.now_us, dt)
+        core, sensors = self.core, self._sensors
+        if sensors.rows is not core.rows.inbox:
+            core.take_inbox(sensors.rows)
+        report = core.step(tick.readings, tick.now_us, self.tick, dt)
+        follow(
+            self._health,
+            sensors.imu,
+            core.force_row,
+            self._battery_row,
+            tick.fields_updated,
+            tick.fixed,
+            tick.now_us,
+            dt,
+        )
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
@@ -254,9 +287,8 @@ class Onboard:
 
     def log_sample(self) -> Sample:
         """What the flight log records at this tick."""
-        imu = self._last.imu if self._last else None
         moment = self._snapshot()
-        return Sample(moment, imu, moment.accel_quad, lambda: moment.estimator)
+        return Sample(moment, self._sensors.sample, moment.accel_quad, lambda: moment.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:
@@ -276,6 +308,7 @@ class Onboard:
         self.fault = ""
         self.core.follow(build_setup(self.parameters, every))
         self._battery = battery_constants(self.parameters)
+        pack(self._battery, self._battery_row, 0)
         # a mission under way keeps the paths that it began with
         if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.mission.active:
             self._prepare()
@@ -334,11 +367,20 @@ class Onboard:
         snapshot.system_status = emergency if snapshot.armed else critical
         return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
 
+    @property
+    def rehearsal(self) -> Work:
+        """Work for nothing, by which a process loads what work needs."""
+        path = Signals(1.0, (Term("x", 0.01, 0.0, 0.5, None, 0.0),))
+        steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0), path)
+        return Work(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
+
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self.core.setup)
-        waypoints = (Waypoint(0.0, 0.0, 2.0), Waypoint(1.0, 0.0, 2.0))
-        Work(waypoints, (0, 1), self.core.setup.settings.limits).done()
+        self._sensors.read(b"", -1)
+        self._put_answer(0)
+        health = packed(Condition())
+        follow(health, self._sensors.imu, self.core.force_row, self._battery_row, 0, False, 0, 0.0)
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):
@@ -399,13 +441,12 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_INFO, f"Mission items kept, not flown: {numbers}")
 
     def _prepare(self) -> None:
-        """Have the paths of the plan made: at once or, where the loop must not wait, by who takes `work`."""
+        """Have the paths of the plan made: at once where the clock waits, else by who takes `work`."""
         plan, limits = self.core.flight.mission.plan, self.core.setup.settings.limits
         self._prepared_for = limits
         self.work = Work(plan.steps, plan.sequence, limits, self.core.flight.area.home)
         self._have_prepared(PENDING)
-        short = self.core.flight.phase in ON_GROUND and len(plan.steps) <= AT_ONCE_STEPS
-        if self._options.clock_waits or short:
+        if self._options.clock_waits or not plan.steps:
             self.finish(self.work, self.work.done())
 
     def finish(self, work: Work, prepared: Prepared) -> None:
@@ -423,5 +464,6 @@ class Onboard:
         self.core.change(replace(flight, mission=replace(flight.mission, plan=plan)))
 
     def _snapshot(self) -> Moment:
-        mission, condition = self.endpoint.mission, self._condition
-        return Moment(self._moments, mission, condition, self._battery, self._gps, self.now_us)
+        condition = unpack(Condition, self._health, 0)
+        fix = unpack(HilGps, self._sensors.fix, 0) if self._fixed else None
+        return Moment(self._moments, self.endpoint.mission, condition, self._battery, fix, self.now_us)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import os
 import signal
 import socket
 import struct
@@ -67,6 +68,19 @@ def receive(sock: socket.socket, flags: int = 0) -> tuple[bytes, Address] | None
         return None
 
 
+def send(sock: socket.socket, datagram: bytes, address: Address | None = None) -> bool:
+    """Send a datagram, of a connected socket without an address; False if it is lost: nobody listens there
+    yet, or the network is full."""
+    try:
+        if address is None:
+            sock.send(datagram)
+        else:
+            sock.sendto(datagram, address)
+    except OSError:
+        return False
+    return True
+
+
 def datagram_socket(address: Address) -> socket.socket:
     """A UDP socket of the family of `address`."""
     family = socket.getaddrinfo(*address, type=socket.SOCK_DGRAM)[0][0]
@@ -83,8 +97,15 @@ def shown(address: Address | None) -> str:
     return f"{address[0]}:{address[1]}" if address else "nowhere"
 
 
-def be_punctual() -> None:
-    """Ask the system and the interpreter for short delays; none of it is needed."""
+def be_punctual(real_time: bool) -> None:
+    """Ask the system and the interpreter for short delays; none of it is needed.
+
+    A program that keeps to the wall clock also asks to go before all others, but not for the processes that
+    it starts.
+    """
+    if real_time:
+        with suppress(OSError, AttributeError):
+            os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
     gc.collect()

@@ -3,50 +3,83 @@
 from __future__ import annotations
 
 import signal
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from autopilot.onboard.onboard import Onboard, Work
+from autopilot.supervisor.state import ON_GROUND
 from autopilot.trajectory.prepare import Prepared
 
 
 class Aside:
-    """Work for which the control loop must not wait, done by a process of its own."""
+    """Work for which the control loop must not wait, done by a process of its own that is kept ready.
+
+    Until that has loaded, which takes a second or two, a vehicle on the ground does its work itself.
+    """
 
     def __init__(self) -> None:
-        self._work: Work | None = None
+        self._work: Work | None = None  # what it is at
+        self._loaded = False
         self._process: SpawnProcess | None = None
-        self._answer: Connection | None = None
+        self._pipe: Connection | None = None
+
+    def start(self, rehearsal: Work) -> None:
+        """Have the process load what it needs, which it does by `rehearsal`."""
+        context = get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(rehearsal, theirs), daemon=True)
+        self._process.start()
+        theirs.close()
 
     def attend(self, onboard: Onboard) -> None:
         """Begin what waits; hand over what is done."""
-        if onboard.work is not None and onboard.work is not self._work:
+        if (self._work is not None or not self._loaded) and self._pipe is not None and self._pipe.poll():
+            self._hear(self._pipe, onboard)
+        if onboard.work is None or self._work is not None:
+            return  # what it is at may be of no use any more, but does not take long
+        if not self._loaded and onboard.phase in ON_GROUND:
+            onboard.finish(onboard.work, onboard.work.done())
+            return
+        if self._pipe is None:
+            self.start(onboard.rehearsal)
+        self._work = onboard.work
+        with suppress(OSError):  # it has died idle: the next look finds that out
+            self._pipe.send(self._work)  # type: ignore[union-attr]
+
+    def _hear(self, pipe: Connection, onboard: Onboard) -> None:
+        try:
+            prepared = pipe.recv()
+        except (EOFError, OSError):
+            work = self._work
             self.close()
-            self._work = onboard.work
-            context = get_context("spawn")
-            self._answer, theirs = context.Pipe(duplex=False)
-            self._process = context.Process(target=_work_aside, args=(onboard.work, theirs), daemon=True)
-            self._process.start()
-            theirs.close()
-        if self._answer is not None and self._work is not None and self._answer.poll():
-            try:
-                onboard.finish(self._work, self._answer.recv())
-            except EOFError:
+            if work is not None:
                 text = "the process that prepares paths has died"
-                onboard.finish(self._work, Prepared(refusal=text, notes=(text,)))
-            self.close()
+                onboard.finish(work, Prepared(refusal=text, notes=(text,)))
+            return
+        if not self._loaded:
+            self._loaded = True  # its first word
+        elif self._work is not None:
+            work, self._work = self._work, None
+            onboard.finish(work, prepared)
 
     def close(self) -> None:
         """End what goes on."""
         if self._process is not None:
             self._process.kill()
             self._process.join()
-        if self._answer is not None:
-            self._answer.close()
-        self._work = self._process = self._answer = None
+        if self._pipe is not None:
+            self._pipe.close()
+        self._work = self._process = self._pipe = None
+        self._loaded = False
 
 
-def _work_aside(work: Work, answer: Connection) -> None:
+def _serve(rehearsal: Work, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
-    answer.send(work.done())
+    rehearsal.done()
+    with suppress(EOFError, OSError):  # our parent is gone
+        pipe.send(None)  # ready
+        while True:
+            work: Work = pipe.recv()
+            pipe.send(work.done())

@@ -27,7 +27,9 @@ from autopilot.services.records import (
     TimesyncAnswered,
     WorldSaved,
 )
+from autopilot.shell.compiling import ONCE, autopilot_parts, ready
 from autopilot.shell.options import (
+    LARGEST_DATAGRAM,
     Address,
     Stop,
     StopRequest,
@@ -37,6 +39,7 @@ from autopilot.shell.options import (
     home_option,
     reason,
     receive,
+    send,
     set_timeout,
     setting_option,
     shown,
@@ -46,7 +49,7 @@ from autopilot.shell.path_worker import Aside
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.tcp_server import TcpServer
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
-from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
+from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from autopilot.wire.codec import Field, FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -246,6 +249,8 @@ class Program:
         self._ground = ground
         self._say = say
         self._socket = _open(simulator, "simulator")
+        self._connect()
+        self._greeted = 0.0  # when, monotonic clock
         self._beaten, self._beaten_us = (
             0.0,
             0,
@@ -261,6 +266,8 @@ class Program:
         self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
+        if isinstance(ground, GroundStations):  # our clock does not wait for paths
+            self._aside.start(self.onboard.rehearsal)
         self._ground.join(self.onboard)
 
     def take_areas(self, areas: Mapping[int, tuple[WireItem, ...]]) -> None:
@@ -275,11 +282,13 @@ class Program:
         silent, lost, beaten = True, False, 0.0
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
+        receive_from_simulator = self._socket.recv
         while True:
             stop.check()
             self._aside.attend(self.onboard)
-            arrived = receive(self._socket)
-            if arrived is None:
+            try:
+                datagram = receive_from_simulator(LARGEST_DATAGRAM)
+            except OSError:  # nothing within the timeout, or nobody listens where we sent to
                 now = time.monotonic()
                 if not silent and now - heard > _SILENCE_S:
                     silent = True
@@ -297,14 +306,11 @@ class Program:
                         beaten = now
                         self._ground.beat(self.onboard)
                 continue
-            datagram, sender = arrived
-            if sender != self._simulator:
-                continue
-            before = self.onboard.now_us, self.onboard.tick
-            answer = self.onboard.receive_sensors(datagram)
+            onboard = self.onboard
+            tick_before = onboard.tick
+            answer = onboard.receive_sensors(datagram)
             if answer is not None:
-                with suppress(OSError):
-                    self._answer(answer, stop, (self.onboard.now_us, self.onboard.tick) != before)
+                self._answer(answer, stop, onboard.tick != tick_before)
                 if silent:
                     silent = False
                     self._say(f"flying with the simulator at {shown(self._simulator)}")
@@ -312,7 +318,7 @@ class Program:
                         lost = False
                         self.onboard.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again")
                 heard = time.monotonic()
-            elif self.onboard.out_of_time >= _RESTART_TICKS:
+            elif onboard.out_of_time >= _RESTART_TICKS:
                 self._say("the simulator has started again: so do I")
                 areas = self.onboard.endpoint.areas
                 self._end_log()
@@ -325,13 +331,15 @@ class Program:
         if isinstance(self._ground, GroundInStep):
             if new:
                 self._ground.exchange(self.onboard, self._keep, stop)
-            self._socket.sendto(answer, self._simulator)
+            send(self._socket, answer)
         else:
-            self._socket.sendto(answer, self._simulator)
+            send(self._socket, answer)
             self.onboard.endpoint.tell_time(time.time_ns() // 1000)
             self._keep_beating()
             self._ground.exchange(self.onboard, self._keep, stop)
-        self._keep(self.onboard.endpoint.take_events())
+        events = self.onboard.endpoint.take_events()
+        if events:
+            self._keep(events)
         self._keep_log(_LOG_BYTES)
         if new and self.onboard.fault and self.onboard.tick == 1:
             raise AutopilotError(self.onboard.fault)
@@ -344,9 +352,19 @@ class Program:
                 self.onboard.endpoint.state_changed()
             self._beaten, self._beaten_us = now, now_us
 
+    def _connect(self) -> None:
+        """Hear nobody but the simulator; what is sent goes there."""
+        try:
+            self._socket.connect(self._simulator)
+        except OSError as error:
+            raise AutopilotError(f"simulator {shown(self._simulator)}: {reason(error)}") from None
+
     def _greet(self) -> None:
-        with suppress(OSError):
-            self._socket.sendto(self._greeting, self._simulator)
+        """A heartbeat to the simulator, now and then: where nobody listens, no receiving waits for it."""
+        now = time.monotonic()
+        if now - self._greeted >= _GREETING_S:
+            self._greeted = now
+            send(self._socket, self._greeting)
 
     def _keep(self, events: list[Event]) -> None:
         for event in events:
@@ -502,6 +520,10 @@ def main(
             print(f"autopilot: {trouble}", file=sys.stderr)
         apply_settings(table, settings)
         table.freeze()
+        parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
+        compiled = ready(parts)
+        if not compiled:
+            say(ONCE)
         mission, trouble = kept.load_mission(place)
         if trouble:
             print(f"autopilot: {trouble}", file=sys.stderr)
@@ -530,7 +552,10 @@ def main(
             print(f"autopilot: {trouble}", file=sys.stderr)
         program.take_areas(areas)
         program.onboard.rehearse()
-        be_punctual()
+        if not compiled:
+            for part in parts:
+                part.done()
+        be_punctual(real_time=not in_step)
         with StopRequest() as stop:
             program.run(stop)
     except (AutopilotError, VehicleFileError, ParameterError, StorageError) as error:

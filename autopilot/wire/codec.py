@@ -303,3 +303,9 @@ def decode(datagram: bytes) -> tuple[list[Received], int]:
         good += stop - start
         start = stop
     return received, end - good
+
+
+def payload_of(frame: bytes) -> bytes:
+    """The payload of a whole frame; MAVLink 2 cuts its trailing zeros."""
+    begin = _HEADER_V1 if frame[0] == _MAGIC_V1 else _HEADER_V2
+    return frame[begin : begin + frame[1]]

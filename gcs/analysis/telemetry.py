@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import fields
-from operator import attrgetter
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,11 +13,11 @@ from numpy.typing import NDArray
 from autopilot.wire.codec import Received
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
+from gcs.analysis.columns import Columns
 from gcs.analysis.tracks import (
     AttitudeTrack,
     CascadeTrack,
     HeartbeatTrack,
-    Ints,
     ItemTrack,
     LoadTrack,
     RotorTrack,
@@ -44,97 +43,48 @@ def load_telemetry(tlog: Path) -> Telemetry:
     return telemetry_of(read_tlog(tlog))
 
 
-def telemetry_of(records: Iterable[Record], system: int = VEHICLE_SYSTEM) -> Telemetry:
-    """The flight of one vehicle; what other systems sent (ground stations, the load) is left out."""
-    rows: dict[int, list[Any]] = {message_id: [] for message_id in _READ}
-    heard: dict[int, list[int]] = {message_id: [] for message_id in _HEARD}
-    texts: list[tuple[int, Any]] = []
-    boot_us: int | None = None
-    for unix_us, received in records:
-        if received.system != system:
-            continue
-        message = received.message
-        message_id = type(message).id  # STATUSTEXT has a field of that name
-        read = _READ.get(message_id)
-        if read is None:
-            if message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
-                texts.append((unix_us, message))
-            continue
-        if message_id in _HEARD:
-            if received.component != AUTOPILOT_COMPONENT:
-                continue
-            heard[message_id].append(unix_us)
-        elif message_id == mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
-            # the record that waited least tells best when the vehicle's clock was zero
-            waited = unix_us - message.time_usec
-            boot_us = waited if boot_us is None else min(boot_us, waited)
-        rows[message_id].append(read(message))
-    if boot_us is None:
-        boot_us = min((stamps[0] for stamps in heard.values() if stamps), default=0)
-    return _assemble(rows, heard, texts, boot_us)
-
-
-_FIELDS: dict[int, str] = {
-    mavlink.MAVLINK_MSG_ID_LOAD_STATE: "time_usec x y z vx vy vz qx qy qz qx_dot qy_dot qz_dot distance"
-    " tension slack_events taut source",
-    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: "time_usec x y z vx vy vz ax ay az qx qy qz elapsed duration"
-    " seq phase control_mode asked_x asked_y asked_z asked_vx asked_vy asked_vz",
-    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: "time_usec e_x e_v e_q e_q_dot e_r e_omega moment"
-    " psi_r psi_q thrust control_mode",
-    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: "time_usec force force_min force_max saturated source",
-    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: "time_usec attitude_quaternion rollspeed pitchspeed"
-    " yawspeed",
-    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed",
-    mavlink.MAVLINK_MSG_ID_SIM_STATUS: "time_usec speed_factor rate_hz late_p50_us late_p99_us late_max_us"
-    " missed vehicle_on_ground load_on_ground",
-    mavlink.MAVLINK_MSG_ID_WIND_STATE: "time_usec wind gust",
-    mavlink.MAVLINK_MSG_ID_CABLE_SNAP: "time_usec speed impulse",
-    mavlink.MAVLINK_MSG_ID_HEARTBEAT: "base_mode custom_mode system_status",
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: "seq",
-    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: "seq",
-}
-_READ = {message_id: attrgetter(*names.split()) for message_id, names in _FIELDS.items()}
-# without a time stamp of their own, and sent by more components than the autopilot
-_HEARD = frozenset(
-    (
-        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
-        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
-        mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
-        mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
-    )
+_READ = (
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE,
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
+    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
+    mavlink.MAVLINK_MSG_ID_SIM_STATUS,
+    mavlink.MAVLINK_MSG_ID_WIND_STATE,
+    mavlink.MAVLINK_MSG_ID_CABLE_SNAP,
 )
-_ARRAYS = {
-    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: dict.fromkeys(
-        ("e_x", "e_v", "e_q", "e_q_dot", "e_r", "e_omega", "moment"), 3
-    ),
-    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: {"force": 4},
-    mavlink.MAVLINK_MSG_ID_WIND_STATE: {"wind": 3, "gust": 3},
-    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: {"attitude_quaternion": 4},
-}
+# without a time stamp of their own, and sent by more components than the autopilot
+_HEARD = (
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+)
 
 
-class _Columns:
-    """The rows of one message type as float columns by field name; (n,) or (n, k)."""
-
-    def __init__(self, message_id: int, rows: list[Any]) -> None:
-        names = _FIELDS[message_id].split()
-        widths = _ARRAYS.get(message_id, {})
-        if len(names) == 1:
-            values: list[Any] = [rows]  # attrgetter of one name gives the value bare
-        else:
-            values = list(zip(*rows, strict=True)) if rows else [() for _ in names]
-        self._by_name = {
-            name: np.array(column, dtype=np.float64).reshape((-1, widths[name]) if name in widths else (-1,))
-            for name, column in zip(names, values, strict=True)
-        }
-
-    def __getitem__(self, names: str) -> Floats:
-        """A column, or several of them side by side."""
-        columns = [self._by_name[name] for name in names.split()]
-        return columns[0] if len(columns) == 1 else np.stack(columns, axis=-1)
-
-    def whole(self, name: str) -> Ints:
-        return self._by_name[name].astype(np.int64)
+def telemetry_of(records: Iterable[Record]) -> Telemetry:
+    """The flight of one vehicle; what other systems sent (ground stations, the load) is left out."""
+    frames: dict[int, list[bytes]] = {message_id: [] for message_id in (*_READ, *_HEARD)}
+    stamps: dict[int, list[int]] = {message_id: [] for message_id in frames}
+    texts: list[tuple[int, Any]] = []
+    for unix_us, received in records:
+        if received.system != VEHICLE_SYSTEM:
+            continue
+        if received.id not in frames:
+            if received.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+                texts.append((unix_us, received.message))
+        elif received.component == AUTOPILOT_COMPONENT or received.id not in _HEARD:
+            frames[received.id].append(received.frame)
+            stamps[received.id].append(unix_us)
+    columns = {message_id: Columns(message_id, found) for message_id, found in frames.items()}
+    waited_us = stamps[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]
+    if waited_us:
+        # the record that waited least tells best when the vehicle's clock was zero
+        sent_us = columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT].raw("time_usec").tolist()
+        boot_us = min(heard - sent for heard, sent in zip(waited_us, sent_us, strict=True))
+    else:
+        boot_us = min((stamps[message_id][0] for message_id in _HEARD if stamps[message_id]), default=0)
+    return _assemble(columns, {message_id: stamps[message_id] for message_id in _HEARD}, texts, boot_us)
 
 
 TrackT = TypeVar("TrackT")
@@ -151,7 +101,7 @@ def _in_order(track: TrackT, keep: NDArray[np.bool_] | None = None) -> TrackT:
     return type(track)(**{name: column[index] for name, column in columns.items()})
 
 
-def _load(c: _Columns, source: int) -> LoadTrack:
+def _load(c: Columns, source: int) -> LoadTrack:
     track = LoadTrack(
         time_s=c["time_usec"] * _MICRO,
         position_m=enu_from_ned(c["x y z"]),
@@ -166,7 +116,7 @@ def _load(c: _Columns, source: int) -> LoadTrack:
     return _in_order(track, c["source"] == source)
 
 
-def _setpoint(c: _Columns) -> SetpointTrack:
+def _setpoint(c: Columns) -> SetpointTrack:
     asked, asked_m_s = c["asked_x asked_y asked_z"], c["asked_vx asked_vy asked_vz"]
     if not asked.any():  # a vehicle that does not say: the wire fills extensions with zeros
         asked, asked_m_s = c["x y z"], c["vx vy vz"]
@@ -188,7 +138,7 @@ def _setpoint(c: _Columns) -> SetpointTrack:
     )
 
 
-def _cascade(c: _Columns) -> CascadeTrack:
+def _cascade(c: Columns) -> CascadeTrack:
     return _in_order(
         CascadeTrack(
             time_s=c["time_usec"] * _MICRO,
@@ -207,7 +157,7 @@ def _cascade(c: _Columns) -> CascadeTrack:
     )
 
 
-def _rotors(c: _Columns, source: int) -> RotorTrack:
+def _rotors(c: Columns, source: int) -> RotorTrack:
     track = RotorTrack(
         time_s=c["time_usec"] * _MICRO,
         force_n=c["force"],
@@ -222,7 +172,7 @@ def _attitude(time_s: Floats, quat_ned_frd: Floats, rates_frd: Floats) -> Attitu
     return _in_order(AttitudeTrack(time_s, quat_enu_flu_from_ned_frd(quat_ned_frd), flu_from_frd(rates_frd)))
 
 
-def _simulation(c: _Columns) -> SimulationTrack:
+def _simulation(c: Columns) -> SimulationTrack:
     return _in_order(
         SimulationTrack(
             time_s=c["time_usec"] * _MICRO,
@@ -238,11 +188,11 @@ def _simulation(c: _Columns) -> SimulationTrack:
     )
 
 
-def _wind(c: _Columns) -> WindTrack:
+def _wind(c: Columns) -> WindTrack:
     return _in_order(WindTrack(c["time_usec"] * _MICRO, enu_from_ned(c["wind"]), enu_from_ned(c["gust"])))
 
 
-def _snaps(c: _Columns) -> SnapTrack:
+def _snaps(c: Columns) -> SnapTrack:
     return _in_order(SnapTrack(c["time_usec"] * _MICRO, c["speed"], c["impulse"]))
 
 
@@ -263,9 +213,8 @@ def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]
 
 
 def _assemble(
-    rows: dict[int, list[Any]], heard: dict[int, list[int]], texts: list[tuple[int, Any]], boot_us: int
+    columns: dict[int, Columns], heard: dict[int, list[int]], texts: list[tuple[int, Any]], boot_us: int
 ) -> Telemetry:
-    columns = {message_id: _Columns(message_id, found) for message_id, found in rows.items()}
     load = columns[mavlink.MAVLINK_MSG_ID_LOAD_STATE]
     rotors = columns[mavlink.MAVLINK_MSG_ID_ROTOR_STATE]
     hil = columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
@@ -19,6 +20,10 @@ from gcs.commands.options import (
 )
 from gcs.shell.display import say
 from gcs.shell.link import DEFAULT_PORT, Address
+
+if TYPE_CHECKING:
+    from gcs.analysis.record import Record
+    from gcs.clients.flight import Outcome
 
 _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to a vehicle that runs already
 
@@ -116,6 +121,14 @@ def fly_command(
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record
 
+    def told(record: Record, outcome: Outcome) -> None:
+        if as_json:
+            print_json(record)
+        elif not quiet:
+            print_record(record)
+        reason = f": {outcome.reason}" if outcome.reason else ""
+        say(f"{mission}: {outcome.name}{reason}")
+
     flight = fly(
         FlightOptions(
             mission=mission,
@@ -131,14 +144,9 @@ def fly_command(
             force=force,
             overwrite=overwrite,
             limit_s=limit_s,
-        )
+        ),
+        told,
     )
-    if as_json:
-        print_json(flight.record)
-    elif not quiet:
-        print_record(flight.record)
-    reason = f": {flight.outcome.reason}" if flight.outcome.reason else ""
-    say(f"{mission}: {flight.outcome.name}{reason}")
     if not as_json:
         click.echo(f"report: {flight.out / 'report.html'}")
     return flight.exit_code

@@ -14,7 +14,7 @@ from gcs.errors import EXIT_DONE, EXIT_ERROR
 @json_option
 def missions_command(as_json: bool) -> None:
     """List the shipped missions."""
-    from gcs.workflows.check_mission import load
+    from gcs.workflows.mission_file import load
     from missions.fileformat import shipped
 
     missions = [load(name) for name in shipped()]

@@ -39,50 +39,57 @@ def load_meta(path: Path) -> FlightMeta:
 
 
 def build_report(
-    tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None, progress: Progress | None = None
+    tlog_path: Path,
+    out_dir: Path,
+    meta: FlightMeta | None = None,
+    progress: Progress | None = None,
+    figures: Callable[[Record], None] | None = None,
 ) -> Record:
     """Writes summary.json, meta.json, flight.parquet, the pictures and report.html; returns the record.
 
-    Without `meta`, meta.json beside the log is read. A log that is cut short, empty or of a lost flight
-    gives a record all the same, with None for what cannot be known.
+    `figures` is given the record as soon as it stands, before what takes longer. Without `meta`, meta.json
+    beside the log is read. A log that is cut short, empty or of a lost flight gives a record all the same,
+    with None for what cannot be known.
     """
-    from gcs.analysis.parquet import write_flight
-    from gcs.report.html import render_page
-    from gcs.report.plots import PICTURES, Picture, View, draw_pictures
+    from gcs.report.draw import Drawing
+    from gcs.report.plots import PICTURES, View
 
     tell = progress or (lambda done, total, text: None)
-    total = len(PICTURES) + 3
     if not tlog_path.is_file():
         raise ReportError(f"{tlog_path}: no such file; give a .tlog that `gcs fly` or `gcs capture` wrote")
     meta = load_meta(tlog_path.parent / META_FILE) if meta is None else meta
     out_dir.mkdir(parents=True, exist_ok=True)
 
-    tell(0, total, "reading telemetry")
+    ahead = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in PICTURES), PAGE_FILE]
+    total = len(ahead)
+
+    def done(step: str) -> None:
+        ahead.remove(step)
+        tell(total - len(ahead), total, ahead[0] if ahead else "done")
+
+    tell(0, total, ahead[0])
     telemetry = load_telemetry(tlog_path)
     samples = samples_of(telemetry)
     record = flight_record(telemetry, meta, samples)
     record["report_dir"] = str(out_dir)
     _write_json(out_dir / META_FILE, meta.to_json())
     _write_json(out_dir / SUMMARY_FILE, record)
+    done(ahead[0])
+    with Drawing(View(telemetry, samples, record, meta), out_dir) as drawing:
+        if figures is not None:
+            figures(record)
 
-    tell(1, total, PARQUET_FILE)
-    # where the directory lies is no property of the flight
-    about = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
-    write_flight(out_dir / PARQUET_FILE, telemetry, samples, about)
+        from gcs.analysis.parquet import write_flight
+        from gcs.report.html import render_page
 
-    done = 2
-    tell(done, total, PICTURES[0].file)
-
-    def drawn(picture: Picture) -> None:
-        nonlocal done
-        done += 1
-        follows = PICTURES.index(picture) + 1
-        tell(done, total, PICTURES[follows].file if follows < len(PICTURES) else PAGE_FILE)
-
-    draw_pictures(View(telemetry, samples, record, meta), out_dir, drawn)
+        # where the directory lies is no property of the flight
+        about = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
+        write_flight(out_dir / PARQUET_FILE, telemetry, samples, about)
+        done(PARQUET_FILE)
+        drawing.finish(lambda picture: done(picture.file))
     page = render_page(record, meta, telemetry.texts, out_dir)
     (out_dir / PAGE_FILE).write_text(page, encoding="utf-8")
-    tell(total, total, "done")
+    done(PAGE_FILE)
     return record
 
 

@@ -34,7 +34,6 @@ from gcs.report.style import (
     phase_spans,
     rows,
     save,
-    style,
     true_spans,
 )
 from gcs.report.track import draw_track
@@ -388,11 +387,3 @@ PICTURES: tuple[Picture, ...] = (
     Picture("rotors", "Rotor forces with their limits; red where a limit cut the command.", rotors),
     Picture("tension", "Cable tension over the whole flight; black where the cable is slack.", tension),
 )
-
-
-def draw_pictures(view: View, directory: Path, done: Callable[[Picture], None]) -> None:
-    """Writes every picture into `directory`; `done` is told after each."""
-    with style():
-        for picture in PICTURES:
-            picture.draw(view, directory / picture.file)
-            done(picture)

@@ -167,6 +167,37 @@ class FlightDisplay(LiveBars):
         return "  ".join(word for word in words if word)
 
 
+class CompileDisplay(LiveBars):
+    """What is being compiled, kernel by kernel, and how many parts remain."""
+
+    _transient = True
+
+    def update(self, running: Mapping[str, str], remain: int, total: int) -> None:
+        """Show the kernel of each running part by the part's title, and that `remain` of `total` parts are
+        not done."""
+        self._show(
+            lambda: {
+                "all": {
+                    "description": "compiling the flight software, once",
+                    "completed": total - remain,
+                    "total": total,
+                    "kernel": f"{remain} of {total} parts remain",
+                },
+                **{
+                    title: {"description": f"  {title}", "completed": 0, "total": None, "kernel": kernel}
+                    for title, kernel in running.items()
+                },
+            },
+            lambda: f"compiling {', '.join(running)}; {remain} of {total} parts remain",
+            " ".join(running),
+        )
+
+    def columns(self) -> tuple[ProgressColumn | str, ...]:
+        from rich.progress import BarColumn, TimeElapsedColumn
+
+        return ("{task.description}", BarColumn(bar_width=16), TimeElapsedColumn(), "{task.fields[kernel]}")
+
+
 class StepDisplay(LiveBars):
     """A bar for any other step that takes more than half a second; there is no plain line."""
 

@@ -9,17 +9,9 @@ from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.wire.convert import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
+from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
-from missions.fileformat import MissionFileError, load_mission
 from missions.model import Mission
-
-
-def load(name_or_path: str) -> Mission:
-    """The mission; GcsError says what is wrong with it."""
-    try:
-        return load_mission(name_or_path)
-    except MissionFileError as error:
-        raise GcsError(str(error)) from None
 
 
 def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
@@ -56,22 +48,23 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool) -> Check:
     return Check(mission.name, vehicle, tuple(found), tuple(reports))
 
 
-def load_checked(name_or_path: str, vehicle: str, force: bool, shaped: bool = True) -> Mission:
+def load_checked(name_or_path: str, vehicle: str, force: bool) -> Mission:
     """The mission, which the vehicle can fly unless `force` says that it need not."""
     mission = load(name_or_path)
     if force:
         return mission
-    _refuse(mission, vehicle, shaped)
+    refuse_unflyable(mission, vehicle)
     return mission
 
 
 def check_items(name: str, items: Sequence[WireItem], home: Home, vehicle: str) -> None:
     """GcsError unless the vehicle can fly what the items stand for."""
     steps = decode_items(items, home)
-    _refuse(Mission(name, name, "", (), steps), vehicle, True)
+    refuse_unflyable(Mission(name, name, "", (), steps), vehicle, True)
 
 
-def _refuse(mission: Mission, vehicle: str, shaped: bool) -> None:
+def refuse_unflyable(mission: Mission, vehicle: str, shaped: bool = True) -> None:
+    """GcsError unless the vehicle can fly the mission."""
     found = violations(mission, vehicle, shaped)
     if found:
         listed = "; ".join(map(str, found))

@@ -15,7 +15,7 @@ from gcs.shell.stopping import StopRequest
 
 _WAIT_S = 0.2
 _TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to those who must be punctual
-START_LIMIT_S = 600.0  # the very first start compiles the kernels, which takes its time on a busy machine
+START_LIMIT_S = 60.0  # some seconds on an idle machine; all kernels are compiled before
 SILENCE_LIMIT_S = 20.0  # of a vehicle in lockstep that was there before
 
 Ended = Callable[[], str]  # why a process of ours has ended, or empty

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from autopilot.vehicle.file import VEHICLES
 from autopilot.wire.tlog import TlogWriter
-from gcs.analysis.record import FlightMeta, Record
-from gcs.clients.flight import Outcome
 from gcs.errors import (
     EXIT_DONE,
     EXIT_ERROR,
@@ -20,14 +21,20 @@ from gcs.errors import (
     StoppedError,
 )
 from gcs.shell.display import say
+from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.check_mission import load_checked
-from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.flight_options import FlightOptions, setting_of
-from gcs.workflows.own_flight import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, Stopwatch, fly_own
+from gcs.workflows.mission_file import load
+from gcs.workflows.own_vehicle import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
 from gcs.workflows.report import TLOG_FILE, make_report
-from gcs.workflows.running_flight import fly_running
+from gcs.workflows.stopwatch import Stopwatch
+from gcs.workflows.warmup import warm_up
 from missions.model import Mission
+from sitl.sensors.shipped import PROFILES
+
+if TYPE_CHECKING:
+    from gcs.analysis.record import FlightMeta, Record
+    from gcs.clients.flight import FlightClient, Outcome
 
 _EXIT = {
     "completed": EXIT_DONE,
@@ -37,6 +44,8 @@ _EXIT = {
     "refused": EXIT_ERROR,
     "lost": EXIT_ERROR,
 }
+
+Told = Callable[["Record", "Outcome"], None]
 
 
 @dataclass(frozen=True)
@@ -53,40 +62,100 @@ class Flight:
         return EXIT_INTERRUPTED if self.stopped else _EXIT[self.outcome.name]
 
 
-def fly(options: FlightOptions) -> Flight:
-    """The whole flight; GcsError if there was none."""
-    if options.connect is None:
+def fly(options: FlightOptions, told: Told) -> Flight:
+    """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
+    the report are drawn."""
+    if options.connect is None and not _as_shipped(options):
+        from gcs.workflows.flight_inputs import check_flight_inputs
+
         check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings))
-    mission = load_checked(
-        options.mission, options.vehicle, options.force or options.tries_anyway, options.law == "plumbline"
-    )
+    mission = load(options.mission)
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    hint = "stopping; Ctrl-C again abandons the report"
-    with _Folder(out, options.overwrite) as folder, StopRequest(hint) as stop:
-        watch = Stopwatch()
-        tlog = out / TLOG_FILE
-        with tlog.open("wb") as file:
-            log = TlogWriter(file)
-            if options.connect is not None:
-                client = fly_running(mission, options, options.connect, log, stop, watch)
-            else:
-                client = fly_own(mission, options, log, out, stop, watch)
-        wall_s = watch.stop()
-        outcome = client.outcome or Outcome("interrupted")
-        if tlog.stat().st_size == 0:
-            if stop:
-                raise StoppedError("stopped before the vehicle said anything")
-            raise GcsError(outcome.reason or "the vehicle said nothing")
-        folder.keep()
-        try:
-            record = make_report(tlog, out, _meta(mission, options, outcome, wall_s), options.quiet)
-        except KeyboardInterrupt:
-            say(f"report abandoned; the telemetry is in {tlog}")
-            raise
-        return Flight(outcome, record, out, bool(stop))
+    with _Folder(out, options.overwrite) as folder:
+        if options.connect is None:
+            warm_up((options.law,), options.quiet)
+        with StopRequest("stopping; Ctrl-C again abandons the report") as stop:
+            watch = Stopwatch()
+            tlog = out / TLOG_FILE
+            with tlog.open("wb") as file:
+                log = TlogWriter(file)
+                if options.connect is None:
+                    client = _fly_own(mission, options, log, out, stop, watch)
+                else:
+                    client = _fly_running(mission, options, options.connect, log, stop, watch)
+            return _end(mission, options, client, watch.stop(), out, folder, stop, told)
+
+
+def _as_shipped(options: FlightOptions) -> bool:
+    """Nothing is asked for that could be refused; to know more, most of the simulator would be loaded."""
+    return (
+        options.vehicle in VEHICLES.names() and options.sensors in PROFILES.names() and not options.settings
+    )
+
+
+def _fly_own(
+    mission: Mission, options: FlightOptions, log: TlogWriter, out: Path, stop: StopRequest, watch: Stopwatch
+) -> FlightClient:
+    with own_vehicle(options, out) as own:
+        from gcs.workflows.own_flight import fly_own  # while they load
+
+        _check(mission, options)
+        return fly_own(mission, options, log, own, stop, watch)
+
+
+def _fly_running(
+    mission: Mission,
+    options: FlightOptions,
+    address: Address,
+    log: TlogWriter,
+    stop: StopRequest,
+    watch: Stopwatch,
+) -> FlightClient:
+    from gcs.workflows.running_flight import fly_running
+
+    _check(mission, options)
+    return fly_running(mission, options, address, log, stop, watch)
+
+
+def _check(mission: Mission, options: FlightOptions) -> None:
+    """GcsError unless the vehicle can fly it, or need not."""
+    if not (options.force or options.tries_anyway):
+        from gcs.workflows.check_mission import refuse_unflyable
+
+        refuse_unflyable(mission, options.vehicle, options.law == "plumbline")
+
+
+def _end(
+    mission: Mission,
+    options: FlightOptions,
+    client: FlightClient,
+    wall_s: float,
+    out: Path,
+    folder: _Folder,
+    stop: StopRequest,
+    told: Told,
+) -> Flight:
+    from gcs.clients.flight import Outcome
+
+    outcome = client.outcome or Outcome("interrupted")
+    tlog = out / TLOG_FILE
+    if tlog.stat().st_size == 0:
+        if stop:
+            raise StoppedError("stopped before the vehicle said anything")
+        raise GcsError(outcome.reason or "the vehicle said nothing")
+    folder.keep()
+    try:
+        meta = _meta(mission, options, outcome, wall_s)
+        record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
+    except KeyboardInterrupt:
+        say(f"report abandoned; the telemetry is in {tlog}")
+        raise
+    return Flight(outcome, record, out, bool(stop))
 
 
 def _meta(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: float) -> FlightMeta:
+    from gcs.analysis.record import FlightMeta
+
     own = options.connect is None
     settings: dict[str, float | str] = {}
     for setting in options.settings:

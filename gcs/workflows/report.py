@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from gcs.analysis.record import FlightMeta, Record
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
+
+if TYPE_CHECKING:
+    from gcs.analysis.record import FlightMeta, Record
 
 TLOG_FILE = "flight.tlog"  # in a directory of gcs fly or gcs capture
 
 
-def make_report(tlog: Path, out: Path, meta: FlightMeta | None, quiet: bool) -> Record:
-    """Make it in `out`; without `meta`, what stands in meta.json beside the log is taken."""
+def make_report(
+    tlog: Path,
+    out: Path,
+    meta: FlightMeta | None,
+    quiet: bool,
+    figures: Callable[[Record], None] | None = None,
+) -> Record:
+    """Make it in `out`; without `meta`, what stands in meta.json beside the log is taken. `figures` is given
+    the record before the pictures are drawn."""
     from gcs.report.build import ReportError, build_report
 
     with StepDisplay("report", quiet) as display:
         try:
-            return build_report(tlog, out, meta, display.update)
+            return build_report(tlog, out, meta, display.update, figures)
         except ReportError as error:
             raise GcsError(str(error)) from None
         except OSError as error:

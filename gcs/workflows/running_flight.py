@@ -16,7 +16,8 @@ from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.flight_loops import run_wall_clock
 from gcs.workflows.flight_options import FlightOptions
-from gcs.workflows.own_flight import Stopwatch, flight_client
+from gcs.workflows.own_flight import flight_client
+from gcs.workflows.stopwatch import Stopwatch
 from missions.model import Mission
 
 

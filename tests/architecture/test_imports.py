@@ -30,6 +30,7 @@ GCS = (
     "autopilot.geometry",
     "autopilot.trajectory",
     "autopilot.wire",
+    "autopilot.shell.compiling",
     "autopilot.shell.options",
     *VEHICLE,
     "autopilot.vehicle.parameters",
@@ -75,7 +76,13 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "sitl.settings": ("autopilot.geometry", "autopilot.wire"),
     "sitl.world": ("autopilot.geometry", "sitl.plant", "sitl.sensors", "sitl.settings"),
     "sitl.sim_core": ("autopilot.geometry", "sitl.plant", "sitl.sensors", "sitl.settings", "sitl.world"),
-    "sitl": ("autopilot.geometry", "autopilot.wire", "autopilot.shell.options", *VEHICLE),
+    "sitl": (
+        "autopilot.geometry",
+        "autopilot.wire",
+        "autopilot.shell.compiling",
+        "autopilot.shell.options",
+        *VEHICLE,
+    ),
     "gcs": GCS,
     "gcs.workflows.flight_inputs": (
         *GCS,

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from fastcrc.crc16 import mcrf4xx
+from hypothesis import given
+from hypothesis import strategies as st
 
-from autopilot.core.sensor_inbox import Tick, fill, read_tick
+from autopilot.core.sensor_inbox import SensorInbox
 from autopilot.estimation import inbox as box
 from autopilot.estimation.records import DirectionReading, GnssReading, ImuReading, LoadReading, PoseReading
 from autopilot.geometry.packed import unpack
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import (
     MAG,
     PRESSURE,
+    HilGps,
     Home,
     hil_gps_message,
     hil_sensor_message,
@@ -43,13 +48,43 @@ def gps(fix_type: int) -> bytes:
     return WRITER.frame(message)
 
 
-def tick_of(*datagrams: bytes) -> Tick:
-    tick = read_tick(b"".join(datagrams), HOME)
+KINDS = {
+    box.IMU: ImuReading,
+    box.POSE: PoseReading,
+    box.LOAD: LoadReading,
+    box.FIX: GnssReading,
+    box.DIRECTION: DirectionReading,
+}
+
+
+class Read(NamedTuple):
+    """A tick with its readings as (kind, instant shown in us, record or numbers)."""
+
+    now_us: int
+    readings: list[tuple[int, int, Any]]
+    imu: ImuReading | None
+    gps: HilGps | None
+    fields_updated: int
+    aside: tuple[Any, ...]
+
+
+def reading_in(row: np.ndarray) -> tuple[int, int, Any]:
+    kind, shows_us = int(row[box.KIND]), int(row[box.SHOWS])
+    if kind in KINDS:
+        return kind, shows_us, unpack(KINDS[kind], row, box.READING)
+    return kind, shows_us, tuple(row[box.READING : box.READING + (1 if kind == box.HEIGHT else 3)])
+
+
+def tick_of(*datagrams: bytes, rows: int = box.ROOM) -> Read:
+    inbox = SensorInbox(HOME, box.new_inbox(rows))
+    tick = inbox.read(b"".join(datagrams), -1)
     assert tick is not None
-    return tick
+    readings = [reading_in(row) for row in inbox.rows[: tick.readings]]
+    gps = unpack(HilGps, inbox.fix, 0) if tick.fixed else None
+    return Read(tick.now_us, readings, inbox.sample, gps, tick.fields_updated, tick.aside)
 
 
-def record(tick: Tick, kind: int) -> tuple[int, object]:
+def record(tick: Read, kind: int) -> tuple[int, object]:
     """The only reading of this kind: the instant it shows, and its record."""
     ((_, shows_us, found),) = (reading for reading in tick.readings if reading[0] == kind)
     return shows_us, found
@@ -74,7 +109,7 @@ HEARTBEAT = WRITER.frame(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3))
 
 @pytest.mark.parametrize("datagram", [b"", b"\x00\xff" * 40, HEARTBEAT, POSE, sensor()[:-1]])
 def test_without_a_whole_sensor_message_there_is_no_tick(datagram: bytes) -> None:
-    assert read_tick(datagram, HOME) is None
+    assert SensorInbox(HOME, box.new_inbox()).read(datagram, -1) is None
 
 
 def test_the_sensor_message_is_the_clock_and_the_inertial_sample() -> None:
@@ -163,25 +198,77 @@ def test_other_messages_are_put_aside() -> None:
     assert [message.get_type() for message in tick.aside] == ["HEARTBEAT"]
 
 
-def test_the_inbox_holds_what_the_tick_says() -> None:
-    tick = tick_of(POSE, TRACKED_LOAD, SEEN_LOAD, gps(6), sensor(PRESSURE | MAG))
-    inbox = fill(box.new_inbox(), tick)
-    assert len(inbox) == box.ROOM
-    kinds = {box.IMU: ImuReading, box.POSE: PoseReading, box.LOAD: LoadReading}
-    kinds |= {box.FIX: GnssReading, box.DIRECTION: DirectionReading}
-    assert len(tick.readings) == 7
-    for row, (kind, shows_us, reading) in zip(inbox, tick.readings, strict=False):
-        assert row[box.KIND] == kind
-        if kind in kinds:
-            assert row[box.SHOWS] == shows_us
-            assert unpack(kinds[kind], row, box.READING) == reading
-        else:
-            assert tuple(row[box.READING : box.READING + len(reading)]) == reading
+def test_readings_are_absorbed_in_this_order() -> None:
+    tick = tick_of(gps(6), POSE, TRACKED_LOAD, sensor(PRESSURE | MAG), SEEN_LOAD)
+    kinds = [kind for kind, _, _ in tick.readings]
+    assert kinds == [box.POSE, box.LOAD, box.DIRECTION, box.IMU, box.FIX, box.HEIGHT, box.FIELD]
 
 
 def test_an_inbox_grows_to_what_a_tick_brings_and_is_kept_otherwise() -> None:
-    inbox = box.new_inbox()
-    assert fill(inbox, tick_of(POSE, sensor())) is inbox
-    larger = fill(inbox, tick_of(*[POSE] * 40, sensor(0)))
-    assert len(larger) >= 41
-    assert np.count_nonzero(larger[:, box.KIND] == box.POSE) == 40
+    rows = box.new_inbox()
+    inbox = SensorInbox(HOME, rows)
+    assert inbox.read(POSE + sensor(), -1) is not None
+    assert inbox.rows is rows
+    tick = inbox.read(b"".join([*[POSE] * 40, sensor(0)]), -1)
+    assert tick is not None
+    assert tick.readings == 41
+    assert len(inbox.rows) >= 41
+    assert np.count_nonzero(inbox.rows[:, box.KIND] == box.POSE) == 40
+
+
+def test_only_a_later_tick_changes_the_sample_and_the_fix_that_are_kept() -> None:
+    inbox = SensorInbox(HOME, box.new_inbox())
+    assert inbox.sample is None
+    inbox.read(gps(3) + sensor(0), -1)
+    kept, fix = inbox.sample, inbox.fix.copy()
+    assert kept is not None
+    again = inbox.read(gps(6) + sensor(0, (5.0, 5.0, 5.0)), NOW_US)
+    assert again is not None
+    assert again.now_us == NOW_US
+    assert inbox.sample == kept
+    assert np.array_equal(inbox.fix, fix)
+
+
+# ---- frames that are not plain are read by the general decoder, and say the same
+
+
+def version_1(frame: bytes) -> bytes:
+    """The frame of a message with an id below 256 as MAVLink 1 has it."""
+    received = decode(frame)[0][0].message
+    payload = frame[10:-2].ljust(type(received).unpacker.size, b"\0")
+    head = bytes((0xFE, len(payload), *frame[4:8]))
+    checked = head[1:] + payload + bytes((received.crc_extra,))
+    return head + payload + mcrf4xx(checked).to_bytes(2, "little")
+
+
+WHOLE = (POSE, TRACKED_LOAD, SEEN_LOAD, gps(6), sensor(PRESSURE | MAG))
+
+
+@pytest.mark.parametrize(
+    "datagram",
+    [
+        b"\x00" + b"".join(WHOLE),
+        b"".join(WHOLE) + b"\xfd",
+        b"".join((*WHOLE[:2], b"\xfd\x03rubbish", *WHOLE[2:])),
+        b"".join((*WHOLE[:2], POSE[:-1] + b"\x00", *WHOLE[2:])),
+        b"".join((*WHOLE[:4], version_1(WHOLE[4]))),
+        b"".join((*WHOLE, HEARTBEAT)),
+    ],
+    ids=["rubbish before", "rubbish behind", "rubbish between", "wrong checksum", "version 1", "a heartbeat"],
+)
+def test_what_surrounds_the_frames_of_the_sensors_changes_no_reading(datagram: bytes) -> None:
+    expected, found = tick_of(*WHOLE), tick_of(datagram)
+    assert len(expected.readings) == 7
+    assert found._replace(aside=()) == expected._replace(aside=())
+
+
+@given(at=st.integers(0, len(b"".join(WHOLE)) - 1), to=st.integers(0, 255), cut=st.integers(0, 400))
+def test_damaged_datagrams_give_what_the_general_decoder_finds(at: int, to: int, cut: int) -> None:
+    damaged = bytearray(b"".join(WHOLE))
+    damaged[at] = to
+    datagram = bytes(damaged[: max(len(damaged) - cut, 0)])
+    sound = b"".join(one.frame for one in decode(datagram)[0])
+    inbox, other = (SensorInbox(HOME, box.new_inbox()) for _ in range(2))
+    found, expected = inbox.read(datagram, -1), other.read(sound, -1)
+    assert (found and found.readings) == (expected and expected.readings)
+    assert np.array_equal(inbox.rows, other.rows, equal_nan=True)

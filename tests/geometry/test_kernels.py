@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from autopilot.geometry import frames, kernel, linear, s2, so3
+from autopilot.geometry import frames, linear, machine_code, s2, so3
 
 SAMPLES = 50
 
@@ -94,7 +94,7 @@ def test_machine_code_is_stale_after_a_change_in_whatever_it_can_reach(
         for name, text in files.items():
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_text(text)
-        return kernel.sources_hash(root / "autopilot/law.py", root)
+        return machine_code.sources_hash(root / "autopilot/law.py", root)
 
     before = hashed(tmp_path / "before")
     assert hashed(tmp_path / "copy") == before

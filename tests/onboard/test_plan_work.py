@@ -1,9 +1,11 @@
-"""Paths that take long to prepare are left to another while the vehicle flies."""
+"""Paths take long to prepare: they are left to another where the clock does not wait."""
 
 from __future__ import annotations
 
 from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import PENDING
+from autopilot.trajectory.shaping import Shaped
+from autopilot.trajectory.waypoint_path import Passage
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
@@ -33,6 +35,33 @@ def upload(craft: Craft, *steps: Takeoff | Delay | Signals | Land) -> None:
     craft.run(taken)
     assert operation.result is not None
     assert operation.result.status is Status.DONE
+
+
+def test_on_the_ground_too_paths_are_left_to_another_where_the_clock_does_not_wait() -> None:
+    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+    onboard = craft.onboard
+    craft.wait(1.0)
+    upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
+    assert onboard.work is not None
+    assert craft.flight.mission.plan.prepared.pending
+    onboard.finish(onboard.work, onboard.work.done())
+    assert not craft.flight.mission.plan.prepared.pending
+    upload(craft)
+    assert onboard.work is None, "a mission without steps has no paths"
+
+
+def test_where_the_clock_waits_paths_are_made_at_once() -> None:
+    craft = Craft(CTL_LAW=PLUMBLINE)
+    craft.wait(1.0)
+    upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
+    assert craft.onboard.work is None
+    assert not craft.flight.mission.plan.prepared.pending
+
+
+def test_the_rehearsal_of_another_is_work_that_can_be_done() -> None:
+    prepared = Craft(CTL_LAW=PLUMBLINE).onboard.rehearsal.done()
+    assert not prepared.refusal
+    assert {type(path) for path in prepared.made} >= {Passage, Shaped}
 
 
 def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
+from autopilot.geometry.packed import unpack
 from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
 from sitl.hil import HilSimulator
@@ -16,18 +17,62 @@ from sitl.settings import settings_of
 from sitl.sim_core import SimCore
 from sitl.vehicles.sim_parameters import apply, sim_parameters
 from sitl.vehicles.truth import load_truth
+from sitl.world import FITTED, READING, READINGS, SENSORS, SHOWS, arrived
 
 Forces = tuple[float, float, float, float]
 
 
-def build_core(profile: str = "ideal", seed: int = 1, vehicle: str = "thesis", **settings: float) -> SimCore:
+class Measurement(NamedTuple):
+    """A reading and the instant it shows."""
+
+    time_us: int
+    reading: Any
+
+
+class Readings(NamedTuple):
+    """What leaves the sensors at one tick, in the order of the world's rows; nothing new: an empty tuple."""
+
+    imu: tuple[Measurement, ...]
+    mocap: tuple[Measurement, ...]
+    load_tracker: tuple[Measurement, ...]
+    cable_sensor: tuple[Measurement, ...]
+    gnss: tuple[Measurement, ...]
+    barometer: tuple[Measurement, ...]
+    magnetometer: tuple[Measurement, ...]
+
+
+class ReadCore(SimCore):
+    """A core whose readings are taken out at every tick, as records."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self._take_out()
+
+    def tick(self, command: Forces, gripper_open: bool = False, reel_rate: float = 0.0) -> Readings:
+        super().tick(command, gripper_open, reel_rate)
+        return self._take_out()
+
+    def _take_out(self) -> Readings:
+        return Readings(*(self._arrivals(sensor) for sensor in range(SENSORS)))
+
+    def _arrivals(self, sensor: int) -> tuple[Measurement, ...]:
+        if not self.rows.clock[sensor, FITTED]:
+            return ()
+        found = []
+        while (at := arrived(sensor, self.now_us, self.rows)) >= 0:
+            row = self.rows.queue[sensor, at]
+            found.append(Measurement(int(row[SHOWS]), unpack(READINGS[sensor], row, READING)))
+        return tuple(found)
+
+
+def build_core(profile: str = "ideal", seed: int = 1, vehicle: str = "thesis", **settings: float) -> ReadCore:
     """A core; `profile` is a shipped name or the text of a TOML file."""
     truth = load_truth(vehicle)
     table = sim_parameters(truth)
     for name, value in settings.items():
         table.set(name, value)
     fitted = parse_profile(profile, "test.toml") if "\n" in profile else load_profile(profile)
-    return SimCore(apply(truth, table), fitted, settings_of(table), seed)
+    return ReadCore(apply(truth, table), fitted, settings_of(table), seed)
 
 
 def lift(core: SimCore) -> SimCore:

@@ -12,7 +12,8 @@ from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from sitl.hil import COMMAND_TIMEOUT_US, HilSimulator, PacingFigures, pressure_pa
+from sitl.hil import COMMAND_TIMEOUT_US, HilSimulator, PacingFigures
+from sitl.messages import pressure_pa
 
 PROFILES = ["gps", "ideal", "lab", "rtk"]
 # float32 keeps 24 bits: at 4 m, half a unit in the last place is 2.4e-7 m

@@ -38,6 +38,16 @@ def test_summary() -> None:
     assert pacing.summary(4) == ("250.00 ticks/s, late p50 3 p99 3 max 3 us, 4 of 101 commands missed")
 
 
+def test_ticks_that_begin_a_whole_tick_late_are_stalls_of_the_machine() -> None:
+    pacing = Pacing(speed=1.0)
+    for tick in range(100):
+        late = {10: 3_999_999, 20: 4_000_000, 30: 50_000_000}.get(tick, 0)
+        pacing.record(tick * SECOND // 250, tick * SECOND // 250 + late)
+    assert pacing.summary(3).endswith(
+        "3 of 100 commands missed; the machine stalled 2 times for a tick or longer"
+    )
+
+
 def test_a_tick_before_its_time_is_not_late() -> None:
     pacing = Pacing(speed=1.0)
     pacing.record(1000, 0)

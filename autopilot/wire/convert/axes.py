@@ -1,6 +1,7 @@
 """The changes of axes of `autopilot.geometry.frames` for messages, which are made in Python.
 
 They are the same functions without their machine code, to enter which costs more than to turn three numbers.
+Kernels may call them as well.
 """
 
 from __future__ import annotations
@@ -8,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from numba.extending import register_jitable
+
 from autopilot.geometry import frames
 from autopilot.geometry.linear import Vec3
 
 
 def _in_python(compiled: Any) -> Any:
-    return getattr(compiled, "py_func", compiled)
+    return register_jitable(getattr(compiled, "py_func", compiled))
 
 
 ned_from_enu: Callable[[Vec3], Vec3] = _in_python(frames.ned_from_enu)

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from numba.extending import register_jitable
+
 from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.codec import Fields, layout_of
@@ -37,7 +39,8 @@ class LoadState(NamedTuple):
     slack_events: int
 
 
-def load_state_message(
+@register_jitable
+def load_state_values(
     time_us: int,
     source: int,
     x_load: Vec3,
@@ -48,9 +51,10 @@ def load_state_message(
     tension: float,
     taut: bool,
     slack_events: int,
-) -> Fields:
-    """LOAD_STATE, see `LoadState`."""
-    return _LOAD_STATE, (
+) -> tuple[float, ...]:
+    """LOAD_STATE, see `LoadState`: the numbers in the order of the wire."""
+    pulls = 1 if taut else 0
+    return (
         time_us,
         *ned_from_enu(x_load),
         *ned_from_enu(v_load),
@@ -59,9 +63,14 @@ def load_state_message(
         distance,
         tension,
         uint16(slack_events),
-        1 if taut else 0,
+        pulls,
         source,
     )
+
+
+def load_state_message(*record: Any) -> Fields:
+    """LOAD_STATE, see `LoadState`."""
+    return _LOAD_STATE, load_state_values(*record)
 
 
 def read_load_state(m: Any) -> LoadState:
@@ -241,11 +250,17 @@ class RotorState(NamedTuple):
     saturated: int
 
 
-def rotor_state_message(
+@register_jitable
+def rotor_state_values(
     time_us: int, source: int, forces: Forces, force_min: float, force_max: float, saturated: int
-) -> Fields:
+) -> tuple[float, ...]:
+    """ROTOR_STATE, see `RotorState`: the numbers in the order of the wire."""
+    return (time_us, *forces, force_min, force_max, saturated, source)
+
+
+def rotor_state_message(*record: Any) -> Fields:
     """ROTOR_STATE, see `RotorState`."""
-    return _ROTOR_STATE, (time_us, *forces, force_min, force_max, saturated, source)
+    return _ROTOR_STATE, rotor_state_values(*record)
 
 
 def read_rotor_state(m: Any) -> RotorState:

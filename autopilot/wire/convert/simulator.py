@@ -1,9 +1,17 @@
-"""The simulator link: HIL_SENSOR, ODOMETRY, LOAD_SENSOR, HIL_GPS down, HIL_ACTUATOR_CONTROLS up."""
+"""The simulator link: HIL_SENSOR, ODOMETRY, LOAD_SENSOR, HIL_GPS down, HIL_ACTUATOR_CONTROLS up.
+
+Both ends of it are machine code: `x_values` gives the numbers of a message in the order of the wire, arrays
+spread out, for `autopilot.wire.compiled` to write; `x_in`, and `read_x` where nothing can be missing, read
+its records as well as pymavlink's objects. There a vector that was not measured is NaN.
+"""
 
 from __future__ import annotations
 
 import math
+from itertools import islice
 from typing import Any, NamedTuple
+
+from numba.extending import register_jitable
 
 from autopilot.geometry.frames import (
     enu_from_ned,
@@ -32,8 +40,26 @@ _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 _NAN3: Vec3 = (math.nan, math.nan, math.nan)
 _GRIPPER, _WINCH = 4, 5  # HIL_ACTUATOR_CONTROLS has room for sixteen: behind the rotors
-_NO_CONTROLS = [0.0] * 10
+_NO_CONTROLS = (0.0,) * 10
 REEL_MAX = 2.0  # m/s, of a winch whose control is 1
+
+
+def _message(message_type: Any, values: tuple[float, ...]) -> Any:
+    """pymavlink's object of these numbers, which come in the order of the wire."""
+    numbers = iter(values)
+    lengths: list[int] = message_type.array_lengths
+    fields = [list(islice(numbers, length)) if length else next(numbers) for length in lengths]
+    return message_type(*(fields[place] for place in message_type.orders))
+
+
+def _or_nan(v: Vec3 | None) -> Vec3:
+    """A vector as it is sent."""
+    return _NAN3 if v is None else v
+
+
+def _or_none(v: Vec3 | None) -> Vec3 | None:
+    """A vector as it was measured."""
+    return None if v is None or math.isnan(v[0]) else v
 
 
 class HilSensor(NamedTuple):
@@ -50,7 +76,8 @@ class HilSensor(NamedTuple):
     sensor_id: int = 0
 
 
-def hil_sensor_message(
+@register_jitable
+def hil_sensor_values(
     time_us: int,
     accel_body: Vec3,
     gyro_body: Vec3,
@@ -60,9 +87,9 @@ def hil_sensor_message(
     temperature_degC: float,
     fields: int,
     sensor_id: int = 0,
-) -> Any:
+) -> tuple[float, ...]:
     """HIL_SENSOR, see `HilSensor`."""
-    return mavlink.MAVLink_hil_sensor_message(
+    return (
         time_us,
         *frd_from_flu(accel_body),
         *frd_from_flu(gyro_body),
@@ -76,6 +103,12 @@ def hil_sensor_message(
     )
 
 
+def hil_sensor_message(*record: Any) -> Any:
+    """HIL_SENSOR, see `HilSensor`."""
+    return _message(mavlink.MAVLink_hil_sensor_message, hil_sensor_values(*record))
+
+
+@register_jitable
 def read_hil_sensor(m: Any) -> HilSensor:
     """Inverse of `hil_sensor_message`."""
     return HilSensor(
@@ -105,10 +138,41 @@ class Odometry(NamedTuple):
     reset_counter: int = 0
 
 
-def _covariance(first: float, second: float) -> list[float]:
+@register_jitable
+def _covariance(first: float, second: float) -> tuple[float, ...]:
     """Upper triangle, row by row, of the 6x6 matrix diag(first, first, first, second, second, second)."""
-    a, b = first, second
-    return [a, 0, 0, 0, 0, 0, a, 0, 0, 0, 0, a, 0, 0, 0, b, 0, 0, b, 0, b]
+    a, b, o = first, second, 0.0
+    return (a, o, o, o, o, o, a, o, o, o, o, a, o, o, o, b, o, o, b, o, b)
+
+
+@register_jitable
+def odometry_values(
+    time_us: int,
+    position: Vec3,
+    quat_wxyz: Quat,
+    velocity: Vec3,
+    omega_body: Vec3,
+    position_std: float,
+    attitude_std: float,
+    velocity_std: float,
+    reset_counter: int = 0,
+) -> tuple[float, ...]:
+    """ODOMETRY, see `Odometry`. Position and velocity in MAV_FRAME_LOCAL_NED."""
+    stated = velocity_std * velocity_std if velocity[0] == velocity[0] else math.nan
+    return (
+        time_us,
+        *ned_from_enu(position),
+        *quat_ned_frd_from_enu_flu(quat_wxyz),
+        *ned_from_enu(velocity),
+        *frd_from_flu(omega_body),
+        *_covariance(position_std * position_std, attitude_std * attitude_std),
+        *_covariance(stated, math.nan),
+        mavlink.MAV_FRAME_LOCAL_NED,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        reset_counter,
+        mavlink.MAV_ESTIMATOR_TYPE_MOCAP,
+        100,
+    )
 
 
 def odometry_message(
@@ -117,41 +181,23 @@ def odometry_message(
     quat_wxyz: Quat,
     velocity: Vec3 | None,
     omega_body: Vec3 | None,
-    position_std: float,
-    attitude_std: float,
-    velocity_std: float,
-    reset_counter: int = 0,
+    *rest: Any,
 ) -> Any:
-    """ODOMETRY, see `Odometry`. Position and velocity in MAV_FRAME_LOCAL_NED."""
-    x, y, z = ned_from_enu(position)
-    return mavlink.MAVLink_odometry_message(
-        time_us,
-        mavlink.MAV_FRAME_LOCAL_NED,
-        mavlink.MAV_FRAME_LOCAL_NED,
-        x,
-        y,
-        z,
-        quat_ned_frd_from_enu_flu(quat_wxyz),
-        *(_NAN3 if velocity is None else ned_from_enu(velocity)),
-        *(_NAN3 if omega_body is None else frd_from_flu(omega_body)),
-        _covariance(position_std * position_std, attitude_std * attitude_std),
-        _covariance(math.nan if velocity is None else velocity_std * velocity_std, math.nan),
-        reset_counter,
-        mavlink.MAV_ESTIMATOR_TYPE_MOCAP,
-        100,
-    )
+    """ODOMETRY, see `Odometry`."""
+    values = odometry_values(time_us, position, quat_wxyz, _or_nan(velocity), _or_nan(omega_body), *rest)
+    return _message(mavlink.MAVLink_odometry_message, values)
 
 
-def read_odometry(m: Any) -> Odometry:
-    """Inverse of `odometry_message`."""
-    measured = not math.isnan(m.velocity_covariance[0])
+@register_jitable
+def odometry_in(m: Any) -> Any:
+    """What an ODOMETRY says."""
     q = m.q
     return Odometry(
         m.time_usec,
         enu_from_ned((m.x, m.y, m.z)),
         quat_enu_flu_from_ned_frd((q[0], q[1], q[2], q[3])),
-        enu_from_ned((m.vx, m.vy, m.vz)) if measured else None,
-        None if math.isnan(m.rollspeed) else flu_from_frd((m.rollspeed, m.pitchspeed, m.yawspeed)),
+        _NAN3 if math.isnan(m.velocity_covariance[0]) else enu_from_ned((m.vx, m.vy, m.vz)),
+        flu_from_frd((m.rollspeed, m.pitchspeed, m.yawspeed)),
         _root(m.pose_covariance[0]),
         _root(m.pose_covariance[15]),
         _root(m.velocity_covariance[0]),
@@ -159,6 +205,13 @@ def read_odometry(m: Any) -> Odometry:
     )
 
 
+def read_odometry(m: Any) -> Odometry:
+    """Inverse of `odometry_message`."""
+    read: Odometry = odometry_in(m)
+    return read._replace(velocity=_or_none(read.velocity), omega_body=_or_none(read.omega_body))
+
+
+@register_jitable
 def _root(variance: float) -> float:
     return math.sqrt(variance) if variance >= 0.0 else math.nan
 
@@ -176,33 +229,30 @@ class LoadSensor(NamedTuple):
     sensor_id: int = 0
 
 
-def load_sensor_message(
+@register_jitable
+def load_sensor_values(
     time_us: int,
-    position: Vec3 | None,
-    velocity: Vec3 | None,
-    direction_body: Vec3 | None,
+    position: Vec3,
+    velocity: Vec3,
+    direction_body: Vec3,
     position_std: float,
     velocity_std: float,
     direction_std: float,
     sensor_id: int = 0,
-) -> Any:
+) -> tuple[float, ...]:
     """LOAD_SENSOR, see `LoadSensor`."""
     fields = 0
-    ned, velocity_ned, direction_frd = _NAN3, _NAN3, _NAN3
-    if position is not None:
+    if position[0] == position[0]:
         fields |= mavlink.PLUMBLINE_LOAD_POSITION
-        ned = ned_from_enu(position)
-    if velocity is not None:
+    if velocity[0] == velocity[0]:
         fields |= mavlink.PLUMBLINE_LOAD_VELOCITY
-        velocity_ned = ned_from_enu(velocity)
-    if direction_body is not None:
+    if direction_body[0] == direction_body[0]:
         fields |= mavlink.PLUMBLINE_LOAD_DIRECTION
-        direction_frd = frd_from_flu(direction_body)
-    return mavlink.MAVLink_load_sensor_message(
+    return (
         time_us,
-        *ned,
-        *velocity_ned,
-        *direction_frd,
+        *ned_from_enu(position),
+        *ned_from_enu(velocity),
+        *frd_from_flu(direction_body),
         position_std,
         velocity_std,
         direction_std,
@@ -211,17 +261,36 @@ def load_sensor_message(
     )
 
 
-def read_load_sensor(m: Any) -> LoadSensor:
-    """Inverse of `load_sensor_message`."""
+def load_sensor_message(
+    time_us: int, position: Vec3 | None, velocity: Vec3 | None, direction_body: Vec3 | None, *rest: Any
+) -> Any:
+    """LOAD_SENSOR, see `LoadSensor`."""
+    vectors = (_or_nan(position), _or_nan(velocity), _or_nan(direction_body))
+    return _message(mavlink.MAVLink_load_sensor_message, load_sensor_values(time_us, *vectors, *rest))
+
+
+@register_jitable
+def load_sensor_in(m: Any) -> Any:
+    """What a LOAD_SENSOR says."""
     return LoadSensor(
         m.time_usec,
-        enu_from_ned((m.x, m.y, m.z)) if m.fields & mavlink.PLUMBLINE_LOAD_POSITION else None,
-        enu_from_ned((m.vx, m.vy, m.vz)) if m.fields & mavlink.PLUMBLINE_LOAD_VELOCITY else None,
-        flu_from_frd((m.dx, m.dy, m.dz)) if m.fields & mavlink.PLUMBLINE_LOAD_DIRECTION else None,
+        enu_from_ned((m.x, m.y, m.z)) if m.fields & mavlink.PLUMBLINE_LOAD_POSITION else _NAN3,
+        enu_from_ned((m.vx, m.vy, m.vz)) if m.fields & mavlink.PLUMBLINE_LOAD_VELOCITY else _NAN3,
+        flu_from_frd((m.dx, m.dy, m.dz)) if m.fields & mavlink.PLUMBLINE_LOAD_DIRECTION else _NAN3,
         m.position_std,
         m.velocity_std,
         m.direction_std,
         m.sensor_id,
+    )
+
+
+def read_load_sensor(m: Any) -> LoadSensor:
+    """Inverse of `load_sensor_message`."""
+    read: LoadSensor = load_sensor_in(m)
+    return read._replace(
+        position=_or_none(read.position),
+        velocity=_or_none(read.velocity),
+        direction_body=_or_none(read.direction_body),
     )
 
 
@@ -237,7 +306,8 @@ class HilGps(NamedTuple):
     satellites: int
 
 
-def hil_gps_message(
+@register_jitable
+def hil_gps_values(
     time_us: int,
     fix_type: int,
     position: Vec3,
@@ -245,15 +315,13 @@ def hil_gps_message(
     horizontal_std: float,
     vertical_std: float,
     satellites: int,
-    *,
     home: Home,
-) -> Any:
+) -> tuple[float, ...]:
     """HIL_GPS, see `HilGps`."""
     latitude, longitude, altitude = geodetic_from_enu(position, home)
     north, east, down = ned_from_enu(velocity)
-    return mavlink.MAVLink_hil_gps_message(
+    return (
         time_us,
-        fix_type,
         latitude,
         longitude,
         altitude,
@@ -264,10 +332,19 @@ def hil_gps_message(
         int16(east * 100.0),
         int16(down * 100.0),
         course_cdeg(north, east),
+        fix_type,
         saturated(satellites, 0, 255),
+        0,  # the first receiver
+        0,  # no yaw
     )
 
 
+def hil_gps_message(*record: Any, home: Home) -> Any:
+    """HIL_GPS, see `HilGps`."""
+    return _message(mavlink.MAVLink_hil_gps_message, hil_gps_values(*(*record, home)))
+
+
+@register_jitable
 def read_hil_gps(m: Any, home: Home) -> HilGps:
     """Inverse of `hil_gps_message`."""
     return HilGps(
@@ -293,7 +370,8 @@ class HilStateQuaternion(NamedTuple):
     accel_body: Vec3  # specific force, m/s^2
 
 
-def hil_state_quaternion_message(
+@register_jitable
+def hil_state_quaternion_values(
     time_us: int,
     quat_wxyz: Quat,
     omega_body: Vec3,
@@ -301,22 +379,18 @@ def hil_state_quaternion_message(
     velocity: Vec3,
     airspeed: float,
     accel_body: Vec3,
-    *,
     home: Home,
-) -> Any:
+) -> tuple[float, ...]:
     """HIL_STATE_QUATERNION, see `HilStateQuaternion`."""
-    p, q, r = frd_from_flu(omega_body)
     latitude, longitude, altitude = geodetic_from_enu(position, home)
     north, east, down = ned_from_enu(velocity)
     ax, ay, az = frd_from_flu(accel_body)
     speed = uint16(airspeed * 100.0)
     mg = 1000.0 / STANDARD_GRAVITY
-    return mavlink.MAVLink_hil_state_quaternion_message(
+    return (
         time_us,
-        quat_ned_frd_from_enu_flu(quat_wxyz),
-        p,
-        q,
-        r,
+        *quat_ned_frd_from_enu_flu(quat_wxyz),
+        *frd_from_flu(omega_body),
         latitude,
         longitude,
         altitude,
@@ -329,6 +403,12 @@ def hil_state_quaternion_message(
         int16(ay * mg),
         int16(az * mg),
     )
+
+
+def hil_state_quaternion_message(*record: Any, home: Home) -> Any:
+    """HIL_STATE_QUATERNION, see `HilStateQuaternion`."""
+    values = hil_state_quaternion_values(*(*record, home))
+    return _message(mavlink.MAVLink_hil_state_quaternion_message, values)
 
 
 def read_hil_state_quaternion(m: Any, home: Home) -> HilStateQuaternion:
@@ -357,34 +437,54 @@ class HilActuatorControls(NamedTuple):
     reel_rate: float = 0.0  # m/s, at which the winch lets the cable out
 
 
-def hil_actuator_controls_message(
+@register_jitable
+def hil_actuator_controls_values(
     time_us: int,
     forces: Forces,
     armed: bool,
     lockstep: bool,
     gripper_open: bool = False,
     reel_rate: float = 0.0,
-) -> Any:
+) -> tuple[float, ...]:
     """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`: controls[i] = force of rotor i+1 / ROTOR_FMAX,
     controls[4] = 1 while the gripper that holds the cable is open, controls[5] = winch rate / REEL_MAX.
     """
-    controls = [force / ROTOR_FMAX for force in forces]
-    return mavlink.MAVLink_hil_actuator_controls_message(
+    flags = _LOCKSTEP if lockstep else 0
+    mode = _ARMED | _CUSTOM if armed else _CUSTOM
+    gripper = 1.0 if gripper_open else 0.0
+    return (
         time_us,
-        [*controls, 1.0 if gripper_open else 0.0, reel_rate / REEL_MAX, *_NO_CONTROLS],
-        _ARMED | _CUSTOM if armed else _CUSTOM,
-        _LOCKSTEP if lockstep else 0,
+        flags,
+        forces[0] / ROTOR_FMAX,
+        forces[1] / ROTOR_FMAX,
+        forces[2] / ROTOR_FMAX,
+        forces[3] / ROTOR_FMAX,
+        gripper,
+        reel_rate / REEL_MAX,
+        *_NO_CONTROLS,
+        mode,
     )
 
 
+def hil_actuator_controls_message(*record: Any) -> Any:
+    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`."""
+    return _message(mavlink.MAVLink_hil_actuator_controls_message, hil_actuator_controls_values(*record))
+
+
+@register_jitable
 def read_hil_actuator_controls(m: Any) -> HilActuatorControls:
     """Inverse of `hil_actuator_controls_message`."""
-    f1, f2, f3, f4 = m.controls[:4]
+    controls = m.controls
     return HilActuatorControls(
         m.time_usec,
-        (f1 * ROTOR_FMAX, f2 * ROTOR_FMAX, f3 * ROTOR_FMAX, f4 * ROTOR_FMAX),
-        bool(m.mode & _ARMED),
-        bool(m.flags & _LOCKSTEP),
-        m.controls[_GRIPPER] > 0.5,
-        m.controls[_WINCH] * REEL_MAX,
+        (
+            controls[0] * ROTOR_FMAX,
+            controls[1] * ROTOR_FMAX,
+            controls[2] * ROTOR_FMAX,
+            controls[3] * ROTOR_FMAX,
+        ),
+        (m.mode & _ARMED) != 0,
+        (m.flags & _LOCKSTEP) != 0,
+        controls[_GRIPPER] > 0.5,
+        controls[_WINCH] * REEL_MAX,
     )

@@ -3,7 +3,9 @@
 import io
 import json
 import math
+import os
 import re
+import signal
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -313,3 +315,31 @@ def test_snapshots_stand_apart():
     assert sorted(snapshots(path, 0.2)) == [0, 25, 50, 75, 100]
     assert snapshots(path[:1], 0.2) == [0]
     assert snapshots(path[:0], 0.2) == []
+
+
+def test_the_figures_are_told_before_the_pictures_are_drawn(tmp_path):
+    made = flights.case_b(duration_s=2.0).write(tmp_path / "flight.tlog")
+    told = []
+
+    def figures(record):
+        told.append((dict(record), (tmp_path / "summary.json").exists(), (tmp_path / "report.html").exists()))
+
+    record = build_report(made, tmp_path, figures=figures)
+    assert told == [(record, True, False)]
+
+
+def test_a_helper_that_dies_leaves_its_pictures_to_us(tmp_path, monkeypatch):
+    ours = os.getpid()
+
+    def only_here(draw):
+        def drawn(view, path):
+            if os.getpid() != ours:
+                signal.raise_signal(signal.SIGKILL)
+            draw(view, path)
+
+        return drawn
+
+    for picture in PICTURES:
+        monkeypatch.setattr(picture, "draw", only_here(picture.draw))
+    build_report(flights.case_b(duration_s=2.0).write(tmp_path / "flight.tlog"), tmp_path)
+    assert all((tmp_path / picture.file).stat().st_size for picture in PICTURES)

@@ -1,0 +1,112 @@
+"""Where the machine code of kernels is kept, and whether all of it is there; without numba, which is heavy.
+
+A directory is named by a hash over a source file and all files of this project that it imports, directly or
+not, so that a stale entry cannot be met and a change recompiles only what it can reach. Where the checkout
+lies does not enter the hash: a second clone of the same source finds the machine code of the first.
+
+Once a program has compiled all that a flight needs it leaves a mark (`mark_ready`), by which the next one
+knows (`is_ready`), before it has loaded anything, whether it will have to compile.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import re
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+ROOT = Path(__file__).resolve().parents[2]
+CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
+_IMPORT = re.compile(
+    rb"^\s*from\s+((?:autopilot|sitl|missions|gcs)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)", re.MULTILINE
+)
+_NAME = re.compile(rb"\w+")
+_CPU_INFO = Path("/proc/cpuinfo")
+_CPU_FIELDS = ("model name", "flags", "Features", "CPU implementer", "CPU part")
+
+
+@cache
+def _source(path: Path) -> bytes:
+    return path.read_bytes()
+
+
+@cache
+def _packages(path: Path, root: Path) -> tuple[Path, ...]:
+    """The files that make `path`, or what it lies in, packages of the project at `root`."""
+    inside = [parent for parent in (path, *path.parents) if parent.is_relative_to(root)]
+    return tuple(file for file in (parent / "__init__.py" for parent in inside) if file.is_file())
+
+
+@cache
+def _imported(path: Path, root: Path) -> frozenset[Path]:
+    """Files below `root` that the file imports itself."""
+    found: set[Path] = set()
+    for module, names in _IMPORT.findall(_source(path)):
+        base = root.joinpath(*module.decode().split("."))
+        found.update(_packages(base, root))
+        if base.is_dir():
+            parts = (base / name.decode() for name in _NAME.findall(names))
+            found.update(p for q in parts for p in (q.with_suffix(".py"), q / "__init__.py") if p.is_file())
+        elif base.with_suffix(".py").is_file():
+            found.add(base.with_suffix(".py"))
+    if b"iter_modules(__path__)" in _source(path):  # a package that finds its modules by itself
+        found.update(path.parent.glob("*.py"))
+    return frozenset(found)
+
+
+@cache
+def sources_hash(path: Path, root: Path = ROOT) -> str:
+    """Hash of a source file and of all files of the project at `root` that it imports, directly or not."""
+    seen, ahead = {path}, [path]
+    while ahead:
+        fresh = _imported(ahead.pop(), root) - seen
+        seen |= fresh
+        ahead += fresh
+    digest = hashlib.sha256()
+    for name, file in sorted((os.path.relpath(file, root), file) for file in seen):
+        digest.update(name.encode() + b"\0" + _source(file) + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def folder_of(path: Path) -> Path:
+    """Where the machine code of the kernels in this source file is kept."""
+    return user_cache_path("plumbline") / "kernels" / sources_hash(path)
+
+
+@cache
+def _machine() -> str:
+    """What machine code depends on beside its sources: processor, interpreter and compiler."""
+    known = [platform.machine(), platform.python_version(), version("numba"), version("llvmlite")]
+    known += [os.environ.get(name, "") for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT")]
+    with suppress(OSError):
+        lines = (line.partition(":") for line in _CPU_INFO.read_text().partition("\n\n")[0].splitlines())
+        known += [value.strip() for name, _, value in lines if name.strip() in _CPU_FIELDS]
+    return hashlib.sha256("\0".join(known).encode()).hexdigest()[:16]
+
+
+def _mark(source: Path, part: str) -> Path:
+    base = Path(CHOSEN_BY_USER) if CHOSEN_BY_USER else user_cache_path("plumbline") / "kernels"
+    return base / "ready" / f"{sources_hash(source)}-{_machine()}-{part}"
+
+
+def is_ready(source: Path, parts: Iterable[str]) -> bool:
+    """True if all kernels of these parts are there, or none is ever compiled; `source` imports them all."""
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        return True
+    return all(_mark(source, part).is_file() for part in parts)
+
+
+def mark_ready(source: Path, parts: Iterable[str]) -> None:
+    """Say so; where nothing can be written, the next program will look again."""
+    with suppress(OSError):
+        for part in parts:
+            mark = _mark(source, part)
+            mark.parent.mkdir(parents=True, exist_ok=True)
+            mark.touch()

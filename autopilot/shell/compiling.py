@@ -1,0 +1,70 @@
+"""The parts in which the flight software is compiled before the first flight, and what is said meanwhile.
+
+Each part is a program of its own, so that several compile at the same time; what they have in common is
+compiled by the one that comes first (`autopilot.geometry.kernel`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from autopilot.geometry.machine_code import ROOT, is_ready, mark_ready
+
+ONCE = "compiling the flight software, once; it takes a minute or two (gcs warmup shows how far it is)"
+
+
+@dataclass(frozen=True)
+class Part:
+    """What `python -m MODULE ARGUMENTS` compiles."""
+
+    title: str
+    module: str
+    arguments: tuple[str, ...]
+    source: Path  # which imports all kernels of the part
+    mark: str
+    cost_s: float  # of one core, roughly
+
+    @property
+    def ready(self) -> bool:
+        """Nothing is left to be compiled."""
+        return is_ready(self.source, (self.mark,))
+
+    def done(self) -> None:
+        """Nothing is left to be compiled from now on."""
+        mark_ready(self.source, (self.mark,))
+
+
+_AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
+SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 18.0)
+
+
+def autopilot_parts(law: str) -> tuple[Part, ...]:
+    """What the autopilot needs to fly with this law, the longest first."""
+    module = "autopilot.shell.warmup"
+    return (
+        Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 30.0),
+        Part("the paths", module, ("paths", law), _AUTOPILOT, "paths", 5.0),
+    )
+
+
+def ready(parts: Iterable[Part]) -> bool:
+    """Nothing is left to be compiled in any of these parts."""
+    return all(part.ready for part in parts)
+
+
+def name_what_is_compiled() -> None:
+    """From now on print the name of each kernel as its compilation begins."""
+    from numba.core import event
+
+    class Names(event.Listener):
+        def on_start(self, event: object) -> None:
+            function = event.data["dispatcher"].py_func  # type: ignore[attr-defined]
+            if function.__module__:  # numba's own have none
+                print(f"{function.__module__}.{function.__name__}", flush=True)
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    event.register("numba:compile", Names())

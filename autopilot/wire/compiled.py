@@ -1,0 +1,259 @@
+"""MAVLink 2 frames in machine code: what `codec` does for any message, for those of the simulator link.
+
+A message is given by a type that `wire_record` makes of pymavlink's own class: a NamedTuple of its fields in
+the order of the wire, arrays as tuples. Layout, id and CRC_EXTRA are those of the generated class.
+
+    HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message, __name__)
+
+    end = put_frame(HIL_SENSOR, values, payload, buffer, at, Origin(sequence, 1, 26))
+    if holds(HIL_SENSOR, datagram, start, payload):
+        message = taken(HIL_SENSOR, payload)                            # message.time_usec, message.xacc, ...
+
+All of it works in Python as well, with the same bytes. Only plain frames are read here, those of MAVLink 2
+without a signature; whatever else a datagram may hold is left to `codec.decode`.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from autopilot.geometry.kernel import kernel
+
+Bytes = NDArray[np.uint8]
+
+HEADER = 10
+PAYLOAD_ROOM = 256  # bytes of an array that holds any payload
+FRAME_ROOM = HEADER + 255 + 2
+_MAGIC = 0xFD
+# (bytes, NumPy's type) of a number on the wire; times fit into 63 bits
+_NUMBERS = {
+    "float": (4, "float32"),
+    "double": (8, "float64"),
+    "uint64_t": (8, "int64"),
+    "int64_t": (8, "int64"),
+    "uint32_t": (4, "uint32"),
+    "int32_t": (4, "int32"),
+    "uint16_t": (2, "uint16"),
+    "int16_t": (2, "int16"),
+    "uint8_t": (1, "uint8"),
+    "int8_t": (1, "int8"),
+}
+
+
+def _table() -> NDArray[np.int64]:
+    """CRC-16/MCRF4XX of each byte."""
+    values = np.arange(256, dtype=np.int64)
+    for _ in range(8):
+        values = (values >> 1) ^ np.where(values & 1, 0x8408, 0)
+    return values
+
+
+_CRC_TABLE = _table()
+
+
+class _Layout(NamedTuple):
+    """How a message lies in a frame."""
+
+    message_id: int
+    crc_extra: int
+    size: int  # bytes of the whole payload
+    fields: tuple[tuple[int, int, str], ...]  # (first byte, how many or 0 for a single one, NumPy's type)
+
+
+class Origin(NamedTuple):
+    """Who sends a frame: its sequence number, system and component."""
+
+    sequence: int
+    system: int
+    component: int
+
+
+_LAYOUTS: dict[Any, _Layout] = {}
+
+
+def wire_record(message_type: Any, module: str) -> Any:
+    """The record type of one of pymavlink's classes; a message with text raises KeyError.
+
+    It must be kept in this module under the name of the message, where numba finds it when it loads machine
+    code.
+    """
+    kinds = dict(zip(message_type.fieldnames, message_type.fieldtypes, strict=True))
+    fields, at = [], 0
+    for name, count in zip(message_type.ordered_fieldnames, message_type.array_lengths, strict=True):
+        size, number = _NUMBERS[kinds[name]]
+        fields.append((at, count, number))
+        at += size * max(count, 1)
+    record = namedtuple(message_type.msgname, message_type.ordered_fieldnames, module=module)  # type: ignore[misc]
+    _LAYOUTS[record] = _Layout(message_type.id, message_type.crc_extra, at, tuple(fields))
+    return record
+
+
+def _numbers(layout: _Layout) -> tuple[str, list[str]]:
+    """Source of the views of `payload` that its numbers are seen through, and of each number."""
+    views, found = set(), []
+    for at, count, number in layout.fields:
+        size = np.dtype(number).itemsize
+        for first in range(at, at + max(count, 1) * size, size):
+            if first % size:  # an extension: they are not laid out by size
+                found.append(f"payload[{first} : {first + size}].view(np.{number})[0]")
+            else:
+                views.add(number)
+                found.append(f"{number}s[{first // size}]")
+    return "".join(f"    {view}s = payload.view(np.{view})\n" for view in sorted(views)), found
+
+
+@cache
+def _putter(record: Any) -> Any:
+    layout = _LAYOUTS[record]
+    views, numbers = _numbers(layout)
+    lines = "".join(f"    {number} = values[{i}]\n" for i, number in enumerate(numbers))
+    known: dict[str, Any] = {"np": np, "framed": _framed}
+    exec(
+        "def put(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:\n"
+        f"{views}{lines}    return framed(payload, {layout.size}, {layout.message_id}, {layout.crc_extra}, "
+        "buffer, at, origin)\n",
+        known,
+    )
+    return known["put"]
+
+
+@cache
+def _taker(record: Any) -> Any:
+    layout = _LAYOUTS[record]
+    views, numbers = _numbers(layout)
+    parts, i = [], 0
+    for _, count, number in layout.fields:
+        wide = "np.float64" if number.startswith("float") else "np.int64"
+        each = [f"{wide}({one})" for one in numbers[i : i + max(count, 1)]]
+        parts.append(f"({', '.join(each)},)" if count else each[0])
+        i += max(count, 1)
+    known: dict[str, Any] = {"np": np, "record": record}
+    exec(f"def take(kind: Any, payload: Any) -> Any:\n{views}    return record({', '.join(parts)})\n", known)
+    return known["take"]
+
+
+@cache
+def _finder(record: Any) -> Any:
+    layout = _LAYOUTS[record]
+    known: dict[str, Any] = {"copied": _copied}
+    exec(
+        "def find(kind: Any, data: Any, start: Any, payload: Any) -> Any:\n"
+        f"    return copied(data, start, {layout.message_id}, {layout.size}, {layout.crc_extra}, payload)\n",
+        known,
+    )
+    return known["find"]
+
+
+@kernel
+def _checksum(data: Any, first: int, end: int, crc_extra: int) -> int:
+    """CRC-16/MCRF4XX of some bytes and one more."""
+    crc = 0xFFFF
+    for i in range(first, end):
+        crc = (crc >> 8) ^ _CRC_TABLE[(crc ^ int(data[i])) & 0xFF]
+    last: int = _CRC_TABLE[(crc ^ crc_extra) & 0xFF]
+    return (crc >> 8) ^ last
+
+
+@kernel
+def _framed(
+    payload: Bytes, size: int, message_id: int, crc_extra: int, buffer: Bytes, at: int, origin: Origin
+) -> int:
+    """Write the frame of a payload of this size; where the next frame may begin."""
+    length = size
+    while length > 1 and payload[length - 1] == 0:
+        length -= 1
+    buffer[at] = _MAGIC
+    buffer[at + 1] = length
+    buffer[at + 2] = 0
+    buffer[at + 3] = 0
+    buffer[at + 4] = origin.sequence & 0xFF
+    buffer[at + 5] = origin.system
+    buffer[at + 6] = origin.component
+    buffer[at + 7] = message_id & 0xFF
+    buffer[at + 8] = (message_id >> 8) & 0xFF
+    buffer[at + 9] = message_id >> 16
+    body = at + HEADER
+    for i in range(length):
+        buffer[body + i] = payload[i]
+    end = body + length
+    crc = _checksum(buffer, at + 1, end, crc_extra)
+    buffer[end] = crc & 0xFF
+    buffer[end + 1] = crc >> 8
+    return end + 2
+
+
+@kernel
+def frame_end(data: Any, start: int) -> int:
+    """Where the plain frame ends that begins at `start` of a datagram; 0 if there is none that is whole."""
+    if start + HEADER + 2 > len(data) or data[start] != _MAGIC or data[start + 2] != 0:
+        return 0
+    end = start + HEADER + data[start + 1] + 2
+    return end if end <= len(data) else 0
+
+
+@kernel
+def _copied(data: Any, start: int, message_id: int, size: int, crc_extra: int, payload: Bytes) -> bool:
+    """Copy the payload of the whole frame at `start`, if it is of this id and its checksum is right."""
+    if data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16 != message_id:
+        return False
+    length = int(data[start + 1])
+    end = start + HEADER + length
+    if _checksum(data, start + 1, end, crc_extra) != data[end] | data[end + 1] << 8:
+        return False
+    kept = min(length, size)
+    for i in range(kept):
+        payload[i] = data[start + HEADER + i]
+    for i in range(kept, size):
+        payload[i] = 0
+    return True
+
+
+def put_frame(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin) -> int:
+    """Write a frame at `at` of the buffer, trailing zeros of its payload cut; where the next one may begin.
+
+    `payload` is scratch. A float beyond float32 is sent as infinite; integers must be within their fields.
+    """
+    return int(_putter(kind)(kind, values, payload, buffer, at, origin))
+
+
+def holds(kind: Any, data: Any, start: int, payload: Bytes) -> bool:
+    """Whether the frame at `start`, which `frame_end` found whole, is an intact one of this message.
+
+    Then `payload` gets its payload, zeros behind it.
+    """
+    return bool(_finder(kind)(kind, data, start, payload))
+
+
+def taken(kind: Any, payload: Bytes) -> Any:
+    """The record of this type whose bytes `payload` begins with."""
+    return _taker(kind)(kind, payload)
+
+
+def _record_of(kind: Any) -> Any:
+    record = kind.instance_class if isinstance(kind, types.NamedTupleClass) else None
+    return record if record in _LAYOUTS else None
+
+
+@overload(put_frame)
+def _put_frame(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:
+    record = _record_of(kind)
+    return None if record is None else _putter(record)
+
+
+@overload(holds)
+def _holds(kind: Any, data: Any, start: Any, payload: Any) -> Any:
+    record = _record_of(kind)
+    return None if record is None else _finder(record)
+
+
+@overload(taken)
+def _taken(kind: Any, payload: Any) -> Any:
+    record = _record_of(kind)
+    return None if record is None else _taker(record)

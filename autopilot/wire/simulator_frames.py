@@ -1,0 +1,66 @@
+"""The messages of the simulator link as records of `compiled`, and the answer to a tick in machine code."""
+
+from __future__ import annotations
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.packed import Row
+from autopilot.wire.compiled import (
+    Bytes,
+    Origin,
+    frame_end,
+    holds,
+    put_frame,
+    taken,
+    wire_record,
+)
+from autopilot.wire.convert.simulator import (
+    Forces,
+    hil_actuator_controls_values,
+    read_hil_actuator_controls,
+)
+from autopilot.wire.dialect import plumbline as mavlink
+
+HIL_SENSOR = wire_record(mavlink.MAVLink_hil_sensor_message, __name__)
+ODOMETRY = wire_record(mavlink.MAVLink_odometry_message, __name__)
+LOAD_SENSOR = wire_record(mavlink.MAVLink_load_sensor_message, __name__)
+HIL_GPS = wire_record(mavlink.MAVLink_hil_gps_message, __name__)
+HIL_ACTUATOR_CONTROLS = wire_record(mavlink.MAVLink_hil_actuator_controls_message, __name__)
+HIL_STATE_QUATERNION = wire_record(mavlink.MAVLink_hil_state_quaternion_message, __name__)
+LOAD_STATE = wire_record(mavlink.MAVLink_load_state_message, __name__)
+ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
+
+_SYSTEM = 5  # where a frame names its sender
+
+Answer = tuple[bool, int, Forces, bool, bool, float]
+
+
+@kernel
+def put_answer(
+    buffer: Bytes,
+    payload: Bytes,
+    sequence: int,
+    system: int,
+    component: int,
+    time_us: int,
+    forces: Row,
+    armed: bool,
+    lockstep: bool,
+    gripper_open: bool,
+    reel_rate: float,
+) -> int:
+    """Write HIL_ACTUATOR_CONTROLS at the begin of a buffer; how many bytes it has. `forces`: 4, in N;
+    `payload` has PAYLOAD_ROOM bytes to work with."""
+    each = (forces[0], forces[1], forces[2], forces[3])
+    values = hil_actuator_controls_values(time_us, each, armed, lockstep, gripper_open, reel_rate)
+    return put_frame(HIL_ACTUATOR_CONTROLS, values, payload, buffer, 0, Origin(sequence, system, component))
+
+
+@kernel
+def answer_in(datagram: bytes, system: int, payload: Bytes) -> Answer:
+    """Whether a datagram is the plain frame of an answer of this system and no more; and then `time_us`,
+    `forces` (N), `armed`, `gripper_open` and `reel_rate` of it."""
+    plain = len(datagram) > 0 and frame_end(datagram, 0) == len(datagram)
+    if not (plain and datagram[_SYSTEM] == system and holds(HIL_ACTUATOR_CONTROLS, datagram, 0, payload)):
+        return (False, 0, (0.0, 0.0, 0.0, 0.0), False, False, 0.0)
+    said = read_hil_actuator_controls(taken(HIL_ACTUATOR_CONTROLS, payload))
+    return (True, said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)

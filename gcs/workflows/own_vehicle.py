@@ -1,0 +1,85 @@
+"""A simulator and an autopilot started for one flight, and stopped after it.
+
+They load for a second before they speak: they are started first, and what the ground station itself has to
+load, and to check, comes meanwhile. Therefore nothing heavy is imported here.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from autopilot.vehicle.parameters import LAWS
+from gcs.shell.link import LOOPBACK, UdpSocket, free_port
+from gcs.shell.processes import Processes
+from gcs.workflows.flight_options import FlightOptions
+
+ONBOARD_LOG = "flight.ulg"
+SIMULATOR_LOG, AUTOPILOT_LOG = "sitl.log", "autopilot.log"
+_WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
+
+
+@dataclass(frozen=True)
+class OwnVehicle:
+    """The running programs, and the sockets to which they speak."""
+
+    processes: Processes
+    vehicle: UdpSocket
+    truth: UdpSocket
+
+
+@contextmanager
+def own_vehicle(options: FlightOptions, out: Path) -> Iterator[OwnVehicle]:
+    """Start both programs; afterwards they are gone.
+
+    Their logs, and the autopilot's own log of the flight, are left in `out`.
+    """
+    with (
+        tempfile.TemporaryDirectory(prefix="plumbline-") as storage,
+        _log_kept(Path(storage), out),
+        Processes() as processes,
+        closing(UdpSocket()) as vehicle,
+        closing(UdpSocket()) as truth,
+    ):
+        _start(processes, options, out, Path(storage), vehicle.address, truth.address)
+        yield OwnVehicle(processes, vehicle, truth)
+
+
+@contextmanager
+def _log_kept(storage: Path, out: Path) -> Iterator[None]:
+    """Afterwards the autopilot's own log of the flight is in `out`, if it has made one."""
+    try:
+        yield
+    finally:
+        for log in sorted((storage / "card" / "log").glob("*.ulg"))[-1:]:
+            shutil.copyfile(log, out / ONBOARD_LOG)
+
+
+def _start(
+    processes: Processes, options: FlightOptions, out: Path, storage: Path, ground: str, truth: str
+) -> None:
+    simulator = f"{LOOPBACK}:{free_port()}"
+    pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
+    both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS.index(options.law)}"]
+    if options.force:
+        both += ["--set", "MIS_INFEASIBLE=0"]
+    for setting in options.settings:
+        both += ["--set", setting]
+    world = [
+        "--sensors",
+        options.sensors,
+        "--seed",
+        str(options.seed),
+        "--listen",
+        simulator,
+        "--truth",
+        truth,
+    ]
+    processes.start("sitl", [*world, *pace, *both, "--quiet"], out / SIMULATOR_LOG)
+    link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_WATCHERS]
+    home = ["--sim", simulator, "--storage", str(storage)]
+    processes.start("autopilot", [*home, *link, *both, "--quiet"], out / AUTOPILOT_LOG)

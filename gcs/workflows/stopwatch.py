@@ -1,0 +1,22 @@
+"""How long a flight took on the wall clock."""
+
+from __future__ import annotations
+
+import time
+
+
+class Stopwatch:
+    """The wall time from the vehicle's first word to the end of the flight."""
+
+    def __init__(self) -> None:
+        self._began_s: float | None = None
+        self._wall_s: float | None = None
+
+    def start(self) -> None:
+        self._began_s = time.monotonic()
+
+    def stop(self) -> float:
+        """Stop if it runs; the time measured."""
+        if self._wall_s is None:
+            self._wall_s = 0.0 if self._began_s is None else time.monotonic() - self._began_s
+        return self._wall_s

@@ -1,0 +1,20 @@
+"""Compiles what checks missions before they are flown: python -m gcs.workflows.warm_check."""
+
+from __future__ import annotations
+
+from autopilot.shell.compiling import name_what_is_compiled
+
+
+def main() -> None:
+    """Check every shipped mission; prints the names of the kernels that this compiles."""
+    name_what_is_compiled()
+    # only now: the import itself compiles the first ones
+    from gcs.workflows.check_mission import check_mission
+    from missions.fileformat import shipped
+
+    for name in shipped():
+        check_mission(name, "bebop", False)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,257 @@
+"""The datagrams of a tick in machine code: what leaves the sensors, and the truth, as frames in a buffer."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Any, NamedTuple
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, apply_transposed, norm, sub
+from autopilot.geometry.packed import Row, pack, unpack
+from autopilot.geometry.so3 import rotation_from_quat
+from autopilot.wire.compiled import Bytes, Origin, put_frame
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.flight import load_state_values, rotor_state_values
+from autopilot.wire.convert.simulator import (
+    ACCEL,
+    GYRO,
+    MAG,
+    PRESSURE,
+    TEMPERATURE,
+    hil_gps_values,
+    hil_sensor_values,
+    hil_state_quaternion_values,
+    load_sensor_values,
+    odometry_values,
+)
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.simulator_frames import (
+    HIL_GPS,
+    HIL_SENSOR,
+    HIL_STATE_QUATERNION,
+    LOAD_SENSOR,
+    LOAD_STATE,
+    ODOMETRY,
+    ROTOR_STATE,
+)
+from sitl.sensors.barometer import BarometerReading
+from sitl.sensors.cable_sensor import CableReading
+from sitl.sensors.gnss import GnssReading
+from sitl.sensors.imu import ImuReading
+from sitl.sensors.load_tracker import LoadReading
+from sitl.sensors.magnetometer import MagnetometerReading
+from sitl.sensors.pose_tracker import PoseReading
+from sitl.sensors.profile import Stated
+from sitl.world import (
+    BARO,
+    CABLE,
+    GNSS,
+    IMU,
+    LOAD,
+    MOCAP,
+    READING,
+    SHOWS,
+    World,
+    WorldModel,
+    WorldRows,
+    arrived,
+)
+from sitl.world import MAG as MAGNETOMETER
+
+VEHICLE_SYSTEM = 1
+SIMULATOR_COMPONENT = 26
+TRACKER, CAMERA, ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
+TRUTH_FRAMES = 3  # that `put_truth` writes
+_TRUTH = mavlink.PLUMBLINE_SOURCE_TRUTH
+_NAN3: Vec3 = (nan, nan, nan)
+
+
+class Statement(NamedTuple):
+    """What the messages say beside the readings."""
+
+    stated: Stated
+    home: Home
+    fix_type: int  # GPS_FIX_TYPE
+    satellites: int
+    cable_id: int  # LOAD_SENSOR.sensor_id of the cable sensor
+
+
+class Newest(NamedTuple):
+    """The last readings of what HIL_SENSOR repeats at every tick."""
+
+    inertial: ImuReading
+    field: MagnetometerReading
+    height: BarometerReading
+
+
+@kernel
+def pressure_pa(altitude_m: float) -> float:
+    """International standard atmosphere below 11 km; altitude above mean sea level."""
+    pressure: float = 101_325.0 * max(1.0 - 2.25577e-5 * altitude_m, 0.0) ** 5.25588
+    return pressure
+
+
+@kernel
+def _put(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, sequence: int) -> int:
+    return put_frame(kind, values, payload, buffer, at, Origin(sequence, VEHICLE_SYSTEM, SIMULATOR_COMPONENT))
+
+
+@kernel
+def put_sensors(
+    rows: WorldRows, now_us: int, newest: Row, statement: Row, buffer: Bytes, payload: Bytes, sequence: int
+) -> tuple[int, int]:
+    """Take out of the queues what has left the sensors by now, and write its frames, HIL_SENSOR last.
+
+    Returns how many bytes they have and the sequence number of the next frame. `newest` is a `Newest`, which
+    is brought up to date, `statement` a `Statement`; `payload` has PAYLOAD_ROOM bytes to work with.
+    """
+    said = unpack(Statement, statement, 0)
+    stated = said.stated
+    queue = rows.queue
+    at = fields = 0
+    found = arrived(MOCAP, now_us, rows)
+    while found >= 0:
+        row = queue[MOCAP, found]
+        pose = unpack(PoseReading, row, READING)
+        values = odometry_values(
+            int(row[SHOWS]),
+            pose.position,
+            pose.quat_wxyz,
+            pose.velocity,
+            pose.omega_body,
+            stated.mocap_position,
+            stated.mocap_attitude,
+            stated.mocap_velocity,
+        )
+        at = _put(ODOMETRY, values, payload, buffer, at, sequence)
+        sequence += 1
+        found = arrived(MOCAP, now_us, rows)
+    found = arrived(LOAD, now_us, rows)
+    while found >= 0:
+        row = queue[LOAD, found]
+        load = unpack(LoadReading, row, READING)
+        velocity_std = stated.load_velocity if load.velocity[0] == load.velocity[0] else nan
+        tracked = load_sensor_values(
+            int(row[SHOWS]),
+            load.position,
+            load.velocity,
+            _NAN3,
+            stated.load_position,
+            velocity_std,
+            nan,
+            TRACKER,
+        )
+        at = _put(LOAD_SENSOR, tracked, payload, buffer, at, sequence)
+        sequence += 1
+        found = arrived(LOAD, now_us, rows)
+    found = arrived(CABLE, now_us, rows)
+    while found >= 0:
+        row = queue[CABLE, found]
+        cable = unpack(CableReading, row, READING)
+        if cable.seen > 0.0:
+            sighted = load_sensor_values(
+                int(row[SHOWS]),
+                _NAN3,
+                _NAN3,
+                cable.direction_body,
+                nan,
+                nan,
+                stated.direction,
+                said.cable_id,
+            )
+            at = _put(LOAD_SENSOR, sighted, payload, buffer, at, sequence)
+            sequence += 1
+        found = arrived(CABLE, now_us, rows)
+    found = arrived(GNSS, now_us, rows)
+    while found >= 0:
+        row = queue[GNSS, found]
+        fix = unpack(GnssReading, row, READING)
+        fixed = hil_gps_values(
+            int(row[SHOWS]),
+            said.fix_type,
+            fix.position,
+            fix.velocity,
+            stated.gnss_horizontal,
+            stated.gnss_vertical,
+            said.satellites,
+            said.home,
+        )
+        at = _put(HIL_GPS, fixed, payload, buffer, at, sequence)
+        sequence += 1
+        found = arrived(GNSS, now_us, rows)
+    last = unpack(Newest, newest, 0)
+    inertial, field, height = last.inertial, last.field, last.height
+    found = arrived(IMU, now_us, rows)
+    while found >= 0:
+        inertial = unpack(ImuReading, queue[IMU, found], READING)
+        fields |= ACCEL | GYRO
+        found = arrived(IMU, now_us, rows)
+    found = arrived(MAGNETOMETER, now_us, rows)
+    while found >= 0:
+        field = unpack(MagnetometerReading, queue[MAGNETOMETER, found], READING)
+        fields |= MAG
+        found = arrived(MAGNETOMETER, now_us, rows)
+    found = arrived(BARO, now_us, rows)
+    while found >= 0:
+        height = unpack(BarometerReading, queue[BARO, found], READING)
+        fields |= PRESSURE | TEMPERATURE
+        found = arrived(BARO, now_us, rows)
+    pack(Newest(inertial, field, height), newest, 0)
+    altitude = said.home.altitude_m + height.height
+    own = hil_sensor_values(
+        now_us,
+        inertial.accel_body,
+        inertial.gyro_body,
+        field.field_body,
+        pressure_pa(altitude),
+        altitude,
+        15.0 - 0.0065 * altitude,
+        fields,
+        0,
+    )
+    at = _put(HIL_SENSOR, own, payload, buffer, at, sequence)
+    return at, (sequence + 1) & 0xFF
+
+
+@kernel
+def put_truth(
+    world_row: Row, model_row: Row, statement: Row, buffer: Bytes, payload: Bytes, sequence: int
+) -> int:
+    """Write HIL_STATE_QUATERNION, LOAD_STATE and ROTOR_STATE of this tick; how many bytes they have."""
+    world, truth = unpack(World, world_row, 0), unpack(WorldModel, model_row, 0).truth
+    state, home = world.plant, unpack(Statement, statement, 0).home
+    a = state.accel_quad
+    vehicle = hil_state_quaternion_values(
+        world.now_us,
+        state.quat_wxyz,
+        state.omega_body,
+        state.x_quad,
+        state.v_quad,
+        norm(sub(state.v_quad, world.wind)),
+        apply_transposed(rotation_from_quat(state.quat_wxyz), (a[0], a[1], a[2] + truth.gravity)),
+        home,
+    )
+    at = _put(HIL_STATE_QUATERNION, vehicle, payload, buffer, 0, sequence)
+    load = load_state_values(
+        world.now_us,
+        _TRUTH,
+        state.x_load,
+        state.v_load,
+        state.q_cable,
+        state.q_cable_dot,
+        norm(sub(state.x_load, state.x_quad)),
+        state.tension,
+        state.taut > 0.0,
+        int(state.slack_events),
+    )
+    at = _put(LOAD_STATE, load, payload, buffer, at, sequence + 1)
+    low, high = truth.rotor_min, truth.rotor_max
+    cut = 0
+    for i in range(4):
+        if not low <= world.command[i] <= high:
+            cut |= 1 << i
+    rotors = rotor_state_values(world.now_us, _TRUTH, state.rotor_force, low, high, cut)
+    return _put(ROTOR_STATE, rotors, payload, buffer, at, sequence + 2)
+
+
+NOTHING_NEW = Newest(ImuReading(ZERO, ZERO), MagnetometerReading(ZERO), BarometerReading(0.0))

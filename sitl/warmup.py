@@ -1,0 +1,20 @@
+"""Compiles the simulator: python -m sitl.warmup."""
+
+from __future__ import annotations
+
+from autopilot.shell.compiling import name_what_is_compiled
+
+
+def main() -> None:
+    """Compile it, or find it compiled; prints the names of the kernels that it compiles."""
+    name_what_is_compiled()
+    # only now: the import itself compiles the first ones
+    from sitl.hil import HilSimulator
+
+    simulator = HilSimulator.build()
+    simulator.truth_datagram()
+    simulator.advance()
+
+
+if __name__ == "__main__":
+    main()

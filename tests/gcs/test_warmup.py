@@ -1,0 +1,67 @@
+"""The flight software is compiled in parts, by several processes, and what went wrong is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from autopilot.shell.compiling import Part
+from gcs.errors import GcsError
+from gcs.workflows import warmup
+from gcs.workflows.warmup import parts_left, warm_up
+
+SOURCE = Path(__file__)
+
+
+def part(mark: str, statement: str, cost_s: float = 1.0) -> Part:
+    """A part that runs a statement with a program of the standard library."""
+    return Part(f"the {mark}", "timeit", ("-n", "1", "-r", "1", statement), SOURCE, mark, cost_s)
+
+
+@pytest.fixture(autouse=True)
+def nothing_compiled(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    monkeypatch.setattr("autopilot.geometry.machine_code.CHOSEN_BY_USER", "")
+
+
+def test_a_flight_needs_its_law_alone_and_the_longest_part_comes_first():
+    marks = [part.mark for part in parts_left(["lqr"])]
+    assert set(marks) == {"tick-lqr", "law-lqr", "paths", "world", "check"}
+    assert marks[0] == "tick-lqr"
+    both = [part.mark for part in parts_left(["lqr", "thesis"])]
+    assert sorted(both) == sorted({*marks, "tick-thesis", "law-thesis"})
+
+
+def test_what_is_compiled_is_not_compiled_again():
+    for one in parts_left(["lqr"]):
+        one.done()
+    assert parts_left(["lqr"]) == []
+    assert {one.mark for one in parts_left(["thesis"])} == {"tick-thesis", "law-thesis"}
+
+
+def test_all_parts_run_and_are_marked(monkeypatch, tmp_path, capsys):
+    parts = [part(name, f"open({str(tmp_path / name)!r}, 'w')") for name in ("first", "second", "third")]
+    monkeypatch.setattr(warmup, "parts_left", lambda laws: list(parts))
+    warm_up(("plumbline",))
+    assert all((tmp_path / name).exists() for name in ("first", "second", "third"))
+    assert all(one.ready for one in parts)
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("gcs: compiling the flight software, once; about ")
+    assert said[1].endswith("3 of 3 parts remain")
+
+
+def test_nothing_is_said_where_nothing_is_to_be_done(monkeypatch, capsys):
+    monkeypatch.setattr(warmup, "parts_left", lambda laws: [])
+    warm_up(("plumbline",))
+    assert capsys.readouterr().err == ""
+
+
+def test_a_part_that_fails_is_told_with_its_last_words_and_not_marked(monkeypatch, tmp_path):
+    good = part("good", "pass")
+    bad = part("bad", "raise SystemExit('no compiler')")
+    monkeypatch.setattr(warmup, "parts_left", lambda laws: [bad, good])
+    with pytest.raises(GcsError, match=r"the bad cannot be compiled: .*no compiler"):
+        warm_up(("plumbline",), quiet=True)
+    assert not bad.ready

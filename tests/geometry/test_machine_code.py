@@ -1,0 +1,132 @@
+"""Machine code is compiled once, by the process that comes first; it is known when all of it is there."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from autopilot.geometry import machine_code, s2
+from missions import model
+from sitl import hil
+
+ROOT = Path(__file__).parents[2]
+# prints what it compiles, begins on a line of input, and compiles in the order of its arguments
+PROGRAM = """
+import sys
+from numba.core import event
+from numba.core.errors import TypingError
+
+
+class Names(event.Listener):
+    def on_start(self, event):
+        function = event.data["dispatcher"].py_func
+        if str(function.__module__).startswith("autopilot"):
+            print(function.__name__, event.data["args"], flush=True)
+
+    def on_end(self, event):
+        pass
+
+
+event.register("numba:compile", Names())
+from autopilot.geometry import s2, so3
+e1, e2, e3 = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+work = {
+    "s2": lambda: s2.unit_derivatives(e3, e1, e2),
+    "so3": lambda: so3.quat_exp(e1),
+    "wrong": lambda: so3.quat_exp("text"),
+}
+print("ready", flush=True)
+input()
+for name in sys.argv[1:]:
+    try:
+        work[name]()
+    except TypingError:
+        print("refused")
+"""
+NUMBA_IS_OFF = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> dict[str, str]:
+    """An environment in which nothing has been compiled yet."""
+    kept = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    return {**kept, "XDG_CACHE_HOME": str(tmp_path)}
+
+
+def compiled(environment: dict[str, str], *orders: tuple[str, ...]) -> Counter[str]:
+    """How often each kernel was compiled by processes that begin together, one for each order."""
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, *order],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+            env=environment,
+        )
+        for order in orders
+    ]
+    lines: list[str] = []
+    for process in processes:
+        assert process.stdout is not None
+        lines += iter(process.stdout.readline, "ready\n")
+    for process in processes:
+        assert process.stdin is not None
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    for process in processes:
+        lines += process.communicate(timeout=120.0)[0].splitlines(keepends=True)
+        assert process.returncode == 0
+    return Counter(line.strip() for line in lines)
+
+
+@NUMBA_IS_OFF
+def test_no_kernel_is_compiled_by_two_processes(empty: dict[str, str]) -> None:
+    together = compiled(empty, ("s2", "so3"), ("so3", "s2"), ("s2", "so3"))
+    assert {"unit_derivatives", "quat_exp"} <= {name.partition(" ")[0] for name in together}
+    assert set(together.values()) == {1}, together
+    assert not compiled(empty, ("s2", "so3"))
+
+
+@NUMBA_IS_OFF
+def test_a_kernel_that_cannot_be_compiled_for_some_types_holds_up_nobody(empty: dict[str, str]) -> None:
+    together = compiled(empty, ("wrong", "so3"), ("wrong", "so3"))
+    assert together["refused"] == 2
+    assert compiled(empty, ("so3",)) == Counter()
+
+
+def test_what_is_ready_is_known_by_its_sources_and_its_part(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", "")
+    source = Path(s2.__file__)
+    assert not machine_code.is_ready(source, ("tick",))
+    machine_code.mark_ready(source, ("tick", "law"))
+    assert machine_code.is_ready(source, ("tick", "law"))
+    assert not machine_code.is_ready(source, ("tick", "paths"))
+    assert not machine_code.is_ready(Path(model.__file__), ("tick",))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
+    assert not machine_code.is_ready(source, ("tick",))
+
+
+def test_nothing_is_to_be_compiled_where_numba_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert machine_code.is_ready(Path(hil.__file__), ("no such part",))
+
+
+def test_a_directory_that_cannot_be_written_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", str(tmp_path / "file"))
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    source = Path(s2.__file__)
+    machine_code.mark_ready(source, ("tick",))
+    assert not machine_code.is_ready(source, ("tick",))

@@ -1,0 +1,104 @@
+"""The process that prepares paths: it answers, gives up what is of no use any more, and its death is told."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from autopilot.onboard.onboard import Work
+from autopilot.shell.path_worker import Aside
+from autopilot.supervisor.state import Phase
+from autopilot.trajectory.prepare import Prepared
+from missions.model import Waypoint
+from tests.doubles.craft import Craft
+
+LIMIT_S = 60.0  # for what takes a second on an idle machine
+
+
+class Waiting:
+    """What `Aside` knows of the autopilot, with work to be done."""
+
+    def __init__(self, phase: Phase = Phase.HOLD) -> None:
+        self.phase = phase
+        self.rehearsal = Craft().onboard.rehearsal
+        self.work: Work | None = None
+        self.finished: list[tuple[Work, Prepared]] = []
+
+    def ask(self, east_m: float) -> Work:
+        steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(east_m, 0.0, 2.0, 1.0))
+        self.work = Work(steps, (0, 1), self.rehearsal.limits)
+        return self.work
+
+    def finish(self, work: Work, prepared: Prepared) -> None:
+        self.finished.append((work, prepared))
+        if work is self.work:
+            self.work = None
+
+
+@pytest.fixture
+def aside() -> Iterator[Aside]:
+    worker = Aside()
+    yield worker
+    worker.close()
+    assert not multiprocessing.active_children()
+
+
+def attend(aside: Aside, onboard: Any, until: Callable[[], bool]) -> None:
+    end = time.monotonic() + LIMIT_S
+    while not until():
+        assert time.monotonic() < end
+        aside.attend(onboard)
+
+
+def test_one_process_does_one_work_after_the_other(aside: Aside) -> None:
+    onboard = Waiting()
+    aside.start(onboard.rehearsal)
+    (process,) = multiprocessing.active_children()
+    for east_m in (1.0, 2.0):
+        work = onboard.ask(east_m)
+        attend(aside, onboard, lambda: onboard.work is None)
+        assert onboard.finished[-1] == (work, work.done())
+    assert multiprocessing.active_children() == [process]
+
+
+def test_what_is_asked_for_later_is_done_when_what_goes_on_is_over(aside: Aside) -> None:
+    onboard = Waiting()
+    first = onboard.ask(1.0)
+    aside.attend(onboard)  # type: ignore[arg-type]
+    later = onboard.ask(2.0)
+    attend(aside, onboard, lambda: onboard.work is None)
+    assert [work for work, _ in onboard.finished] == [first, later]
+
+
+def test_on_the_ground_nobody_waits_for_a_process_that_still_loads(aside: Aside) -> None:
+    onboard = Waiting(Phase.DISARMED)
+    work = onboard.ask(1.0)
+    aside.attend(onboard)  # type: ignore[arg-type]
+    assert onboard.finished == [(work, work.done())]
+
+
+def test_a_process_that_dies_at_its_work_is_a_refusal(aside: Aside) -> None:
+    onboard = Waiting()
+    work = onboard.ask(1.0)
+    aside.attend(onboard)  # type: ignore[arg-type]
+    (process,) = multiprocessing.active_children()
+    process.kill()
+    attend(aside, onboard, lambda: onboard.work is None)
+    ((done, prepared),) = onboard.finished
+    assert done is work
+    assert prepared.refusal == "the process that prepares paths has died"
+
+
+def test_a_process_that_died_idle_is_replaced(aside: Aside) -> None:
+    onboard = Waiting()
+    aside.start(onboard.rehearsal)
+    (process,) = multiprocessing.active_children()
+    process.kill()
+    process.join()
+    onboard.ask(1.0)
+    attend(aside, onboard, lambda: onboard.work is None)
+    assert not onboard.finished[-1][1].refusal
