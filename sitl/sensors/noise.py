@@ -78,10 +78,10 @@ def gaussian(noise: Noise, block: int) -> Vec3:
 @kernel
 def white(std: float, noise: Noise, block: int) -> Vec3:
     """Three independent normal numbers of deviation `std` times the sample's scale; nan where `std` is."""
-    if std == 0.0 or noise.scale == 0.0:
-        return ZERO
     if isnan(std):
         return (std, std, std)
+    if std == 0.0 or noise.scale == 0.0:
+        return ZERO
     return scale(std, gaussian(noise, block))
 
 
