@@ -377,6 +377,10 @@ class Onboard:
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self.core.setup)
+        self.rehearse_link()
+
+    def rehearse_link(self) -> None:
+        """Of these the ones of the simulator link."""
         self._sensors.read(b"", -1)
         self._put_answer(0)
         health = packed(Condition())
