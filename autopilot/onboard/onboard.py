@@ -26,7 +26,7 @@ from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse
 from autopilot.estimation.filter import estimator_tuning
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.geometry.packed import pack, packed, unpack
+from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
@@ -54,7 +54,7 @@ from autopilot.supervisor.state import MissionPlan, Phase
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM
-from autopilot.wire.convert import HilGps, Home
+from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, located_steps, unflown
@@ -131,10 +131,8 @@ class Onboard:
         self._options = options
         self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
         self._answer = b""
-        self._fixed = False  # a HIL_GPS was heard
         self._health = packed(Condition())
-        self._battery = battery_constants(parameters)
-        self._battery_row = packed(self._battery)
+        self._battery_row = packed(battery_constants(parameters))
         self._frame = np.zeros(FRAME_ROOM, np.uint8)
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
@@ -145,7 +143,7 @@ class Onboard:
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
-        self._moments = Moments(self.core, options, parameters)
+        self._moments = Moments(self.core, options, parameters, self._health, self._sensors.fix)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
@@ -216,7 +214,7 @@ class Onboard:
         self.tick += 1
         self.now_us = tick.now_us
         if tick.fixed:
-            self._fixed = True
+            self._moments.fixed = True
         for message in tick.aside:
             self._hear_simulator(message)
         if period_us > 0 and not 0 < self._shortest_us <= period_us:
@@ -305,8 +303,8 @@ class Onboard:
             return
         self.fault = ""
         self.core.follow(build_setup(self.parameters, every))
-        self._battery = battery_constants(self.parameters)
-        pack(self._battery, self._battery_row, 0)
+        self._moments.battery = battery_constants(self.parameters)
+        pack(self._moments.battery, self._battery_row, 0)
         # a mission under way keeps the paths that it began with
         if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.mission.active:
             self._prepare()
@@ -462,6 +460,4 @@ class Onboard:
         self.core.change(replace(flight, mission=replace(flight.mission, plan=plan)))
 
     def _snapshot(self) -> Moment:
-        condition = unpack(Condition, self._health, 0)
-        fix = unpack(HilGps, self._sensors.fix, 0) if self._fixed else None
-        return Moment(self._moments, self.endpoint.mission, condition, self._battery, fix, self.now_us)
+        return Moment(self._moments, self.endpoint.mission, self.now_us)

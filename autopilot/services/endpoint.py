@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from autopilot.geometry.packed import Row
 from autopilot.services.commands import CommandService
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
@@ -58,6 +59,7 @@ from autopilot.services.requests import (
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
+from autopilot.services.stream_frames import BITS
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import GROUPS, LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
 from autopilot.services.timesync import answer_ping, answer_timesync
@@ -134,6 +136,7 @@ class VehicleEndpoint:
         }
         self._own = (identity.system, AUTOPILOT_COMPONENT)
         self._watched: dict[int, Any] = {}
+        self._seen: tuple[object, Any] = (None, ())  # of the snapshot that was watched last
         self._asked_mode: int | None = None
         self._consequences: list[Output] = []  # of a decision
         self._work = False  # something waits in a queue
@@ -261,16 +264,28 @@ class VehicleEndpoint:
             link: [*state.announced, *state.streams.take_due(now_us)] for link, state in self._links.items()
         }
         datagrams: list[tuple[Link, bytes]] = []
+        instant: Row | None = None
         if any(keys.values()):
             plans = [self._missions.plan_id(kind) for kind in PLANS]
             snapshot = make_snapshot()
             snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, (plans[0], plans[1], plans[2])
             self._watch(snapshot)
+            # what is signed is written frame by frame
+            instant = None if self._signing.signing is not None else snapshot.instant
         built: dict[int, list[Outgoing]] = {}
         for link, state in self._links.items():
-            outgoing: list[Outgoing] = [(self._own, message) for message in state.queue]
+            outgoing: list[Outgoing | int] = [(self._own, message) for message in state.queue]
             # what was announced just now is in its order before the streams
-            for key in dict.fromkeys((*state.announced, *keys[link])):
+            due = dict.fromkeys((*state.announced, *keys[link])) if state.announced else keys[link]
+            for key in due:
+                bit = 0 if instant is None else BITS.get(key, 0)
+                if bit:
+                    last = outgoing[-1] if outgoing else 0
+                    if type(last) is int and 0 < last < bit:
+                        outgoing[-1] = last | bit
+                    else:
+                        outgoing.append(bit)
+                    continue
                 made = built.get(key)
                 if made is None:
                     made = built[key] = self._build(key, snapshot)
@@ -278,7 +293,7 @@ class VehicleEndpoint:
             state.queue.clear()
             state.announced.clear()
             if outgoing:
-                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing)]
+                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing, instant)]
         self._next_us = min(self._timer_us, self._next_stream())
         return datagrams
 
@@ -305,6 +320,10 @@ class VehicleEndpoint:
 
     def _watch(self, snapshot: Snapshot) -> None:
         """Announce what changed since it was last looked at."""
+        seen = (snapshot.unchanged, snapshot.plan_ids)
+        if seen[0] is not None and seen[0] is self._seen[0] and seen[1] == self._seen[1]:
+            return
+        self._seen = seen
         for key, pick in WATCHED.items():
             picked = pick(snapshot)
             if self._watched.get(key) != picked:
@@ -346,7 +365,7 @@ class VehicleEndpoint:
     def _new_link(self, configured: bool, now_us: int) -> LinkState:
         taken = {state.number for state in self._links.values()}
         number = next(number for number in range(len(taken) + 1) if number not in taken)
-        return LinkState(configured, self._defaults, now_us, number & 0xFF, self._signing.signer)
+        return LinkState(configured, self._defaults, now_us, number & 0xFF, self._signing.signer, self.identity.system)
 
     def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)
