@@ -244,7 +244,7 @@ class FlightCore:
         self.rows = self.rows._replace(targets=targets, references=references)
 
     def setpoint_row(self, now_us: int) -> int:
-        """The row of `rows.targets` that has the setpoint of the present leg at this instant; -1: none has."""
+        """The row of `rows.targets` with the setpoint of the present leg at this instant; -1: none has it."""
         laid, flight = self.laid, self.flight
         if laid is None or flight.legs is not laid.legs or flight.leg_start_us != laid.leg_start_us:
             return -1

@@ -5,18 +5,20 @@ from __future__ import annotations
 from math import nan
 from typing import Any, get_type_hints
 
+import numpy as np
+from numpy.typing import NDArray
+
 from autopilot.core.tick import Pilot, Seen
 from autopilot.estimation.records import Array, EstimatorState
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, norm, sub
-from autopilot.geometry.packed import Row, pack, width
-from autopilot.geometry.so3 import Quat, quat_from_rotation
+from autopilot.geometry.linear import norm, sub
+from autopilot.geometry.packed import Row, width
+from autopilot.geometry.so3 import quat_from_rotation
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
 from autopilot.services.instant import Instant
 from autopilot.wire.dialect import plumbline as mavlink
 
 NO_LEG = -1  # in place of a leg's control mode
-_NOWHERE: Vec3 = (nan, nan, nan)
 _ESTIMATING = (
     mavlink.ESTIMATOR_ATTITUDE
     | mavlink.ESTIMATOR_VELOCITY_HORIZ
@@ -39,32 +41,57 @@ def _place(record: Any, path: str) -> int:
     return first
 
 
-_X_LOAD, _V_LOAD = _place(Seen, "state.x_load"), _place(Seen, "state.v_load")
-_Q_CABLE, _Q_CABLE_DOT = _place(Seen, "state.q_cable"), _place(Seen, "state.q_cable_dot")
-_X_QUAD, _V_QUAD = _place(Seen, "state.x_quad"), _place(Seen, "state.v_quad")
-_OMEGA, _TAUT = _place(Seen, "state.omega_body"), _place(Seen, "taut")
+def _copies(record: Any, paths: dict[str, str]) -> NDArray[np.int64]:
+    """(n, 2) where in an `Instant`, and whence in a record, the numbers of these fields are copied."""
+    hints = get_type_hints(Instant)
+    return np.array(
+        [
+            (_place(Instant, name) + i, _place(record, path) + i)
+            for name, path in paths.items()
+            for i in range(width(hints[name]))
+        ]
+    )
+
+
+_OF_SEEN = _copies(
+    Seen,
+    {name: f"state.{name}" for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad")}
+    | {"omega_body": "state.omega_body", "taut": "taut"},
+)
+_OF_ESTIMATOR = _copies(
+    EstimatorState,
+    {
+        "quat_wxyz": "vehicle.quat_wxyz",
+        "accel_quad": "vehicle.accel_quad",
+        "horizontal_std": "doubt.horizontal",
+        "vertical_std": "doubt.vertical",
+        "tension": "load.tension",
+    },
+)
+_OF_PILOT = _copies(
+    Pilot,
+    {
+        name: f"command.{name}"
+        for name in ("e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q", "thrust", "moment")
+    }
+    | {
+        "q_cable_c": "command.q_c",
+        "control_mode": "control_mode",
+        "slack_events": "slack_events",
+        "saturated": "mixed.saturated",
+        "forces": "mixed.forces",
+    },
+)
 _VEHICLE_COMPLAINT, _LOAD_COMPLAINT = _place(Seen, "vehicle_complaint"), _place(Seen, "load_complaint")
-_QUAT, _ACCEL = _place(EstimatorState, "vehicle.quat_wxyz"), _place(EstimatorState, "vehicle.accel_quad")
-_TENSION = _place(EstimatorState, "load.tension")
-_HORIZONTAL, _VERTICAL = _place(EstimatorState, "doubt.horizontal"), _place(EstimatorState, "doubt.vertical")
-_CONTROL_MODE, _SLACK_EVENTS = _place(Pilot, "control_mode"), _place(Pilot, "slack_events")
-_SATURATED, _FORCES = _place(Pilot, "mixed.saturated"), _place(Pilot, "mixed.forces")
-_E_X, _E_V = _place(Pilot, "command.e_x"), _place(Pilot, "command.e_v")
-_E_Q, _E_Q_DOT = _place(Pilot, "command.e_q"), _place(Pilot, "command.e_q_dot")
-_E_R, _E_OMEGA = _place(Pilot, "command.e_R"), _place(Pilot, "command.e_Omega")
-_PSI_R, _PSI_Q = _place(Pilot, "command.psi_R"), _place(Pilot, "command.psi_q")
-_Q_C, _R_C = _place(Pilot, "command.q_c"), _place(Pilot, "command.R_c")
-_THRUST, _MOMENT = _place(Pilot, "command.thrust"), _place(Pilot, "command.moment")
-
-
-@kernel
-def _vector(row: Row, first: int) -> Vec3:
-    return (row[first], row[first + 1], row[first + 2])
-
-
-@kernel
-def _four(row: Row, first: int) -> Quat:
-    return (row[first], row[first + 1], row[first + 2], row[first + 3])
+_R_C = _place(Pilot, "command.R_c")
+_NOW_US, _PHASE, _SEQ = (_place(Instant, name) for name in ("now_us", "phase", "seq"))
+_FLAGS, _DISTANCE = _place(Instant, "estimator_flags"), _place(Instant, "distance")
+_ELAPSED, _DURATION = _place(Instant, "elapsed_s"), _place(Instant, "duration_s")
+_X_LOAD, _X_QUAD, _X_QUAD_D = (_place(Instant, name) for name in ("x_load", "x_quad", "x_quad_d"))
+_X_LOAD_D, _V_LOAD_D, _A_LOAD_D = (_place(Instant, name) for name in ("x_load_d", "v_load_d", "a_load_d"))
+_X_ASKED, _V_ASKED = _place(Instant, "x_load_asked"), _place(Instant, "v_load_asked")
+_QUAT_C, _E_X, _E_V = (_place(Instant, name) for name in ("quat_c_wxyz", "e_x", "e_v"))
+_LEAST, _MOST = _place(Instant, "rotor_min"), _place(Instant, "rotor_max")
 
 
 @kernel
@@ -93,67 +120,34 @@ def put_instant(
     there is none); `targets[at]` is its setpoint, as `layout.jets` gives it, and `asked[at]` what the
     mission asks for. `carrying`: in a phase in which the load is tracked; `carries`: the load must be known.
     """
-    x_load, x_quad = _vector(seen, _X_LOAD), _vector(seen, _X_QUAD)
-    x_load_d = x_load_asked = x_load
-    v_load_d = a_load_d = v_load_asked = ZERO
-    x_quad_d = _NOWHERE
-    if control_mode == LOAD_POSITION:
-        x_load_d, v_load_d, a_load_d = _vector(targets[at], 0), _vector(targets[at], 3), _vector(targets[at], 6)
-        x_load_asked, v_load_asked = _vector(asked[at], 0), _vector(asked[at], 3)
-    elif control_mode == QUAD_POSITION:
-        x_quad_d = _vector(targets[at], 0)
-    e_x = e_v = ZERO
-    if carrying:
-        e_x, e_v = _vector(pilot, _E_X), _vector(pilot, _E_V)
-    r = _R_C
-    rotation = (_vector(pilot, r), _vector(pilot, r + 3), _vector(pilot, r + 6))
-    flags = _ESTIMATING
-    if seen[_VEHICLE_COMPLAINT] != 0.0 or (carries and seen[_LOAD_COMPLAINT] != 0.0):
-        flags = 0
-    made = Instant(
-        now_us,
-        phase,
-        seq,
-        x_quad,
-        _vector(seen, _V_QUAD),
-        _four(estimator, _QUAT),
-        _vector(seen, _OMEGA),
-        _vector(estimator, _ACCEL),
-        flags,
-        estimator[_HORIZONTAL],
-        estimator[_VERTICAL],
-        x_load,
-        _vector(seen, _V_LOAD),
-        _vector(seen, _Q_CABLE),
-        _vector(seen, _Q_CABLE_DOT),
-        norm(sub(x_load, x_quad)),
-        estimator[_TENSION],
-        seen[_TAUT] != 0.0,
-        int(pilot[_SLACK_EVENTS]),
-        int(pilot[_CONTROL_MODE]),
-        elapsed_s,
-        duration_s,
-        x_load_d,
-        v_load_d,
-        a_load_d,
-        x_load_asked,
-        v_load_asked,
-        _vector(pilot, _Q_C),
-        x_quad_d,
-        quat_from_rotation(rotation),
-        e_x,
-        e_v,
-        _vector(pilot, _E_Q),
-        _vector(pilot, _E_Q_DOT),
-        _vector(pilot, _E_R),
-        _vector(pilot, _E_OMEGA),
-        pilot[_PSI_R],
-        pilot[_PSI_Q],
-        pilot[_THRUST],
-        _vector(pilot, _MOMENT),
-        _four(pilot, _FORCES),
-        rotor_min,
-        rotor_max,
-        int(pilot[_SATURATED]),
-    )
-    pack(made, instant, 0)
+    for i in range(_OF_SEEN.shape[0]):
+        instant[_OF_SEEN[i, 0]] = seen[_OF_SEEN[i, 1]]
+    for i in range(_OF_ESTIMATOR.shape[0]):
+        instant[_OF_ESTIMATOR[i, 0]] = estimator[_OF_ESTIMATOR[i, 1]]
+    for i in range(_OF_PILOT.shape[0]):
+        instant[_OF_PILOT[i, 0]] = pilot[_OF_PILOT[i, 1]]
+    instant[_NOW_US], instant[_PHASE], instant[_SEQ] = now_us, phase, seq
+    instant[_ELAPSED], instant[_DURATION] = elapsed_s, duration_s
+    instant[_LEAST], instant[_MOST] = rotor_min, rotor_max
+    vague = seen[_VEHICLE_COMPLAINT] != 0.0 or (carries and seen[_LOAD_COMPLAINT] != 0.0)
+    instant[_FLAGS] = 0 if vague else _ESTIMATING
+    x_load = (instant[_X_LOAD], instant[_X_LOAD + 1], instant[_X_LOAD + 2])
+    x_quad = (instant[_X_QUAD], instant[_X_QUAD + 1], instant[_X_QUAD + 2])
+    instant[_DISTANCE] = norm(sub(x_load, x_quad))
+    for j in range(3):
+        instant[_X_LOAD_D + j] = instant[_X_ASKED + j] = x_load[j]
+        instant[_V_LOAD_D + j] = instant[_A_LOAD_D + j] = instant[_V_ASKED + j] = 0.0
+        instant[_X_QUAD_D + j] = nan
+        if control_mode == LOAD_POSITION:
+            instant[_X_LOAD_D + j] = targets[at, j]
+            instant[_V_LOAD_D + j] = targets[at, 3 + j]
+            instant[_A_LOAD_D + j] = targets[at, 6 + j]
+            instant[_X_ASKED + j], instant[_V_ASKED + j] = asked[at, j], asked[at, 3 + j]
+        elif control_mode == QUAD_POSITION:
+            instant[_X_QUAD_D + j] = targets[at, j]
+        if not carrying:
+            instant[_E_X + j] = instant[_E_V + j] = 0.0
+    r = pilot[_R_C : _R_C + 9]
+    q = quat_from_rotation(((r[0], r[1], r[2]), (r[3], r[4], r[5]), (r[6], r[7], r[8])))
+    for i in range(4):
+        instant[_QUAT_C + i] = q[i]

@@ -27,7 +27,8 @@ from autopilot.core.warmup import rehearse
 from autopilot.estimation.filter import estimator_tuning
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, packed
-from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
+from autopilot.onboard.flight_log import FlightLog, LogChunk
+from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import Moment, Moments, Options
@@ -150,7 +151,7 @@ class Onboard:
         self._log: FlightLog | None = None
         if options.log:
             release = ".".join(map(str, identity.version))
-            self._log = FlightLog(parameters, release, options.boot_unix_us)
+            self._log = FlightLog(parameters, release, options.boot_unix_us, options.home)
             self.endpoint.on_text = self._log_text
 
     # ---- simulator link
@@ -245,10 +246,10 @@ class Onboard:
         for seq in report.reached:
             last = self.core.flight.mission.done and seq == report.reached[-1]
             self.endpoint.item_reached(seq, last)
-        if self._log is not None:
-            rate_hz = self.parameters["LOG_RATE_HZ"]
-            self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self.log_sample)
-            self.endpoint.files.protected = self._log.path
+        log = self._log
+        if log is not None and log.due(tick.now_us, self.armed):
+            log.step(self.now_us, self.armed, self._log_names, self.log_sample)
+            self.endpoint.files.protected = log.path
 
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -273,6 +274,7 @@ class Onboard:
         """The shell could not store the log."""
         if self._log is not None:
             self._log.give_up()
+            self.endpoint.files.protected = None
         self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Flight log lost: {why}")
 
     def _log_names(self) -> set[str]:
@@ -284,7 +286,8 @@ class Onboard:
     def log_sample(self) -> Sample:
         """What the flight log records at this tick."""
         moment = self._snapshot()
-        return Sample(moment, self._sensors.sample, moment.accel_quad, lambda: moment.estimator)
+        sane = self._sensors.sample is not None
+        return Sample(moment, moment.instant, self._sensors.imu, sane, lambda: moment.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:

@@ -377,6 +377,6 @@ def _wind(m: Moment) -> tuple[Any, ...]:
 
 @_makes("battery_voltage", "battery_current", "battery_used_mah", "battery_remaining")
 def _battery(m: Moment) -> tuple[Any, ...]:
-    condition = m.condition
+    condition, battery = m.condition, m.moments.battery
     used_mah = condition.used_as / 3.6
-    return voltage(condition, m.moments.battery), condition.current, used_mah, remaining(condition, m.moments.battery)
+    return voltage(condition, battery), condition.current, used_mah, remaining(condition, battery)

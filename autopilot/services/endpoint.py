@@ -365,7 +365,8 @@ class VehicleEndpoint:
     def _new_link(self, configured: bool, now_us: int) -> LinkState:
         taken = {state.number for state in self._links.values()}
         number = next(number for number in range(len(taken) + 1) if number not in taken)
-        return LinkState(configured, self._defaults, now_us, number & 0xFF, self._signing.signer, self.identity.system)
+        signer, system = self._signing.signer, self.identity.system
+        return LinkState(configured, self._defaults, now_us, number & 0xFF, signer, system)
 
     def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)
