@@ -183,10 +183,19 @@ def told(flight: Flight, items: int) -> Told:
     area, sequence = flight.area, flight.mission.plan.sequence
     seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
     return Told(
-        *(area.home, area.breach, area.breaches, area.breach_us),
-        *(flight.phase not in (Phase.DISARMED, Phase.FAILSAFE), int(flight.phase), *mode_of(flight)),
+        area.home,
+        area.breach,
+        area.breaches,
+        area.breach_us,
+        flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
+        int(flight.phase),
+        *mode_of(flight),
         _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
-        *(seq, seq, items, mission_state(flight, items), flight.cable.reel_rate),
+        seq,
+        seq,
+        items,
+        mission_state(flight, items),
+        flight.cable.reel_rate,
     )
 
 

@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from autopilot.geometry.packed import Row
+import numpy as np
+
 from autopilot.services.commands import CommandService
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
@@ -83,6 +84,7 @@ _UINT16 = 2**16 - 1
 _ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
+_NO_INSTANT = np.zeros(0)
 
 _STREAMED = FollowSetpoint | FollowAttitude | FollowStick  # they change no mode
 _METADATA = {
@@ -264,21 +266,22 @@ class VehicleEndpoint:
             link: [*state.announced, *state.streams.take_due(now_us)] for link, state in self._links.items()
         }
         datagrams: list[tuple[Link, bytes]] = []
-        instant: Row | None = None
+        instant, in_kernel = _NO_INSTANT, False
         if any(keys.values()):
             plans = [self._missions.plan_id(kind) for kind in PLANS]
             snapshot = make_snapshot()
             snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, (plans[0], plans[1], plans[2])
             self._watch(snapshot)
             # what is signed is written frame by frame
-            instant = None if self._signing.signing is not None else snapshot.instant
+            if snapshot.instant is not None and self._signing.signing is None:
+                instant, in_kernel = snapshot.instant, True
         built: dict[int, list[Outgoing]] = {}
         for link, state in self._links.items():
             outgoing: list[Outgoing | int] = [(self._own, message) for message in state.queue]
             # what was announced just now is in its order before the streams
             due = dict.fromkeys((*state.announced, *keys[link])) if state.announced else keys[link]
             for key in due:
-                bit = 0 if instant is None else BITS.get(key, 0)
+                bit = BITS.get(key, 0) if in_kernel else 0
                 if bit:
                     last = outgoing[-1] if outgoing else 0
                     if type(last) is int and 0 < last < bit:

@@ -19,7 +19,11 @@ from autopilot.wire.convert.flight import (
     rotor_state_values,
 )
 from autopilot.wire.convert.simulator import Forces
-from autopilot.wire.convert.telemetry import attitude_quaternion_values, local_position_ned_values
+from autopilot.wire.convert.telemetry import (
+    attitude_quaternion_values,
+    attitude_values,
+    local_position_ned_values,
+)
 from autopilot.wire.dialect import plumbline as mavlink
 
 _ESTIMATED = mavlink.PLUMBLINE_SOURCE_ESTIMATED
@@ -80,8 +84,14 @@ class Instant(NamedTuple):
 
 
 @register_jitable
+def attitude_of(s: Any) -> tuple[float, ...]:
+    """ATTITUDE of an instant, its numbers in the order of the wire; so are all of these."""
+    return attitude_values(s.now_us, s.quat_wxyz, s.omega_body)
+
+
+@register_jitable
 def attitude_quaternion_of(s: Any) -> tuple[float, ...]:
-    """ATTITUDE_QUATERNION of an instant, its numbers in the order of the wire; so are all of these."""
+    """ATTITUDE_QUATERNION."""
     return attitude_quaternion_values(s.now_us, s.quat_wxyz, s.omega_body)
 
 

@@ -67,19 +67,19 @@ class LinkState:
             writer = self.writers[source] = FrameWriter(*source)
         return writer
 
-    def datagrams(self, outgoing: Iterable[Outgoing | int], instant: Row | None) -> list[bytes]:
+    def datagrams(self, outgoing: Iterable[Outgoing | int], instant: Row) -> list[bytes]:
         """Frames in their order, as many in a datagram as go in. A number is a set of streams of `instant`,
         as `StreamFrames` has them; of a link that signs there must be none."""
         datagrams: list[bytes] = []
         frames: list[bytes] = []
         size, sign, writers = 0, self.signer(self.number), self.writers
         for one in outgoing:
-            if type(one) is int:
+            if isinstance(one, int):
                 made = self._streams.frames(one, instant)
-                several = (made,) if size + len(made) <= DATAGRAM_BYTES else split(made)
+                several = [made] if size + len(made) <= DATAGRAM_BYTES else split(made)
             else:
                 source, message = one
-                several = ((writers.get(source) or self._writer(source)).frame(message, sign),)
+                several = [(writers.get(source) or self._writer(source)).frame(message, sign)]
             for frame in several:
                 size += len(frame)
                 if size > DATAGRAM_BYTES:

@@ -14,6 +14,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, unpack
 from autopilot.services.instant import (
     Instant,
+    attitude_of,
     attitude_quaternion_of,
     cascade_errors_of,
     load_setpoint_of,
@@ -25,6 +26,7 @@ from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM, Bytes, Origin, put_frame, wire_record
 from autopilot.wire.dialect import plumbline as mavlink
 
+ATTITUDE = wire_record(mavlink.MAVLink_attitude_message, __name__)
 ATTITUDE_QUATERNION = wire_record(mavlink.MAVLink_attitude_quaternion_message, __name__)
 LOCAL_POSITION_NED = wire_record(mavlink.MAVLink_local_position_ned_message, __name__)
 LOAD_STATE = wire_record(mavlink.MAVLink_load_state_message, __name__)
@@ -34,14 +36,15 @@ ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
 
 # a set of these streams is the sum of their bits, which rise in the order in which they are sent
 BITS = {
-    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 1,
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 2,
-    mavlink.MAVLINK_MSG_ID_LOAD_STATE: 4,
-    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: 8,
-    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: 16,
-    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: 32,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 1,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 2,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 4,
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE: 8,
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: 16,
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: 32,
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: 64,
 }
-_OF_AUTOPILOT = 1 | 2  # the others leave from the component of the dialect
+_OF_AUTOPILOT = 1 | 2 | 4  # the others leave from the component of the dialect
 
 
 @kernel
@@ -64,27 +67,36 @@ def put_streams(
     at = 0
     if streams & 1:
         origin = Origin(sequence, system, component)
-        at = put_frame(ATTITUDE_QUATERNION, attitude_quaternion_of(s), payload, buffer, at, origin)
+        at = put_frame(ATTITUDE, attitude_of(s), payload, buffer, at, origin)
         sequence += 1
     if streams & 2:
         origin = Origin(sequence, system, component)
-        at = put_frame(LOCAL_POSITION_NED, local_position_ned_of(s), payload, buffer, at, origin)
+        at = put_frame(ATTITUDE_QUATERNION, attitude_quaternion_of(s), payload, buffer, at, origin)
+        sequence += 1
     if streams & 4:
+        origin = Origin(sequence, system, component)
+        at = put_frame(LOCAL_POSITION_NED, local_position_ned_of(s), payload, buffer, at, origin)
+    if streams & 8:
         origin = Origin(dialect_sequence, system, dialect_component)
         at = put_frame(LOAD_STATE, load_state_of(s), payload, buffer, at, origin)
         dialect_sequence += 1
-    if streams & 8:
+    if streams & 16:
         origin = Origin(dialect_sequence, system, dialect_component)
         at = put_frame(LOAD_SETPOINT, load_setpoint_of(s), payload, buffer, at, origin)
         dialect_sequence += 1
-    if streams & 16:
+    if streams & 32:
         origin = Origin(dialect_sequence, system, dialect_component)
         at = put_frame(CASCADE_ERRORS, cascade_errors_of(s), payload, buffer, at, origin)
         dialect_sequence += 1
-    if streams & 32:
+    if streams & 64:
         origin = Origin(dialect_sequence, system, dialect_component)
         at = put_frame(ROTOR_STATE, rotor_state_of(s), payload, buffer, at, origin)
     return at
+
+
+def rehearse(instant: Row) -> None:
+    """Make the frames of all streams once, so that nothing is compiled in flight."""
+    StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2)).frames(sum(BITS.values()), instant)
 
 
 class StreamFrames:

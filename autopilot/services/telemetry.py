@@ -24,6 +24,7 @@ from autopilot.services.identity import (
     protocol_version_message,
 )
 from autopilot.services.instant import (
+    attitude_of,
     attitude_quaternion_of,
     cascade_errors_of,
     load_setpoint_of,
@@ -37,7 +38,6 @@ from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import (
     ROTOR_FMAX,
     altitude_message,
-    attitude_message,
     attitude_target_message,
     boot_ms,
     global_position_int_message,
@@ -174,7 +174,7 @@ def _local_position_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _attitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (attitude_message(s.now_us, s.quat_wxyz, s.omega_body),)
+    return ((_ATTITUDE, attitude_of(s)),)
 
 
 def _attitude_quaternion(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

@@ -49,12 +49,18 @@ def boot_ms(now_us: int) -> int:
     return now_us // 1000 & 0xFFFF_FFFF
 
 
+@register_jitable
 def euler_ned_frd(quat_wxyz: Quat) -> Vec3:
     """(roll, pitch, yaw) in rad of MAVLink, from the attitude body FLU to world ENU; yaw 0 is north."""
     w, x, y, z = quat_ned_frd_from_enu_flu(quat_wxyz)
+    sine = 2.0 * (w * y - z * x)
+    if not sine > -1.0:
+        sine = -1.0
+    elif sine > 1.0:
+        sine = 1.0
     return (
         math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x)))),
+        math.asin(sine),
         math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     )
 
@@ -65,9 +71,15 @@ def heading_cdeg(quat_wxyz: Quat) -> int:
     return 0xFFFF if math.isnan(yaw) else round(math.degrees(yaw) * 100.0) % 36000
 
 
+@register_jitable
+def attitude_values(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> tuple[float, ...]:
+    """ATTITUDE: the numbers in the order of the wire."""
+    return (boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body))
+
+
 def attitude_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
     """ATTITUDE."""
-    return _ATTITUDE, (boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body))
+    return _ATTITUDE, attitude_values(now_us, quat_wxyz, omega_body)
 
 
 class AttitudeQuaternion(NamedTuple):
