@@ -73,7 +73,6 @@ from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
-PLANS = (mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 REACHED_AGAIN = 4  # times that the end of a mission is said again
 REACHED_US = 300_000  # between two of them
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
@@ -262,33 +261,33 @@ class VehicleEndpoint:
             self._follow_up(self._events)
             self._say_reached_again(now_us)
             self._work, self._stirred = False, True
-        keys = {
-            link: [*state.announced, *state.streams.take_due(now_us)] for link, state in self._links.items()
-        }
+        ahead = [(link, state, state.streams.take_due(now_us)) for link, state in self._links.items()]
         datagrams: list[tuple[Link, bytes]] = []
         instant, in_kernel = _NO_INSTANT, False
-        if any(keys.values()):
-            plans = [self._missions.plan_id(kind) for kind in PLANS]
+        if any(keys or state.announced for _, state, keys in ahead):
             snapshot = make_snapshot()
-            snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, (plans[0], plans[1], plans[2])
+            snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, self._missions.plan_ids
             self._watch(snapshot)
             # what is signed is written frame by frame
             if snapshot.instant is not None and self._signing.signing is None:
                 instant, in_kernel = snapshot.instant, True
         built: dict[int, list[Outgoing]] = {}
-        for link, state in self._links.items():
+        for link, state, streams in ahead:
             outgoing: list[Outgoing | int] = [(self._own, message) for message in state.queue]
-            # what was announced just now is in its order before the streams
-            due = dict.fromkeys((*state.announced, *keys[link])) if state.announced else keys[link]
-            for key in due:
+            # what was announced, just now as well, comes before the streams
+            keys = dict.fromkeys((*state.announced, *streams)) if state.announced else streams
+            last = 0
+            for key in keys:
                 bit = BITS.get(key, 0) if in_kernel else 0
                 if bit:
-                    last = outgoing[-1] if outgoing else 0
-                    if type(last) is int and 0 < last < bit:
-                        outgoing[-1] = last | bit
+                    if 0 < last < bit:  # they are written together
+                        last |= bit
+                        outgoing[-1] = last
                     else:
+                        last = bit
                         outgoing.append(bit)
                     continue
+                last = 0
                 made = built.get(key)
                 if made is None:
                     made = built[key] = self._build(key, snapshot)
