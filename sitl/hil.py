@@ -17,7 +17,7 @@ from autopilot.geometry.linear import ZERO
 from autopilot.geometry.packed import Row, packed
 from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.compiled import FRAME_ROOM
+from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
@@ -94,6 +94,7 @@ class HilSimulator:
         self._lockstep = lockstep
         self._truth_every = truth_every
         self._put_sensors: Callable[..., tuple[int, int]] | None = None  # its machine code, once it was run
+        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._begin()
@@ -187,7 +188,7 @@ class HilSimulator:
         ignored: other messages, systems and ticks, rubbish.
         In real time a late command is still the newest one, and is used.
         """
-        answer = answer_in(datagram, VEHICLE_SYSTEM)
+        answer = answer_in(datagram, VEHICLE_SYSTEM, self._payload)
         if answer[0]:
             self._take(*answer[1:])
             return self.answered
@@ -268,7 +269,8 @@ class HilSimulator:
         writer, core = self._sensor_writer, self.core
         aside = self.parameters.take()
         first = b"".join(map(writer.frame, aside)) if aside else b""
-        arguments = (core.rows, core.now_us, self._newest, self._statement, self._buffer, writer.sequence)
+        room = (self._buffer, self._payload)
+        arguments = (core.rows, core.now_us, self._newest, self._statement, *room, writer.sequence)
         if self._put_sensors is None:
             self._put_sensors = entry_of(put_sensors, *arguments)
         length, writer.sequence = self._put_sensors(*arguments)
@@ -284,8 +286,8 @@ class HilSimulator:
             return None
         writer, datagram = self._truth_writer, b""
         if due:
-            rows = core.rows
-            length = put_truth(rows.world, rows.model, self._statement, self._buffer, writer.sequence)
+            room = (self._buffer, self._payload)
+            length = put_truth(core.rows.world, core.rows.model, self._statement, *room, writer.sequence)
             writer.sequence = (writer.sequence + TRUTH_FRAMES) & 0xFF
             datagram = self._buffer[:length].tobytes()
         if wind_due or snapped:

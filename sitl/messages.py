@@ -5,13 +5,11 @@ from __future__ import annotations
 from math import nan
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, apply_transposed, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.geometry.so3 import rotation_from_quat
-from autopilot.wire.compiled import PAYLOAD_ROOM, Bytes, Origin, put_frame
+from autopilot.wire.compiled import Bytes, Origin, put_frame
 from autopilot.wire.convert import Home
 from autopilot.wire.convert.flight import load_state_values, rotor_state_values
 from autopilot.wire.convert.simulator import (
@@ -100,15 +98,15 @@ def _put(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, sequenc
 
 @kernel
 def put_sensors(
-    rows: WorldRows, now_us: int, newest: Row, statement: Row, buffer: Bytes, sequence: int
+    rows: WorldRows, now_us: int, newest: Row, statement: Row, buffer: Bytes, payload: Bytes, sequence: int
 ) -> tuple[int, int]:
     """Take out of the queues what has left the sensors by now, and write its frames, HIL_SENSOR last.
 
     Returns how many bytes they have and the sequence number of the next frame. `newest` is a `Newest`, which
-    is brought up to date, `statement` a `Statement`.
+    is brought up to date, `statement` a `Statement`; `payload` has PAYLOAD_ROOM bytes to work with.
     """
     said = unpack(Statement, statement, 0)
-    stated, payload = said.stated, np.empty(PAYLOAD_ROOM, np.uint8)
+    stated = said.stated
     queue = rows.queue
     at = fields = 0
     found = arrived(MOCAP, now_us, rows)
@@ -216,11 +214,12 @@ def put_sensors(
 
 
 @kernel
-def put_truth(world_row: Row, model_row: Row, statement: Row, buffer: Bytes, sequence: int) -> int:
+def put_truth(
+    world_row: Row, model_row: Row, statement: Row, buffer: Bytes, payload: Bytes, sequence: int
+) -> int:
     """Write HIL_STATE_QUATERNION, LOAD_STATE and ROTOR_STATE of this tick; how many bytes they have."""
     world, truth = unpack(World, world_row, 0), unpack(WorldModel, model_row, 0).truth
     state, home = world.plant, unpack(Statement, statement, 0).home
-    payload = np.empty(PAYLOAD_ROOM, np.uint8)
     a = state.accel_quad
     vehicle = hil_state_quaternion_values(
         world.now_us,

@@ -1,7 +1,7 @@
 """The flight software around its compiled tick: the supervisor where it may have something to decide.
 
 `FlightCore` is driven by the simulator link in the processes and by the loop of a sweep: `step` runs a tick,
-`decide` finishes one whose estimate a sweep's loop has made already. The cable as the winch has it enters the
+`decide` is the supervisor's part of one that a sweep's loop flies. The cable as the winch has it enters the
 tick as `Winch`, what is flown and until when as `Stretch` with its setpoints laid out.
 """
 
@@ -29,7 +29,6 @@ from autopilot.core.tick import (
     Pilot,
     Seen,
     Winch,
-    control_tick,
     fly_tick,
 )
 from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints
@@ -173,17 +172,18 @@ class FlightCore:
         """One tick of `dt` seconds with the first `count` readings of the inbox."""
         self.move_cable(now_us)
         if self._fly is None:
-            self._fly = entry_of(fly_tick, self.rows, self.law_rows, count, now_us, tick, dt)
-        if self._fly(self.rows, self.law_rows, count, now_us, tick, dt) != TO_DECIDE:
+            self._fly = entry_of(fly_tick, self.rows, self.law_rows, count, now_us, tick, dt, False)
+        if self._fly(self.rows, self.law_rows, count, now_us, tick, dt, False) != TO_DECIDE:
             return _NOTHING
-        return self.decide(now_us, round(dt * 1e6))
+        report = self.decide(now_us, round(dt * 1e6))
+        self._fly(self.rows, self.law_rows, count, now_us, tick, dt, True)
+        return report
 
     def decide(self, now_us: int, period_us: int) -> Report:
-        """The supervisor's part of a tick that is estimated already, and the law's behind it."""
+        """The supervisor's part of a tick that is estimated already; the law's is still to come."""
         self.flight, report = advance(self.flight, self.view(now_us, pulls=True), self.settings)
         self._dirty = True
         self._lay_out(now_us, period_us)
-        control_tick(self.rows, self.law_rows, 0)
         return report
 
     def move_cable(self, now_us: int) -> None:

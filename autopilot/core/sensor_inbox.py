@@ -34,7 +34,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack, packed, unpack, width
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.compiled import PAYLOAD_ROOM, frame_end, holds, taken
+from autopilot.wire.compiled import PAYLOAD_ROOM, Bytes, frame_end, holds, taken
 from autopilot.wire.convert import (
     MAG,
     PRESSURE,
@@ -129,14 +129,13 @@ def _put_fix(inbox: Array, at: int, gps: HilGps) -> int:
 
 @kernel
 def _read(
-    datagram: bytes, home: Row, since_us: int, inbox: Array, imu: Row, fix: Row
+    datagram: bytes, home: Row, since_us: int, inbox: Array, imu: Row, fix: Row, payload: Bytes
 ) -> tuple[int, int, int, bool]:
     """The number of readings that a datagram holds, its time, HIL_SENSOR.fields_updated, and whether there
     was a HIL_GPS. As many readings as there is room for go into the inbox, in the order in which they are
     absorbed; the inertial sample also into `imu` and the HIL_GPS into `fix`, if the tick is later than
     `since_us`.
     """
-    payload = np.empty(PAYLOAD_ROOM, np.uint8)
     place = unpack(Home, home, 0)
     sensor, gps = _NO_SENSOR, _NO_FIX
     sensed = fixed = False
@@ -183,6 +182,7 @@ class SensorInbox:
         self._home = packed(home)
         self.imu = np.full(width(ImuReading), np.nan)  # `ImuReading` of the last tick
         self.fix = np.zeros(width(HilGps))  # `HilGps`, the last one
+        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._writer = FrameWriter(1, 1)
 
     def read(self, datagram: bytes, since_us: int) -> Tick | None:
@@ -204,10 +204,10 @@ class SensorInbox:
         return Tick(now_us, count, fields, fixed, aside)
 
     def _read(self, datagram: bytes, since_us: int) -> tuple[int, int, int, bool]:
-        found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix)
+        found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
         if found[0] > len(self.rows):
             self.rows = new_inbox(2 * found[0])
-            found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix)
+            found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
         return found
 
     @property

@@ -5,7 +5,7 @@ readings -> estimate -> (may the supervisor have something to decide?) -> law ->
 All that is carried from tick to tick lies in `CoreRows`, flat arrays that `fly_tick` reads and writes; which
 law flies, the compiler sees by the type of the law's rows. Where the supervisor may have something to decide
 the tick stops behind the estimate and says so: `autopilot.core.flight_core` then lets it decide, in Python,
-and has the tick finished by `control_tick`. No clock, no socket, no hidden state.
+and calls again for the rest of the tick. No clock, no socket, no hidden state.
 """
 
 from __future__ import annotations
@@ -262,7 +262,6 @@ def control_tick(rows: CoreRows, law_rows: Any, at: int) -> None:
         pack(memory, law_rows.memory, 0)
         mixed = mix(command.thrust, command.moment, vehicle, constants.limited)
     actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, constants.actuation)
-    rows.commands[:] = actuation.queue
     pilot = Pilot(
         command,
         mixed,
@@ -277,8 +276,16 @@ def control_tick(rows: CoreRows, law_rows: Any, at: int) -> None:
 
 
 @kernel
-def fly_tick(rows: CoreRows, law_rows: Any, count: int, now_us: int, tick: int, dt: float) -> int:
-    """One tick, `dt` seconds after the last: ESTIMATED, FLOWN, or TO_DECIDE before `control_tick`."""
+def fly_tick(
+    rows: CoreRows, law_rows: Any, count: int, now_us: int, tick: int, dt: float, decided: bool
+) -> int:
+    """One tick, `dt` seconds after the last: ESTIMATED, FLOWN, or TO_DECIDE before the law has its turn.
+
+    `decided`: of a tick that was to be decided upon, what is left.
+    """
+    if decided:
+        control_tick(rows, law_rows, 0)
+        return FLOWN
     sense(rows, count, now_us, dt)
     constants = unpack(CoreConstants, rows.constants, 0)
     if tick % constants.control_every != 0:

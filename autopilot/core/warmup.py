@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, Setup
-from autopilot.core.tick import control_tick, fly_tick
+from autopilot.core.tick import fly_tick
 from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
@@ -19,15 +19,9 @@ from missions.model import Signals, Sine, Term, Waypoint
 
 
 def rehearse_tick(setup: Setup) -> None:
-    """Run a whole tick."""
+    """Run a tick."""
     core = FlightCore(setup)
-    fly_tick(core.rows, core.law_rows, 0, 0, 0, 0.0)
-
-
-def rehearse_law(setup: Setup) -> None:
-    """Run the part of a tick that follows a decision of the supervisor."""
-    core = FlightCore(setup)
-    control_tick(core.rows, core.law_rows, 0)
+    fly_tick(core.rows, core.law_rows, 0, 0, 0, 0.0, False)
 
 
 def rehearse_paths(setup: Setup) -> None:
@@ -54,7 +48,7 @@ def rehearse_paths(setup: Setup) -> None:
     demand(np.zeros((7, 1, 3)), limits.body)  # of paths through waypoints
 
 
-PARTS = {"tick": rehearse_tick, "law": rehearse_law, "paths": rehearse_paths}
+PARTS = {"tick": rehearse_tick, "paths": rehearse_paths}
 
 
 def rehearse(setup: Setup) -> None:

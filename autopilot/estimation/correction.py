@@ -1,7 +1,7 @@
-"""What all corrections share: the past a reading speaks of, rows of its Jacobian, and the state moved by it.
+"""What all corrections share: the past a reading speaks of, entries of its Jacobian, and the state moved.
 
-A reading of `age` ago is a function of the errors of *then*; `row` wants them in errors of *now*. Errors move
-by x' = F x, and back over the age
+A reading of `age` ago is a function of the errors of *then*; a Jacobian wants them in errors of *now*. Errors
+move by x' = F x, and back over the age
 
     attitude(then)  = attitude + age R gyro bias
     velocity(then)  = velocity - attitude x S + age R accel bias
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from autopilot.estimation.covariance import clear_row
+from autopilot.estimation.covariance import enter
 from autopilot.estimation.history import carry_back, past3, past4, row_before
 from autopilot.estimation.records import (
     ACCEL_BIAS,
@@ -103,64 +103,55 @@ def look_back(state: EstimatorState, history: History, tuning: EstimatorTuning, 
 
 
 @kernel
-def _attitude_cross(history: History, i: int, s: float, v: Vec3) -> None:
-    """Add s (attitude x v)_i."""
-    row = history.row
+def _attitude_cross(history: History, k: int, i: int, s: float, v: Vec3) -> None:
+    """Enter s (attitude x v)_i."""
     if i == 0:
-        row[ATTITUDE + 1] += s * v[2]
-        row[ATTITUDE + 2] -= s * v[1]
+        enter(history, k, ATTITUDE + 1, s * v[2])
+        enter(history, k, ATTITUDE + 2, -s * v[1])
     elif i == 1:
-        row[ATTITUDE + 2] += s * v[0]
-        row[ATTITUDE] -= s * v[2]
+        enter(history, k, ATTITUDE + 2, s * v[0])
+        enter(history, k, ATTITUDE, -s * v[2])
     else:
-        row[ATTITUDE] += s * v[1]
-        row[ATTITUDE + 1] -= s * v[0]
+        enter(history, k, ATTITUDE, s * v[1])
+        enter(history, k, ATTITUDE + 1, -s * v[0])
 
 
 @kernel
-def position_row(history: History, past: Past, i: int, n: int) -> None:
-    """Row of component i of the vehicle's position then."""
-    clear_row(history, n)
-    row = history.row
-    row[POSITION + i] = 1.0
-    row[VELOCITY + i] = -past.age
-    _attitude_cross(history, i, 1.0, past.moved)
+def enter_position(history: History, k: int, past: Past, i: int) -> None:
+    """Component i of the vehicle's position then."""
+    enter(history, k, POSITION + i, 1.0)
+    enter(history, k, VELOCITY + i, -past.age)
+    _attitude_cross(history, k, i, 1.0, past.moved)
     s = -0.5 * past.age * past.age
     for j in range(3):
-        row[ACCEL_BIAS + j] = s * past.R[i][j]
+        enter(history, k, ACCEL_BIAS + j, s * past.R[i][j])
 
 
 @kernel
-def velocity_row(history: History, past: Past, i: int, n: int) -> None:
-    """Row of component i of the vehicle's velocity then."""
-    clear_row(history, n)
-    row = history.row
-    row[VELOCITY + i] = 1.0
-    _attitude_cross(history, i, -1.0, past.gained)
+def enter_velocity(history: History, k: int, past: Past, i: int) -> None:
+    """Component i of the vehicle's velocity then."""
+    enter(history, k, VELOCITY + i, 1.0)
+    _attitude_cross(history, k, i, -1.0, past.gained)
     for j in range(3):
-        row[ACCEL_BIAS + j] = past.age * past.R[i][j]
+        enter(history, k, ACCEL_BIAS + j, past.age * past.R[i][j])
 
 
 @kernel
-def attitude_row(history: History, past: Past, axis: Vec3, n: int) -> None:
-    """Row of the attitude error then about a world axis."""
-    clear_row(history, n)
-    row = history.row
+def enter_attitude(history: History, k: int, past: Past, axis: Vec3) -> None:
+    """The attitude error then about a world axis."""
     for i in range(3):
-        row[ATTITUDE + i] = axis[i]
-        row[GYRO_BIAS + i] = past.age * (
-            axis[0] * past.R[0][i] + axis[1] * past.R[1][i] + axis[2] * past.R[2][i]
-        )
+        enter(history, k, ATTITUDE + i, axis[i])
+        about = axis[0] * past.R[0][i] + axis[1] * past.R[1][i] + axis[2] * past.R[2][i]
+        enter(history, k, GYRO_BIAS + i, past.age * about)
 
 
 @kernel
-def add_direction(history: History, past: Past, first: float, second: float) -> None:
-    """Add first, second times the two components of the cable's direction then."""
-    row = history.row
-    row[DIRECTION] += past.bend * first
-    row[DIRECTION + 1] += past.bend * second
-    row[RATE] -= past.age * first
-    row[RATE + 1] -= past.age * second
+def enter_direction(history: History, k: int, past: Past, first: float, second: float) -> None:
+    """`first`, `second` times the two components of the cable's direction then."""
+    enter(history, k, DIRECTION, past.bend * first)
+    enter(history, k, DIRECTION + 1, past.bend * second)
+    enter(history, k, RATE, -past.age * first)
+    enter(history, k, RATE + 1, -past.age * second)
 
 
 @kernel
@@ -273,7 +264,7 @@ def load_at(load: LoadEstimate, age_s: float, rejected: float, source: float) ->
 @kernel
 def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, plain: float) -> LoadEstimate:
     """The cable moved by the correction in `error`; while taut the load is where it ends."""
-    e = history.error
+    e = history.error[0]
     along = cross(load.q_cable, load.across)
     off = add(scale(e[DIRECTION], load.across), scale(e[DIRECTION + 1], along))
     turned = add(scale(e[RATE], load.across), scale(e[RATE + 1], along))
@@ -310,7 +301,7 @@ def moved_load(load: LoadEstimate, vehicle: VehicleEstimate, history: History, p
 @kernel
 def inject(state: EstimatorState, history: History) -> EstimatorState:
     """The state moved by the correction in `error`, and the ring with it."""
-    e, v, a = history.error, state.vehicle, state.aids
+    e, v, a = history.error[0], state.vehicle, state.aids
     turned = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
     moved = (e[POSITION], e[POSITION + 1], e[POSITION + 2])
     shift = (e[GYRO_BIAS], e[GYRO_BIAS + 1], e[GYRO_BIAS + 2])

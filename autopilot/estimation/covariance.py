@@ -1,11 +1,16 @@
-"""The covariance of the error state: moved in time by its known sparsity, narrowed by one scalar at a time.
+"""The covariance of the error state: moved in time by its known sparsity, narrowed by some scalars at a time.
 
 An error x of the state obeys x' = F x + noise. `transit` applies Phi = I + F dt to the rows of P, transposes
 and applies it again, Phi (Phi P)^T = Phi P Phi^T, so that each of the two passes runs along rows.
+
+What a reading measures are scalars y_k = h_k x + noise of variance r_k, each independent of the others. They
+are absorbed one after the other, but P is moved once: row k of H P loses what it shares with the scalars
+before it, and P the sum of the squares of these rows over their variances.
 """
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from autopilot.estimation.records import (
@@ -15,18 +20,20 @@ from autopilot.estimation.records import (
     DIRECTION,
     GNSS,
     GYRO_BIAS,
+    INNOVATION,
     LENGTH,
     POSITION,
     RATE,
     SIZE,
+    VARIANCE,
     VELOCITY,
     Array,
     EstimatorTuning,
     History,
-    Steps,
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, apply_transposed, cross, dot, scale
+from autopilot.geometry.wide import WIDTH, mirror_block, put_wide, transpose_blocks, wide_at
 
 
 class Transit(NamedTuple):
@@ -47,79 +54,101 @@ class Transit(NamedTuple):
     parting_std: float  # m/s, at which the ends of the cable part
 
 
-@kernel
-def _step(steps: Steps, k: int, to: int, of: int, factor: float) -> int:
-    """Write step k: row `to` += factor times row `of`. The number of the next one."""
-    steps.to[k], steps.of[k], steps.factor[k] = to, of, factor
-    return k + 1
+class CableDrive(NamedTuple):
+    """What drives the rate of the cable's direction along one of its axes, over a step."""
+
+    attitude: Vec3
+    bias: Vec3  # of the accelerometer
+    length: float
+    direction: tuple[float, float]
 
 
 @kernel
-def _step3(steps: Steps, k: int, to: int, of: int, c: Vec3) -> int:
-    """Row `to` += c . rows of ... of+2, of which what is zero is left out."""
-    for i in range(3):
-        if c[i] != 0.0:
-            k = _step(steps, k, to, of + i, c[i])
-    return k
+def _cable_drive(to: Transit, dt: float, i: int) -> CableDrive:
+    """The part of Phi in the row of RATE + i."""
+    f = to.force
+    axis = to.across if i == 0 else to.along
+    rates = (dot(to.across, to.q_cable_dot), dot(to.along, to.q_cable_dot))
+    speed2 = rates[0] * rates[0] + rates[1] * rates[1]
+    stiff = dot(to.q_cable, f) / to.length - speed2
+    s = dt / to.length
+    # two neighbouring paths on the sphere draw together: |q'|^2 across the motion
+    own, other = dt * (stiff + rates[i] * rates[i]), dt * rates[0] * rates[1]
+    return CableDrive(
+        scale(-s, cross(f, axis)),
+        scale(s, apply_transposed(to.R, axis)),
+        s / to.length * dot(axis, f),
+        (own, other) if i == 0 else (other, own),
+    )
 
 
 @kernel
-def _half(steps: Steps, k: int, to: Transit, dt: float) -> int:
-    """Half a step of position and direction with their present rates."""
-    for i in range(3):
-        k = _step(steps, k, POSITION + i, VELOCITY + i, 0.5 * dt)
-    if to.taut > 0.0:
-        for i in range(2):
-            k = _step(steps, k, DIRECTION + i, RATE + i, 0.5 * dt)
-    return k
+def _move_rows(P: Array, to: Transit, first: CableDrive, second: CableDrive, dt: float, n: int) -> None:
+    """P becomes Phi P, eight columns at a time: half a step of position and direction with their present
+    rates, then the rates and the attitude, then the other half."""
+    half = 0.5 * dt
+    f, R = scale(dt, to.force), to.R
+    for j in range(0, n, WIDTH):
+        a0, a1, a2 = wide_at(P, ATTITUDE, j), wide_at(P, ATTITUDE + 1, j), wide_at(P, ATTITUDE + 2, j)
+        b0, b1, b2 = wide_at(P, ACCEL_BIAS, j), wide_at(P, ACCEL_BIAS + 1, j), wide_at(P, ACCEL_BIAS + 2, j)
+        g0, g1, g2 = wide_at(P, GYRO_BIAS, j), wide_at(P, GYRO_BIAS + 1, j), wide_at(P, GYRO_BIAS + 2, j)
+        if to.taut > 0.0:
+            r0, r1, length = wide_at(P, RATE, j), wide_at(P, RATE + 1, j), wide_at(P, LENGTH, j)
+            d0 = wide_at(P, DIRECTION, j) + half * r0
+            d1 = wide_at(P, DIRECTION + 1, j) + half * r1
+            c, e, m = first, first.attitude, first.bias
+            r0 = r0 + e[0] * a0 + e[1] * a1 + e[2] * a2 + m[0] * b0 + m[1] * b1 + m[2] * b2
+            r0 = r0 + c.length * length + c.direction[0] * d0 + c.direction[1] * d1
+            c, e, m = second, second.attitude, second.bias
+            r1 = r1 + e[0] * a0 + e[1] * a1 + e[2] * a2 + m[0] * b0 + m[1] * b1 + m[2] * b2
+            r1 = r1 + c.length * length + c.direction[0] * d0 + c.direction[1] * d1
+            put_wide(P, RATE, j, r0)
+            put_wide(P, RATE + 1, j, r1)
+            put_wide(P, DIRECTION, j, d0 + half * r0)
+            put_wide(P, DIRECTION + 1, j, d1 + half * r1)
+        v0, v1, v2 = wide_at(P, VELOCITY, j), wide_at(P, VELOCITY + 1, j), wide_at(P, VELOCITY + 2, j)
+        x0 = wide_at(P, POSITION, j) + half * v0
+        x1 = wide_at(P, POSITION + 1, j) + half * v1
+        x2 = wide_at(P, POSITION + 2, j) + half * v2
+        # velocity += dt (attitude x f) - dt R bias
+        p0, p1, p2 = dt * b0, dt * b1, dt * b2
+        v0 = v0 + f[2] * a1 - f[1] * a2 - R[0][0] * p0 - R[0][1] * p1 - R[0][2] * p2
+        v1 = v1 + f[0] * a2 - f[2] * a0 - R[1][0] * p0 - R[1][1] * p1 - R[1][2] * p2
+        v2 = v2 + f[1] * a0 - f[0] * a1 - R[2][0] * p0 - R[2][1] * p1 - R[2][2] * p2
+        put_wide(P, VELOCITY, j, v0)
+        put_wide(P, VELOCITY + 1, j, v1)
+        put_wide(P, VELOCITY + 2, j, v2)
+        put_wide(P, POSITION, j, x0 + half * v0)
+        put_wide(P, POSITION + 1, j, x1 + half * v1)
+        put_wide(P, POSITION + 2, j, x2 + half * v2)
+        p0, p1, p2 = dt * g0, dt * g1, dt * g2
+        put_wide(P, ATTITUDE, j, a0 - R[0][0] * p0 - R[0][1] * p1 - R[0][2] * p2)
+        put_wide(P, ATTITUDE + 1, j, a1 - R[1][0] * p0 - R[1][1] * p1 - R[1][2] * p2)
+        put_wide(P, ATTITUDE + 2, j, a2 - R[2][0] * p0 - R[2][1] * p1 - R[2][2] * p2)
 
 
 @kernel
-def _plan(steps: Steps, to: Transit, dt: float) -> int:
-    """The rows' steps of Phi, in order; how many they are."""
-    f, R = to.force, to.R
-    k = _half(steps, 0, to, dt)
-    if to.taut > 0.0:
-        rates = (dot(to.across, to.q_cable_dot), dot(to.along, to.q_cable_dot))
-        speed2 = rates[0] * rates[0] + rates[1] * rates[1]
-        stiff = dot(to.q_cable, f) / to.length - speed2
-        s = dt / to.length
-        for i in range(2):
-            # driven by attitude error, accelerometer bias and length
-            axis = to.across if i == 0 else to.along
-            k = _step3(steps, k, RATE + i, ATTITUDE, scale(-s, cross(f, axis)))
-            k = _step3(steps, k, RATE + i, ACCEL_BIAS, scale(s, apply_transposed(R, axis)))
-            k = _step(steps, k, RATE + i, LENGTH, s / to.length * dot(axis, f))
-            # two neighbouring paths on the sphere draw together: |q'|^2 across the motion
-            k = _step(steps, k, RATE + i, DIRECTION + i, dt * (stiff + rates[i] * rates[i]))
-            k = _step(steps, k, RATE + i, DIRECTION + 1 - i, dt * rates[0] * rates[1])
-    lever = ((0.0, dt * f[2], -dt * f[1]), (-dt * f[2], 0.0, dt * f[0]), (dt * f[1], -dt * f[0], 0.0))
-    for i in range(3):
-        k = _step3(steps, k, VELOCITY + i, ATTITUDE, lever[i])
-        k = _step3(steps, k, VELOCITY + i, ACCEL_BIAS, scale(-dt, R[i]))
-        k = _step3(steps, k, ATTITUDE + i, GYRO_BIAS, scale(-dt, R[i]))
-    return _half(steps, k, to, dt)
+def _forget_slow(P: Array, keep: float, n: int) -> None:
+    """The rows of the receiver's slow error, of which a share is kept."""
+    for i in range(GNSS, n):
+        for j in range(0, n, WIDTH):
+            put_wide(P, i, j, keep * wide_at(P, i, j))
 
 
 @kernel
 def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n: int) -> None:
     """The covariance dt seconds on, in place, with the noise of one sample."""
-    P, steps = history.covariance, history.steps
+    P = history.covariance
     forget = dt / tuning.gnss_time
     keep = 1.0 - forget * to.reversion
-    count = _plan(steps, to, dt)
-    for turn in range(2):
-        for k in range(count):
-            i, of, factor = steps.to[k], steps.of[k], steps.factor[k]
-            for j in range(n):
-                P[i, j] += factor * P[of, j]
-        for i in range(GNSS, n):
-            for j in range(n):
-                P[i, j] *= keep
-        if turn == 0:
-            for i in range(n):
-                for j in range(i):
-                    P[i, j], P[j, i] = P[j, i], P[i, j]
+    first, second = _cable_drive(to, dt, 0), _cable_drive(to, dt, 1)
+    _move_rows(P, to, first, second, dt, n)
+    _forget_slow(P, keep, n)
+    for i in range(0, n, WIDTH):
+        for j in range(i, n, WIDTH):
+            transpose_blocks(P, i, j)
+    _move_rows(P, to, first, second, dt, n)
+    _forget_slow(P, keep, n)
 
     accel = tuning.accel_std * tuning.accel_std * dt * dt
     gyro = tuning.gyro_std * tuning.gyro_std * dt * dt
@@ -146,9 +175,15 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
         P[GNSS, GNSS] += 2.0 * forget * level * level
         P[GNSS + 1, GNSS + 1] += 2.0 * forget * level * level
         P[GNSS + 2, GNSS + 2] += 2.0 * forget * climb * climb
-    for i in range(n):
-        for j in range(i):
-            P[i, j] = P[j, i]
+    symmetrise(P, n)
+
+
+@kernel
+def symmetrise(P: Array, n: int) -> None:
+    """Write what lies above the diagonal to below it."""
+    for i in range(0, n, WIDTH):
+        for j in range(i, n, WIDTH):
+            mirror_block(P, i, j)
 
 
 @kernel
@@ -161,54 +196,96 @@ def forget(P: Array, first: int, count: int) -> None:
 
 
 @kernel
-def clear_row(history: History, n: int) -> None:
-    """Begin the Jacobian of another scalar."""
-    for i in range(n):
-        history.row[i] = 0.0
-
-
-@kernel
 def begin(history: History) -> None:
     """Begin the correction of another reading."""
-    for i in range(SIZE):
-        history.error[i] = 0.0
+    for j in range(0, SIZE, WIDTH):
+        put_wide(history.error, 0, j, 0.0 * wide_at(history.error, 0, j))
 
 
 @kernel
-def spread(history: History, n: int) -> float:
-    """Variance of the scalar whose Jacobian is in `row`: row P row^T; `gain` receives P row^T."""
-    P, row, gain = history.covariance, history.row, history.gain
-    for i in range(n):
-        gain[i] = 0.0
-    for j in range(n):
-        h = row[j]
-        if h != 0.0:
-            for i in range(n):
-                gain[i] += P[j, i] * h
-    variance = 0.0
-    for j in range(n):
-        if row[j] != 0.0:
-            variance += row[j] * gain[j]
-    return variance
+def scalar(history: History, k: int, innovation: float, variance: float) -> None:
+    """Begin scalar k of a reading: its innovation against the state before the reading, and its variance."""
+    history.columns[k, 0] = 0
+    history.scalars[k, INNOVATION], history.scalars[k, VARIANCE] = innovation, variance
 
 
 @kernel
-def absorb(history: History, innovation: float, variance: float, n: int) -> float:
-    """Absorb a scalar with Jacobian `row`: P narrows, `error` gathers what the state is to be moved by.
+def enter(history: History, k: int, column: int, share: float) -> None:
+    """Add to the Jacobian of scalar k: it grows by `share` times the error in `column`."""
+    if share != 0.0:
+        at = history.columns[k, 0] + 1
+        history.columns[k, 0] = at
+        history.columns[k, at], history.shares[k, at] = column, share
 
-    `innovation` is against the state before the reading; what `error` already holds is taken off. Returns the
-    innovation squared over its variance.
+
+@kernel
+def gather(history: History, first: int, last: int, n: int) -> None:
+    """The rows of H P of the scalars from `first` to before `last`."""
+    P, columns, shares = history.covariance, history.columns, history.shares
+    for k in range(first, last):
+        for j in range(0, n, WIDTH):
+            total = shares[k, 1] * wide_at(P, columns[k, 1], j)
+            for entry in range(2, columns[k, 0] + 1):
+                total = total + shares[k, entry] * wide_at(P, columns[k, entry], j)
+            put_wide(history.gain, k, j, total)
+
+
+@kernel
+def shared(history: History, k: int, other: int) -> float:
+    """What two scalars have in common: the Jacobian of scalar k times the gathered row of `other`."""
+    total = 0.0
+    for entry in range(1, history.columns[k, 0] + 1):
+        total += history.shares[k, entry] * history.gain[other, history.columns[k, entry]]
+    return total
+
+
+@kernel
+def farness(history: History, count: int) -> float:
+    """The sum over the first scalars, gathered, of their squared innovations over their variances, each by
+    itself."""
+    total = 0.0
+    for k in range(count):
+        off = history.scalars[k, INNOVATION]
+        total += off * off / (shared(history, k, k) + history.scalars[k, VARIANCE])
+    return total
+
+
+@kernel
+def absorb(history: History, count: int, n: int) -> float:
+    """Absorb the first scalars, gathered: P narrows, `error` gathers what the state is to be moved by.
+
+    Returns the sum of their innovations squared over their variances, each given those before it.
     """
-    P, row, gain, error = history.covariance, history.row, history.gain, history.error
-    s = 1.0 / (spread(history, n) + variance)
-    left = innovation
-    for j in range(n):
-        if row[j] != 0.0:
-            left -= row[j] * error[j]
+    gain, error, scalars = history.gain, history.error, history.scalars
+    nis = 0.0
+    for k in range(count):
+        # what is left of scalar k: its row and its innovation given the scalars before it
+        s = 1.0 / (shared(history, k, k) + scalars[k, VARIANCE])
+        off = scalars[k, INNOVATION]
+        for m in range(k + 1, count):
+            share = shared(history, m, k) * s
+            scalars[m, INNOVATION] -= share * off
+            for j in range(0, n, WIDTH):
+                put_wide(gain, m, j, wide_at(gain, m, j) - share * wide_at(gain, k, j))
+        nis += off * off * s
+        root, left = sqrt(s), off * s
+        for j in range(0, n, WIDTH):
+            row = wide_at(gain, k, j)
+            put_wide(error, 0, j, wide_at(error, 0, j) + left * row)
+            put_wide(gain, k, j, root * row)
+    for first in range(0, count, 3):
+        for k in range(count, first + 3):
+            for j in range(0, n, WIDTH):
+                put_wide(gain, k, j, 0.0 * wide_at(gain, 0, j))
+        _narrow(history.covariance, gain, first, n)
+    return nis
+
+
+@kernel
+def _narrow(P: Array, gain: Array, first: int, n: int) -> None:
+    """P without the squares of three rows; symmetric to the bit, for a product has no order."""
     for i in range(n):
-        error[i] += gain[i] * (left * s)
-    for i in range(n):
-        g = gain[i]
-        for j in range(n):
-            P[i, j] -= (g * gain[j]) * s  # in this order: the same bits for (j, i)
-    return left * left * s
+        a, b, c = float(gain[first, i]), float(gain[first + 1, i]), float(gain[first + 2, i])
+        for j in range(0, n, WIDTH):
+            left = wide_at(P, i, j) - a * wide_at(gain, first, j) - b * wide_at(gain, first + 1, j)
+            put_wide(P, i, j, left - c * wide_at(gain, first + 2, j))

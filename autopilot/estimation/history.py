@@ -101,7 +101,7 @@ def past4(ring: Array, row: int, share: float, first: int) -> Quat:
 @kernel
 def carry_back(head: int, history: History, memory_s: float) -> None:
     """Carry the correction in `error` to every row back to `memory_s` before now and the one before that."""
-    ring, e = history.ring, history.error
+    ring, e = history.ring, history.error[0]
     turn = quat_exp((e[ATTITUDE], e[ATTITUDE + 1], e[ATTITUDE + 2]))
     now = ring[head, 0]
     row = head

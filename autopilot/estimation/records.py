@@ -23,6 +23,10 @@ TRACKED_SIZE = 20
 MOUNTING, HEADING, BAROMETER, GNSS = 20, 22, 23, 24
 SIZE = 27
 
+ROOM = 32  # whole eights
+SCALARS, ENTRIES = 9, 13  # of one reading; of a scalar's Jacobian, behind their number
+INNOVATION, VARIANCE = 0, 1  # columns of `History.scalars`
+
 # columns of the ring of past states: time, then as named
 RING_LENGTH = 512
 X_QUAD, V_QUAD, QUAT, Q_CABLE, ACROSS, Q_RATE = 1, 4, 7, 11, 14, 17
@@ -38,23 +42,16 @@ CAMERA = 2.0  # what tells where the load is, beside NOBODY and TRACKER
 Covariance2 = tuple[float, float, float]  # (aa, ab, bb)
 
 
-class Steps(NamedTuple):
-    """What moves the covariance in time: row `to` += `factor` times row `of`, one after the other."""
-
-    to: NDArray[np.int64]
-    of: NDArray[np.int64]
-    factor: Array
-
-
 class History(NamedTuple):
     """The arrays of the filter, written in place: too large for tuples."""
 
     ring: Array  # past states, RING_LENGTH x RING_COLUMNS
-    covariance: Array  # of the error state, SIZE x SIZE, symmetric to the bit
-    error: Array  # SIZE: the correction being gathered
-    row: Array  # SIZE: Jacobian of the scalar being absorbed
-    gain: Array  # SIZE: covariance times `row`
-    steps: Steps
+    covariance: Array  # of the error state, symmetric to the bit; ROOM x ROOM, of which SIZE x SIZE are used
+    error: Array  # 1 x ROOM: the correction being gathered
+    columns: NDArray[np.int64]  # SCALARS x ENTRIES: how many entries a scalar's Jacobian has, then where
+    shares: Array  # SCALARS x ENTRIES: the entries, from column 1 on
+    gain: Array  # SCALARS x ROOM: Jacobian times covariance
+    scalars: Array  # SCALARS x 2: innovation and variance
     consistency: Array  # SENSORS x 2: how many readings were absorbed, and the sum of their NIS
 
 
@@ -228,15 +225,14 @@ def new_history() -> History:
     """Arrays of a filter that knows nothing; `predict` and the corrections write them in place."""
     ring = np.zeros((RING_LENGTH, RING_COLUMNS))
     ring[:, 0] = -np.inf  # the time: long ago
-    most = 64
-    steps = Steps(np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most))
     return History(
         ring,
-        np.zeros((SIZE, SIZE)),
-        np.zeros(SIZE),
-        np.zeros(SIZE),
-        np.zeros(SIZE),
-        steps,
+        np.zeros((ROOM, ROOM)),
+        np.zeros((1, ROOM)),
+        np.zeros((SCALARS, ENTRIES), np.int64),
+        np.zeros((SCALARS, ENTRIES)),
+        np.zeros((SCALARS, ROOM)),
+        np.zeros((SCALARS, 2)),
         np.zeros((SENSORS, 2)),
     )
 

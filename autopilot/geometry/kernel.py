@@ -10,13 +10,13 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable
+from functools import update_wrapper
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-import numba
-from numba.core import caching, event
-from numba.core.dispatcher import Dispatcher
+from numba.core import caching, config, event
 
+from autopilot.geometry.compiler import Kernel
 from autopilot.geometry.machine_code import CHOSEN_BY_USER, ROOT, folder_of, sources_hash
 
 _LONGEST_S = 600.0  # that another process is waited for; then we compile what it does not deliver
@@ -83,17 +83,28 @@ class _SharedCache(caching.FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compile result, loaded; None: the caller must compile it, and holds the lock."""
-        found = super().load_overload(sig, target_context)
+        found = self._load(sig, target_context)
         if found is not None:
             return found
         types = hashlib.sha256(_ADDRESS.sub("", str(sig)).encode()).hexdigest()[:16]
         lock = self._lock(f"{self._impl.filename_base}-{types}")
-        found = super().load_overload(sig, target_context)
+        found = self._load(sig, target_context)
         if found is None:
             _held.append((self, lock))
         elif lock is not None:
             lock.release()
         return found
+
+    def _load(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except (AttributeError, ImportError):
+            # an index that names types which are no longer where they were
+            index = self._lock("index")
+            self.flush()
+            if index is not None:
+                index.release()
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compile result, and let others have it."""
@@ -144,9 +155,9 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """Compile `function` to machine code with strict IEEE arithmetic and a disk cache.
 
     Fast-math stays off, so that CPython and machine code agree to the bit. Division by zero gives inf or nan
-    as IEEE 754 says, in place of an exception.
+    as IEEE 754 says, in place of an exception. A kernel makes no arrays: it writes those that it is given.
     """
-    compiled: Callable[P, T] = numba.njit(error_model="numpy")(function)
-    if isinstance(compiled, Dispatcher):
-        compiled._cache = _SharedCache(function)  # type: ignore[attr-defined]
+    if config.DISABLE_JIT:
+        return function
+    compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache(function)), function)
     return compiled

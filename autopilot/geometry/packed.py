@@ -22,6 +22,8 @@ from numba import types
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from autopilot.geometry.compiler import INLINED
+
 Row = NDArray[np.float64]
 R = TypeVar("R")
 _NUMBERS: dict[Any, str] = {float: "{}", int: "int({})", bool: "{} != 0.0"}
@@ -125,19 +127,19 @@ def with_field(record: R, name: str, value: Any) -> R:
     return record._replace(**{name: value})  # type: ignore[attr-defined,no-any-return]
 
 
-@overload(unpack)
+@overload(unpack, jit_options=INLINED)
 def _unpack(kind: Any, row: Any, first: Any) -> Any:
     record: Any = kind.instance_class if isinstance(kind, types.NamedTupleClass) else None
     return None if record is None else _unpacker(record)
 
 
-@overload(pack)
+@overload(pack, jit_options=INLINED)
 def _pack(record: Any, row: Any, first: Any) -> Any:
     kind: Any = getattr(record, "instance_class", None)
     return _packer(kind) if _is_record(kind) else None
 
 
-@overload(with_field, prefer_literal=True)
+@overload(with_field, jit_options=INLINED, prefer_literal=True)
 def _with_field(record: Any, name: Any, value: Any) -> Any:
     kind: Any = getattr(record, "instance_class", None)
     if not _is_record(kind) or not isinstance(name, types.StringLiteral):

@@ -111,10 +111,10 @@ def quat_from_rotation(R: Mat3) -> Quat:
 def quat_exp(phi: Vec3) -> Quat:
     """Unit quaternion of the rotation vector phi (rad)."""
     angle2 = dot(phi, phi)
-    if angle2 < 1e-8:
-        # Taylor to the fourth power of the angle: the next term is below 1e-25
-        w = 1.0 - angle2 / 8.0 + angle2 * angle2 / 384.0
-        s = 0.5 - angle2 / 48.0 + angle2 * angle2 / 3840.0
+    if angle2 < 1e-2:
+        # Taylor to the eighth power of the angle: the next term is below 1e-19
+        w = 1.0 + angle2 * (-1 / 8 + angle2 * (1 / 384 + angle2 * (-1 / 46080 + angle2 / 10321920)))
+        s = 0.5 + angle2 * (-1 / 48 + angle2 * (1 / 3840 + angle2 * (-1 / 645120 + angle2 / 185794560)))
     else:
         angle = sqrt(angle2)
         w = cos(0.5 * angle)

@@ -55,7 +55,7 @@ from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import MissionPlan, Phase
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.compiled import FRAME_ROOM
+from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
@@ -136,6 +136,7 @@ class Onboard:
         self._health = packed(Condition())
         self._battery_row = packed(battery_constants(parameters))
         self._frame = np.zeros(FRAME_ROOM, np.uint8)
+        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
@@ -189,6 +190,7 @@ class Onboard:
         flight, writer = self.core.flight, self._writer
         end = put_answer(
             self._frame,
+            self._payload,
             writer.sequence,
             writer.system,
             writer.component,

@@ -44,8 +44,7 @@ def autopilot_parts(law: str) -> tuple[Part, ...]:
     """What the autopilot needs to fly with this law, the longest first."""
     module = "autopilot.shell.warmup"
     return (
-        Part("the estimator", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 50.0),
-        Part(f"the {law} law", module, ("law", law), _AUTOPILOT, f"law-{law}", 30.0),
+        Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 30.0),
         Part("the paths", module, ("paths", law), _AUTOPILOT, "paths", 5.0),
     )
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row
 from autopilot.wire.compiled import (
-    PAYLOAD_ROOM,
     Bytes,
     Origin,
     frame_end,
@@ -40,6 +37,7 @@ Answer = tuple[bool, int, Forces, bool, bool, float]
 @kernel
 def put_answer(
     buffer: Bytes,
+    payload: Bytes,
     sequence: int,
     system: int,
     component: int,
@@ -50,18 +48,17 @@ def put_answer(
     gripper_open: bool,
     reel_rate: float,
 ) -> int:
-    """Write HIL_ACTUATOR_CONTROLS at the begin of a buffer; how many bytes it has. `forces`: 4, in N."""
+    """Write HIL_ACTUATOR_CONTROLS at the begin of a buffer; how many bytes it has. `forces`: 4, in N;
+    `payload` has PAYLOAD_ROOM bytes to work with."""
     each = (forces[0], forces[1], forces[2], forces[3])
     values = hil_actuator_controls_values(time_us, each, armed, lockstep, gripper_open, reel_rate)
-    payload = np.empty(PAYLOAD_ROOM, np.uint8)
     return put_frame(HIL_ACTUATOR_CONTROLS, values, payload, buffer, 0, Origin(sequence, system, component))
 
 
 @kernel
-def answer_in(datagram: bytes, system: int) -> Answer:
+def answer_in(datagram: bytes, system: int, payload: Bytes) -> Answer:
     """Whether a datagram is the plain frame of an answer of this system and no more; and then `time_us`,
     `forces` (N), `armed`, `gripper_open` and `reel_rate` of it."""
-    payload = np.empty(PAYLOAD_ROOM, np.uint8)
     plain = len(datagram) > 0 and frame_end(datagram, 0) == len(datagram)
     if not (plain and datagram[_SYSTEM] == system and holds(HIL_ACTUATOR_CONTROLS, datagram, 0, payload)):
         return (False, 0, (0.0, 0.0, 0.0, 0.0), False, False, 0.0)

@@ -18,14 +18,14 @@ from autopilot.core.scheduler import divider
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.packed import packed, unpack
 from autopilot.guidance.layout import COLUMNS, jets
-from autopilot.guidance.legs import LOAD_POSITION, asked_jet
+from autopilot.guidance.legs import LOAD_POSITION
 from autopilot.onboard.onboard import Onboard, build_setup, plan_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.quiescence import Stretch
 from autopilot.supervisor.requests.arming import arming_complaints
-from autopilot.supervisor.state import IN_AIR, MissionPlan, Phase, jet_ahead, leg_time_s
+from autopilot.supervisor.state import IN_AIR, MissionPlan, Phase
 from autopilot.trajectory.prepare import Limits
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.file import load_vehicle
@@ -36,7 +36,7 @@ from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.flight import READY_LIMIT_US, TIME_FACTOR, TIME_MARGIN_S
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
-from gcs.sweep.kernel import NO_FIGURES, Figures, count, fly_stretch
+from gcs.sweep.kernel import NO_FIGURES, Figures, fly_stretch
 from gcs.sweep.plan import simulated
 from gcs.sweep.wire import most_readings, wire_of, wire_rate
 from missions.model import Mission
@@ -166,28 +166,34 @@ class _Flight:
             before = self._now()
             self.core.move_cable(before.now_us + (self.tick_us if begun else 0))
             flight = self.core.flight
-            undecided = fly_stretch(
-                self.world,
-                self.core.rows,
-                self.core.law_rows,
-                self.wire,
-                self.figures,
-                self.asked,
-                self.trace,
-                begun,
-                flight.cable.released,
-                wire_rate(commanded_rate(flight, before.now_us, self.tick_us * 1e-6)),
-                self._stop_tick(),
-            )
+            reel_rate = wire_rate(commanded_rate(flight, before.now_us, self.tick_us * 1e-6))
+            undecided = self._fly(begun, False, flight.cable.released, reel_rate, self._stop_tick())
             begun = True
             now = self._now()
             self._note(phase, before, now)
             if undecided:
                 self._decide(now.now_us)
+                self._fly(True, True, False, 0.0, now.tick)
             self._ground_turn(now.now_us)
             self._judge(now.now_us)
         self._conclude()
         return self.flown
+
+    def _fly(self, begun: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int) -> bool:
+        return fly_stretch(
+            self.world,
+            self.core.rows,
+            self.core.law_rows,
+            self.wire,
+            self.figures,
+            self.asked,
+            self.trace,
+            begun,
+            decided,
+            gripper_open,
+            reel_rate,
+            stop_tick,
+        )
 
     def _now(self) -> World:
         return unpack(World, self.world.world, 0)
@@ -210,15 +216,14 @@ class _Flight:
             self.item = mission.plan.sequence[mission.step]
 
     def _decide(self, now_us: int) -> None:
-        """The supervisor's tick, as the process has it; and where the mission asks the load to be."""
+        """The supervisor's part of a tick; and where the mission asks the load to be."""
         phase = self.core.flight.phase
         self._hear(self.core.decide(now_us, self.tick_us).texts, phase)
         flight = self.core.flight
         self.asked = _NO_ROWS
         if flight.phase != Phase.MISSION or not flight.legs or flight.legs[0].control_mode != LOAD_POSITION:
             return
-        leg, t = flight.legs[0], leg_time_s(flight, now_us)
-        count(self.figures, self.world, self.core.rows, jet_ahead(flight, t)[0], asked_jet(leg, t)[0])
+        leg = flight.legs[0]
         stretch = unpack(Stretch, self.core.rows.stretch, 0)
         since_us = now_us - flight.leg_start_us
         ticks = np.arange(len(self.core.rows.targets))

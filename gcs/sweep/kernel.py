@@ -96,28 +96,31 @@ def fly_stretch(
     asked: Floats,
     trace: Floats,
     begun: bool,
+    decided: bool,
     gripper_open: bool,
     reel_rate: float,
     stop_tick: int,
 ) -> bool:
     """Fly until the supervisor is to be asked (True) or the tick `stop_tick` is over (False).
 
-    `begun`: the present tick is over. `asked` (ticks, 21) is where the mission asks the load to be, from the
+    `begun`: the present tick is over; `decided`: but for the law's part, as the supervisor was to be asked.
+    `asked` (ticks, 21) is where the mission asks the load to be, from the
     first tick of the core's stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the
     true state, as long as it lasts.
     """
     link = unpack(Wire, wire, 0)
     tick_us = unpack(WorldModel, world.model, 0).tick_us
     while True:
-        if begun:
+        if begun and not decided:
             forces = unpack(Pilot, core.pilot, 0).mixed.forces
             world_tick(world, wire_forces(forces), gripper_open, reel_rate)
         begun = True
         now = unpack(World, world.world, 0)
         _trace(trace, now)
-        readings = deliver(world, now.now_us, link, core.inbox)
+        readings = 0 if decided else deliver(world, now.now_us, link, core.inbox)
         dt = 0.0 if now.tick == 0 else tick_us * 1e-6
-        came = fly_tick(core, law_rows, readings, now.now_us, now.tick, dt)
+        came = fly_tick(core, law_rows, readings, now.now_us, now.tick, dt, decided)
+        decided = False
         if came == TO_DECIDE:
             return True
         if came == FLOWN and asked.shape[0] > 0:

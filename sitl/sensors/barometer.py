@@ -7,7 +7,7 @@ from typing import NamedTuple
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3
 from sitl.plant.records import PlantState
-from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian
+from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
 
 
 class BarometerConfig(NamedTuple):
@@ -40,7 +40,7 @@ def sample(
     truth_state: PlantState, sensor_state: BarometerState, config: BarometerConfig, noise: Noise
 ) -> tuple[BarometerReading, BarometerState]:
     """Height of the vehicle with drift and noise."""
-    height = truth_state.x_quad[2] + sensor_state.error[0] + config.height_noise * gaussian(noise, 0)[0]
+    height = truth_state.x_quad[2] + sensor_state.error[0] + white(config.height_noise, noise, 0)[0]
     return (
         BarometerReading(height),
         BarometerState(drift_step(sensor_state.error, config.height_drift, noise, 1)),

@@ -11,7 +11,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, apply, apply_transposed, norm, scale, sub
 from autopilot.geometry.so3 import exp, rotation_from_quat
 from sitl.plant.records import PlantState
-from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian
+from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
 
 _DOWN: Vec3 = (0.0, 0.0, -1.0)
 
@@ -58,7 +58,7 @@ def sample(
         direction = scale(1.0 / distance, line)
         if -direction[2] >= config.cone_cosine and (truth_state.taut > 0.5 or config.taut_only < 0.5):
             seen = 1.0
-    turn = add(sensor_state.mounting, scale(config.direction_noise, gaussian(noise, 0)))
+    turn = add(sensor_state.mounting, white(config.direction_noise, noise, 0))
     measured = apply(exp(turn), direction)
     return (
         CableReading(measured, seen),

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add3, apply_transposed, scale
+from autopilot.geometry.linear import Vec3, add3, apply_transposed
 from autopilot.geometry.so3 import rotation_from_quat
 from sitl.plant.records import PlantState
-from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian
+from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
 
 
 class ImuConfig(NamedTuple):
@@ -61,8 +61,8 @@ def sample(
     R = rotation_from_quat(truth_state.quat_wxyz)
     a = truth_state.accel_quad
     force = apply_transposed(R, (a[0], a[1], a[2] + config.gravity))
-    accel = add3(force, sensor_state.accel_bias, scale(config.accel_noise, gaussian(noise, 0)))
-    gyro = add3(truth_state.omega_body, sensor_state.gyro_bias, scale(config.gyro_noise, gaussian(noise, 1)))
+    accel = add3(force, sensor_state.accel_bias, white(config.accel_noise, noise, 0))
+    gyro = add3(truth_state.omega_body, sensor_state.gyro_bias, white(config.gyro_noise, noise, 1))
     return (
         ImuReading(clip(accel, config.accel_range), clip(gyro, config.gyro_range)),
         ImuState(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, add3, scale
+from autopilot.geometry.linear import Vec3, add, add3
 from sitl.plant.records import PlantState
-from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian
+from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
 
 
 class LoadConfig(NamedTuple):
@@ -43,8 +43,8 @@ def sample(
 ) -> tuple[LoadReading, LoadTrackerState]:
     """Position and velocity with white noise."""
     x = truth_state.x_load
-    position = add3(x, sensor_state.offset, scale(config.position_noise, gaussian(noise, 0)))
-    velocity = add(truth_state.v_load, scale(config.velocity_noise, gaussian(noise, 1)))
+    position = add3(x, sensor_state.offset, white(config.position_noise, noise, 0))
+    velocity = add(truth_state.v_load, white(config.velocity_noise, noise, 1))
     return (
         LoadReading(position, velocity),
         LoadTrackerState(drift_step(sensor_state.offset, config.position_drift, noise, 2)),

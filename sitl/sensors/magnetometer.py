@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add3, apply_transposed, scale
+from autopilot.geometry.linear import Vec3, add3, apply_transposed
 from autopilot.geometry.so3 import rotation_from_quat
 from sitl.plant.records import PlantState
-from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian
+from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
 
 
 class MagnetometerConfig(NamedTuple):
@@ -43,7 +43,7 @@ def sample(
 ) -> tuple[MagnetometerReading, MagnetometerState]:
     """R^T B with offset and noise."""
     field = apply_transposed(rotation_from_quat(truth_state.quat_wxyz), config.field)
-    measured = add3(field, sensor_state.offset, scale(config.field_noise, gaussian(noise, 0)))
+    measured = add3(field, sensor_state.offset, white(config.field_noise, noise, 0))
     return (
         MagnetometerReading(measured),
         MagnetometerState(drift_step(sensor_state.offset, config.hard_iron, noise, 1)),

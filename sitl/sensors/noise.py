@@ -7,11 +7,11 @@ reading keeps its noise whatever other sensors are fitted, lost or late.
 
 from __future__ import annotations
 
-from math import cos, log, pi, sin, sqrt
+from math import cos, isnan, log, pi, sin, sqrt
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.linear import ZERO, Vec3, scale
 
 _MASK = 0xFFFFFFFF
 _MULTIPLIER_0 = 0xD2511F53
@@ -75,6 +75,16 @@ def gaussian(noise: Noise, block: int) -> Vec3:
     return (r0 * cos(angle_0), r0 * sin(angle_0), r1 * cos(angle_1))
 
 
+@kernel
+def white(std: float, noise: Noise, block: int) -> Vec3:
+    """Three independent normal numbers of deviation `std` times the sample's scale; nan where `std` is."""
+    if isnan(std):
+        return (std, std, std)
+    if std == 0.0 or noise.scale == 0.0:
+        return ZERO
+    return scale(std, gaussian(noise, block))
+
+
 class Drift(NamedTuple):
     """A slow error per sample: x' = decay x + drive n, started at initial n, with n normal.
 
@@ -96,7 +106,7 @@ def drift_start(drift: Drift, noise: Noise, block: int) -> Vec3:
 @kernel
 def drift_step(error: Vec3, drift: Drift, noise: Noise, block: int) -> Vec3:
     """The error one sample later."""
-    if drift.drive == 0.0:
+    if drift.drive == 0.0 or noise.scale == 0.0:
         return (drift.decay * error[0], drift.decay * error[1], drift.decay * error[2])
     n = gaussian(noise, block)
     return (

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, add3, scale
+from autopilot.geometry.linear import Vec3, add, add3
 from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply, quat_normalise
 from sitl.plant.records import PlantState
-from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, gaussian
+from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
 
 
 class PoseConfig(NamedTuple):
@@ -48,10 +48,10 @@ def sample(
 ) -> tuple[PoseReading, PoseState]:
     """The pose with white noise; the attitude is turned by a small rotation vector in body axes."""
     x = truth_state.x_quad
-    position = add3(x, sensor_state.offset, scale(config.position_noise, gaussian(noise, 0)))
-    turn = quat_exp(scale(config.attitude_noise, gaussian(noise, 1)))
-    velocity = add(truth_state.v_quad, scale(config.velocity_noise, gaussian(noise, 2)))
-    omega = add(truth_state.omega_body, scale(config.rate_noise, gaussian(noise, 3)))
+    position = add3(x, sensor_state.offset, white(config.position_noise, noise, 0))
+    turn = quat_exp(white(config.attitude_noise, noise, 1))
+    velocity = add(truth_state.v_quad, white(config.velocity_noise, noise, 2))
+    omega = add(truth_state.omega_body, white(config.rate_noise, noise, 3))
     attitude = quat_normalise(quat_multiply(truth_state.quat_wxyz, turn))
     return (
         PoseReading(position, attitude, velocity, omega),

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from autopilot.control.laws import LAWS
 from autopilot.core.flight_core import FlightCore
-from autopilot.core.tick import FLOWN, TO_DECIDE, control_tick, fly_tick, sense
+from autopilot.core.tick import FLOWN, TO_DECIDE, fly_tick, sense
 from autopilot.estimation import inbox as box
 from autopilot.estimation.filter import complaints
 from autopilot.estimation.records import ImuReading, LoadReading, PoseReading
@@ -123,7 +123,7 @@ def fingerprints() -> dict[str, str]:
             for tick in range(4):
                 now_us = begin_us + tick * TICK_US
                 count = put_hover(core, now_us, 8 + tick)
-                came = fly_tick(core.rows, core.law_rows, count, now_us, 8 + tick, TICK_US * 1e-6)
+                came = fly_tick(core.rows, core.law_rows, count, now_us, 8 + tick, TICK_US * 1e-6, False)
                 assert came == FLOWN
             for array, row in rows_of(core).items():
                 found[f"{law.name}, {name}: {array}"] = hashlib.sha256(row.tobytes()).hexdigest()[:12]
@@ -194,10 +194,11 @@ def test_no_reading_makes_the_estimate_or_a_force_no_number(begun: bool, script:
     for tick in range(REPEATS):
         now_us = begin_us + tick * TICK_US
         count = put_rows(core, script[tick % len(script)], now_us)
-        came = fly_tick(core.rows, core.law_rows, count, now_us, 8 + tick, TICK_US * 1e-6)
+        flown = (count, now_us, 8 + tick, TICK_US * 1e-6)
+        came = fly_tick(core.rows, core.law_rows, *flown, False)
         assert np.isfinite(numbers_of(core)).all()
         if came == TO_DECIDE:
-            control_tick(core.rows, core.law_rows, 0)
+            fly_tick(core.rows, core.law_rows, *flown, True)
         assert all(0.0 <= force <= core.setup.vehicle.rotor_max for force in core.forces)
 
 

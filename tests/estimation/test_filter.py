@@ -342,9 +342,10 @@ def test_looking_back_sees_the_past_and_a_correction_moves_all_of_it_that_matter
     assert x_at(1e8) == x_at(1e9), "beyond the ring: its oldest row"
 
     before = {age: x_at(age) for age in (0.0, 0.011, 0.019, 0.1)}
-    history.error[:] = 0.0
-    history.error[POSITION], history.error[VELOCITY] = 0.5, 3.0
-    history.error[ATTITUDE + 2] = np.pi
+    error = history.error[0]
+    error[:] = 0.0
+    error[POSITION], error[VELOCITY] = 0.5, 3.0
+    error[ATTITUDE + 2] = np.pi
     carry_back(state.head, history, 0.021)
     for age, moved in ((0.0, 0.5), (0.011, 0.5 - 0.033), (0.019, 0.5 - 0.057), (0.1, 0.0)):
         assert x_at(age) - before[age] == pytest.approx(moved, abs=1e-12), age

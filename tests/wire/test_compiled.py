@@ -200,17 +200,16 @@ def test_a_message_with_text_has_no_record() -> None:
 @quick
 def test_the_answer_is_the_message_and_is_read_as_the_message(answer: Any, sequence: int) -> None:
     time_us, forces, armed, lockstep, gripper_open, reel_rate = answer
-    buffer = np.zeros(FRAME_ROOM, np.uint8)
-    end = frames.put_answer(
-        buffer, sequence, 1, 1, time_us, np.array(forces), armed, lockstep, gripper_open, reel_rate
-    )
+    payload, buffer = np.zeros(PAYLOAD_ROOM, np.uint8), np.zeros(FRAME_ROOM, np.uint8)
+    asked = (armed, lockstep, gripper_open, reel_rate)
+    end = frames.put_answer(buffer, payload, sequence, 1, 1, time_us, np.array(forces), *asked)
     writer = FrameWriter(1, 1)
     writer.sequence = sequence
     frame = writer.frame(hil_actuator_controls_message(*answer))
     assert bytes(buffer[:end]) == frame
     said = read_hil_actuator_controls(decode(frame)[0][0].message)
     read = (said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)
-    assert frames.answer_in(frame, 1) == (True, *read)
+    assert frames.answer_in(frame, 1, payload) == (True, *read)
 
 
 @pytest.mark.parametrize(
@@ -219,11 +218,12 @@ def test_the_answer_is_the_message_and_is_read_as_the_message(answer: Any, seque
     ids=["nothing", "a begin", "another message", "rubbish"],
 )
 def test_what_is_no_answer_is_none(datagram: bytes) -> None:
-    assert not frames.answer_in(datagram, 1)[0]
+    assert not frames.answer_in(datagram, 1, np.zeros(PAYLOAD_ROOM, np.uint8))[0]
 
 
 def test_an_answer_of_another_system_or_beside_another_frame_is_left_to_the_general_decoder() -> None:
     frame = FrameWriter(2, 1).frame(hil_actuator_controls_message(0, (1.0,) * 4, True, True))
-    assert frames.answer_in(frame, 2)[0]
-    assert not frames.answer_in(frame, 1)[0]
-    assert not frames.answer_in(frame + frame, 2)[0]
+    payload = np.zeros(PAYLOAD_ROOM, np.uint8)
+    assert frames.answer_in(frame, 2, payload)[0]
+    assert not frames.answer_in(frame, 1, payload)[0]
+    assert not frames.answer_in(frame + frame, 2, payload)[0]

@@ -118,9 +118,12 @@ def after_delay(actuation: Actuation, constants: ActuationConstants) -> tuple[fl
 
 @kernel
 def advance(actuation: Actuation, thrust: float, moment: Vec3, constants: ActuationConstants) -> Actuation:
-    """The belief a period later, `thrust` (N) and `moment` (N m, body) being the command of this tick."""
-    queue = np.empty_like(actuation.queue)
-    queue[1:] = actuation.queue[:-1]
+    """The belief a period later, `thrust` (N) and `moment` (N m, body) being the command of this tick, which
+    is put into the queue in place."""
+    queue = actuation.queue
+    for row in range(queue.shape[0] - 1, 0, -1):
+        for i in range(4):
+            queue[row, i] = queue[row - 1, i]
     queue[0, 0] = thrust
     queue[0, 1] = moment[0]
     queue[0, 2] = moment[1]

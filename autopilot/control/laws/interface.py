@@ -28,6 +28,7 @@ import numpy as np
 from numba.extending import overload
 
 from autopilot.control.records import Vehicle
+from autopilot.geometry.compiler import INSIDE
 from autopilot.geometry.packed import packed, unpack, width
 from autopilot.wire.parameter_table import ParameterTable
 
@@ -103,7 +104,7 @@ def _known(kind: Any) -> Law | None:
     return _BY_RECORD.get(getattr(kind, "instance_class", None))
 
 
-@overload(kernels_of)
+@overload(kernels_of, jit_options=INSIDE)
 def _kernels_of(record: Any) -> Any:
     law = _known(record)
     if law is None:
@@ -116,7 +117,7 @@ def _kernels_of(record: Any) -> Any:
     return known
 
 
-@overload(constants_of)
+@overload(constants_of, jit_options=INSIDE)
 def _constants_of(rows: Any) -> Any:
     law = _known(rows)
     if law is None:
@@ -129,7 +130,7 @@ def _constants_of(rows: Any) -> Any:
     return taken
 
 
-@overload(memory_of)
+@overload(memory_of, jit_options=INSIDE)
 def _memory_of(rows: Any) -> Any:
     law = _known(rows)
     if law is None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from autopilot.estimation.correction import heard, inject, look_back, position_row, with_aids
-from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.correction import enter_position, heard, inject, look_back, with_aids
+from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
 from autopilot.estimation.records import (
     BAROMETER,
     PRESSURE,
@@ -50,14 +50,14 @@ def correct_barometer(
         history.covariance[BAROMETER, BAROMETER] = ANY_OFFSET_STD * ANY_OFFSET_STD
     past = look_back(state, history, tuning, age)
     innovation = height - past.x_quad[2] - state.aids.barometer
-    position_row(history, past, 2, n)
-    history.row[BAROMETER] = 1.0
-    variance = tuning.barometer_std * tuning.barometer_std
-    limit = tuning.gate_sigma * tuning.gate_sigma * (spread(history, n) + variance)
-    if not innovation * innovation <= limit:
+    scalar(history, 0, innovation, tuning.barometer_std * tuning.barometer_std)
+    enter_position(history, 0, past, 2)
+    enter(history, 0, BAROMETER, 1.0)
+    gather(history, 0, 1, n)
+    if not farness(history, 1) <= tuning.gate_sigma * tuning.gate_sigma:
         return state
     begin(history)
-    nis = absorb(history, innovation, variance, n)
+    nis = absorb(history, 1, n)
     history.consistency[PRESSURE, 0] += 1.0
     history.consistency[PRESSURE, 1] += nis
     return inject(state, history)

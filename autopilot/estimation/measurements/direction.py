@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from autopilot.estimation.correction import (
     Past,
-    add_direction,
-    attitude_row,
+    enter_attitude,
+    enter_direction,
     heard,
     inject,
     load_at,
     look_back,
     with_load,
 )
-from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
 from autopilot.estimation.records import (
     CAMERA,
     DIRECTION,
@@ -116,21 +116,20 @@ def correct_direction(
     stated = reading.direction_std * reading.direction_std
     variance = max(stated - tuning.mounting_std * tuning.mounting_std, 0.25 * stated)
     innovation = (dot(past.across, off), dot(past.along, off))
-    far = 0.0
     for i in range(2):
-        sight_row(history, past, R, i, n)
-        far += innovation[i] * innovation[i] / (spread(history, n) + variance)
+        scalar(history, i, innovation[i], variance)
+        enter_sight(history, i, past, R)
+    gather(history, 0, 2, n)
+    far = farness(history, 2)
     # written so that NaN is refused
     if not (far <= 2.0 * tuning.gate_sigma * tuning.gate_sigma and dot(sight, q) > 0.0):
         if load.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
             return with_load(state, load_at(load, load.age_s, load.rejected + 1.0, load.source), state.resets)
         widen(history)
+        gather(history, 0, 2, n)
         state = with_load(state, load, state.resets + 1.0)
     begin(history)
-    nis = 0.0
-    for i in range(2):
-        sight_row(history, past, R, i, n)
-        nis += absorb(history, innovation[i], variance, n)
+    nis = absorb(history, 2, n)
     history.consistency[SIGHT, 0] += 1.0
     history.consistency[SIGHT, 1] += nis
     state = inject(state, history)
@@ -146,12 +145,12 @@ def widen(history: History) -> None:
 
 
 @kernel
-def sight_row(history: History, past: Past, R: tuple[Vec3, Vec3, Vec3], i: int, n: int) -> None:
-    """Row of component i of the seen direction in the cable's axes."""
+def enter_sight(history: History, i: int, past: Past, R: tuple[Vec3, Vec3, Vec3]) -> None:
+    """Component i of the seen direction in the cable's axes, as scalar i."""
     axis = past.across if i == 0 else past.along
     turn = cross(past.q_cable, axis)
-    attitude_row(history, past, scale(-1.0, turn), n)
-    add_direction(history, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
+    enter_attitude(history, i, past, scale(-1.0, turn))
+    enter_direction(history, i, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
     mounted = apply_transposed(R, turn)
-    history.row[MOUNTING] = mounted[0]
-    history.row[MOUNTING + 1] = mounted[1]
+    enter(history, i, MOUNTING, mounted[0])
+    enter(history, i, MOUNTING + 1, mounted[1])

@@ -9,18 +9,17 @@ from __future__ import annotations
 from math import sqrt
 
 from autopilot.estimation.correction import (
-    Past,
+    enter_position,
+    enter_velocity,
     heard,
     inject,
     look_back,
-    position_row,
     vehicle_at,
-    velocity_row,
     with_aids,
     with_load,
     with_vehicle,
 )
-from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
 from autopilot.estimation.history import renew
 from autopilot.estimation.measurements.magnetic import correct_magnetic, magnetic_north
 from autopilot.estimation.measurements.pose import spread_out
@@ -196,16 +195,6 @@ def restart_by_fix(
 
 
 @kernel
-def fix_row(history: History, past: Past, k: int, n: int) -> None:
-    """Row of component k of a fix: position and slow error, then velocity."""
-    if k < 3:
-        position_row(history, past, k, n)
-        history.row[GNSS + k] = 1.0
-    else:
-        velocity_row(history, past, k - 3, n)
-
-
-@kernel
 def correct_gnss(
     state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
 ) -> EstimatorState:
@@ -239,25 +228,22 @@ def correct_gnss(
     worse = CLIMB_WORSE * speed
     position_var = (level * level, level * level, climb * climb)
     velocity_var = (speed * speed, speed * speed, worse * worse)
-    off = 0.0
-    for k in range(6):
-        fix_row(history, past, k, n)
-        own = position_var[k] if k < 3 else velocity_var[k - 3]
-        away = innovation[k] if k < 3 else difference[k - 3]
-        off += away * away / (spread(history, n) + own)
+    for i in range(3):
+        scalar(history, i, innovation[i], position_var[i])
+        enter_position(history, i, past, i)
+        enter(history, i, GNSS + i, 1.0)
+        scalar(history, 3 + i, difference[i], velocity_var[i])
+        enter_velocity(history, 3 + i, past, i)
+    gather(history, 0, 6, n)
     # written so that NaN is refused
-    if not off <= 6.0 * tuning.gate_sigma * tuning.gate_sigma:
+    if not farness(history, 6) <= 6.0 * tuning.gate_sigma * tuning.gate_sigma:
         vehicle = state.vehicle
         if vehicle.rejected + 1.0 < FIXES_BEFORE_RESET:
             refused = vehicle_at(vehicle, vehicle.age_s, vehicle.rejected + 1.0)
             return with_vehicle(state, refused, state.resets)
         return restart_by_fix(state, history, fix, tuning)
     begin(history)
-    nis = 0.0
-    for k in range(6):
-        fix_row(history, past, k, n)
-        own = position_var[k] if k < 3 else velocity_var[k - 3]
-        nis += absorb(history, innovation[k] if k < 3 else difference[k - 3], own, n)
+    nis = absorb(history, 6, n)
     history.consistency[FIX, 0] += 1.0
     history.consistency[FIX, 1] += nis
     state = inject(state, history)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from autopilot.estimation.correction import (
     Past,
-    add_direction,
+    enter_direction,
+    enter_position,
+    enter_velocity,
     heard,
     inject,
     load_at,
     look_back,
-    position_row,
-    velocity_row,
     with_load,
 )
-from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
 from autopilot.estimation.measurements.pose import (
     KNOCK_STD,
     KNOCK_WHEN,
@@ -150,23 +150,23 @@ def correct_slack(
 
 
 @kernel
-def load_position_row(history: History, past: Past, length: float, i: int, n: int) -> None:
-    """Row of component i of x_Q + L q then."""
-    position_row(history, past, i, n)
-    add_direction(history, past, length * past.across[i], length * past.along[i])
-    history.row[LENGTH] = past.q_cable[i]
+def enter_load_position(history: History, k: int, past: Past, length: float, i: int) -> None:
+    """Component i of x_Q + L q then."""
+    enter_position(history, k, past, i)
+    enter_direction(history, k, past, length * past.across[i], length * past.along[i])
+    enter(history, k, LENGTH, past.q_cable[i])
 
 
 @kernel
-def load_velocity_row(history: History, past: Past, length: float, i: int, n: int) -> None:
-    """Row of component i of v_Q + L q' then: turning the direction by (a, b) leans q' by -(q' . turn) q."""
-    velocity_row(history, past, i, n)
-    row, q = history.row, past.q_cable
-    row[RATE] = length * past.across[i]
-    row[RATE + 1] = length * past.along[i]
-    row[DIRECTION] = -length * dot(past.across, past.q_cable_dot) * q[i]
-    row[DIRECTION + 1] = -length * dot(past.along, past.q_cable_dot) * q[i]
-    row[LENGTH] = past.q_cable_dot[i]
+def enter_load_velocity(history: History, k: int, past: Past, length: float, i: int) -> None:
+    """Component i of v_Q + L q' then: turning the direction by (a, b) leans q' by -(q' . turn) q."""
+    enter_velocity(history, k, past, i)
+    q = past.q_cable
+    enter(history, k, RATE, length * past.across[i])
+    enter(history, k, RATE + 1, length * past.along[i])
+    enter(history, k, DIRECTION, -length * dot(past.across, past.q_cable_dot) * q[i])
+    enter(history, k, DIRECTION + 1, -length * dot(past.along, past.q_cable_dot) * q[i])
+    enter(history, k, LENGTH, past.q_cable_dot[i])
 
 
 @kernel
@@ -187,13 +187,13 @@ def correct_load(
     past = look_back(state, history, tuning, reading.age_s)
     innovation = sub(reading.x_load, axpy(load.length, past.q_cable, past.x_quad))
     position_var = reading.position_std * reading.position_std
-    off = 0.0
     for i in range(3):
-        load_position_row(history, past, load.length, i, n)
-        off += innovation[i] * innovation[i] / (spread(history, n) + position_var)
+        scalar(history, i, innovation[i], position_var)
+        enter_load_position(history, i, past, load.length, i)
+    gather(history, 0, 3, n)
     distance = norm(sub(reading.x_load, past.x_quad)) / tuning.cable_length
     short = SLACK_FROM < distance < SLACK_BELOW
-    refused = not off <= 3.0 * tuning.gate_sigma * tuning.gate_sigma
+    refused = not farness(history, 3) <= 3.0 * tuning.gate_sigma * tuning.gate_sigma
     if refused or short:
         # nearer the threshold the pendulum tells: it no longer is one
         short = short or SLACK_FROM < distance < REFUSED_BELOW
@@ -201,17 +201,14 @@ def correct_load(
             return start_load(state, history, reading, tuning)
         return refuse_load(state, history, reading, tuning)
     begin(history)
-    nis = 0.0
     velocity_var = reading.velocity_std * reading.velocity_std
     difference = sub(reading.v_load, axpy(load.length, past.q_cable_dot, past.v_quad))
-    for k in range(6 if reading.velocity_std >= 0.0 else 3):
-        if k < 3:
-            load_position_row(history, past, load.length, k, n)
-            off, variance = innovation[k], position_var
-        else:
-            load_velocity_row(history, past, load.length, k - 3, n)
-            off, variance = difference[k - 3], velocity_var
-        nis += absorb(history, off, variance, n)
+    count = 6 if reading.velocity_std >= 0.0 else 3
+    for i in range(3):
+        scalar(history, 3 + i, difference[i], velocity_var)
+        enter_load_velocity(history, 3 + i, past, load.length, i)
+    gather(history, 3, count, n)
+    nis = absorb(history, count, n)
     history.consistency[LOAD, 0] += 1.0
     history.consistency[LOAD, 1] += nis
     state = inject(state, history)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
 
-from autopilot.estimation.correction import attitude_row, heard, inject, look_back, with_aids
-from autopilot.estimation.covariance import absorb, begin, spread
+from autopilot.estimation.correction import enter_attitude, heard, inject, look_back, with_aids
+from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
 from autopilot.estimation.records import (
     HEADING,
     MAGNETIC,
@@ -75,14 +75,14 @@ def correct_magnetic(
     angle = atan2(u[0] * north[1] - u[1] * north[0], u[0] * north[0] + u[1] * north[1])
     innovation = angle - state.aids.heading
     steep = u[2] / level
-    attitude_row(history, past, (-steep * north[0], -steep * north[1], 1.0), n)
-    history.row[HEADING] = 1.0
-    variance = tuning.magnetic_std * tuning.magnetic_std
-    limit = tuning.gate_sigma * tuning.gate_sigma * (spread(history, n) + variance)
-    if not innovation * innovation <= limit:
+    scalar(history, 0, innovation, tuning.magnetic_std * tuning.magnetic_std)
+    enter_attitude(history, 0, past, (-steep * north[0], -steep * north[1], 1.0))
+    enter(history, 0, HEADING, 1.0)
+    gather(history, 0, 1, n)
+    if not farness(history, 1) <= tuning.gate_sigma * tuning.gate_sigma:
         return state
     begin(history)
-    nis = absorb(history, innovation, variance, n)
+    nis = absorb(history, 1, n)
     history.consistency[MAGNETIC, 0] += 1.0
     history.consistency[MAGNETIC, 1] += nis
     return inject(state, history)

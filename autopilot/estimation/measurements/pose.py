@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from autopilot.estimation.correction import (
-    attitude_row,
+    enter_attitude,
+    enter_position,
+    enter_velocity,
     heard,
     inject,
     look_back,
     moved_load,
-    position_row,
     vehicle_at,
-    velocity_row,
     with_load,
     with_vehicle,
 )
-from autopilot.estimation.covariance import absorb, begin, forget, spread
+from autopilot.estimation.covariance import absorb, begin, farness, forget, gather, scalar
 from autopilot.estimation.history import renew
 from autopilot.estimation.records import (
     ACCEL_BIAS,
@@ -141,12 +141,12 @@ def correct_pose(
     past = look_back(state, history, tuning, pose.age_s)
     innovation = sub(pose.x_quad, past.x_quad)
     position_var = pose.position_std * pose.position_std
-    off = 0.0
     for i in range(3):
-        position_row(history, past, i, n)
-        off += innovation[i] * innovation[i] / (spread(history, n) + position_var)
+        scalar(history, i, innovation[i], position_var)
+        enter_position(history, i, past, i)
+    gather(history, 0, 3, n)
     # written so that NaN is refused
-    if not off <= 3.0 * tuning.gate_sigma * tuning.gate_sigma:
+    if not farness(history, 3) <= 3.0 * tuning.gate_sigma * tuning.gate_sigma:
         vehicle = state.vehicle
         if vehicle.rejected + 1.0 < REJECTIONS_BEFORE_RESET:
             if vehicle.rejected + 1.0 == REFUSED_BY_KNOCK:
@@ -156,25 +156,18 @@ def correct_pose(
             return with_vehicle(state, refused, state.resets)
         return start_by_pose(state, history, pose, tuning)
     begin(history)
-    nis = 0.0
     velocity_var = pose.velocity_std * pose.velocity_std
     attitude_var = pose.attitude_std * pose.attitude_std
     difference = sub(pose.v_quad, past.v_quad)
     angle = quat_log(quat_multiply(pose.quat_wxyz, quat_conjugate(past.quat_wxyz)))
-    for k in range(9):
-        i = k % 3
-        if k < 3:
-            position_row(history, past, i, n)
-            off, variance = innovation[i], position_var
-        elif k < 6:
-            attitude_row(history, past, AXES[i], n)
-            off, variance = angle[i], attitude_var
-        elif pose.velocity_std >= 0.0:
-            velocity_row(history, past, i, n)
-            off, variance = difference[i], velocity_var
-        else:
-            break
-        nis += absorb(history, off, variance, n)
+    count = 9 if pose.velocity_std >= 0.0 else 6
+    for i in range(3):
+        scalar(history, 3 + i, angle[i], attitude_var)
+        enter_attitude(history, 3 + i, past, AXES[i])
+        scalar(history, 6 + i, difference[i], velocity_var)
+        enter_velocity(history, 6 + i, past, i)
+    gather(history, 3, count, n)
+    nis = absorb(history, count, n)
     history.consistency[POSE, 0] += 1.0
     history.consistency[POSE, 1] += nis
     state = inject(state, history)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from autopilot.estimation.correction import inject
-from autopilot.estimation.covariance import absorb, begin, clear_row
+from autopilot.estimation.covariance import absorb, begin, enter, gather, scalar
 from autopilot.estimation.records import (
     GYRO_BIAS,
     RECEIVER,
@@ -44,14 +44,13 @@ def correct_standing(
         return state
     n, vehicle, imu = state.size, state.vehicle, state.last_imu
     begin(history)
-    nis = 0.0
-    for k in range(6):
-        clear_row(history, n)
-        i = k % 3
-        history.row[(VELOCITY if k < 3 else GYRO_BIAS) + i] = 1.0
-        off = -vehicle.v_quad[i] if k < 3 else imu.gyro[i] - vehicle.gyro_bias[i]
-        std = SPEED_STD if k < 3 else tuning.gyro_std
-        nis += absorb(history, off, std * std, n)
+    for i in range(3):
+        scalar(history, i, -vehicle.v_quad[i], SPEED_STD * SPEED_STD)
+        enter(history, i, VELOCITY + i, 1.0)
+        scalar(history, 3 + i, imu.gyro[i] - vehicle.gyro_bias[i], tuning.gyro_std * tuning.gyro_std)
+        enter(history, 3 + i, GYRO_BIAS + i, 1.0)
+    gather(history, 0, 6, n)
+    nis = absorb(history, 6, n)
     history.consistency[REST, 0] += 1.0
     history.consistency[REST, 1] += nis
     return inject(state, history)

@@ -7,8 +7,8 @@ does not climb.
 from __future__ import annotations
 
 from autopilot.estimation.correction import inject, look_back, with_aids
-from autopilot.estimation.covariance import absorb, begin, spread
-from autopilot.estimation.measurements.load import load_position_row, load_velocity_row
+from autopilot.estimation.covariance import absorb, begin, farness, gather, scalar
+from autopilot.estimation.measurements.load import enter_load_position, enter_load_velocity
 from autopilot.estimation.records import (
     CAMERA,
     RECEIVER,
@@ -63,16 +63,19 @@ def correct_tautened(
     n, debt = state.size, state.aids.debt
     past = look_back(state, history, tuning, 0.0)
     begin(history)
+    count = 0
     if tied:
-        innovation, variance = before.x_load[2] - load.x_load[2], LYING_STD * LYING_STD
-        load_position_row(history, past, load.length, 2, n)
-        limit = tuning.gate_sigma * tuning.gate_sigma * (spread(history, n) + variance)
-        if not innovation * innovation <= limit:
+        scalar(history, 0, before.x_load[2] - load.x_load[2], LYING_STD * LYING_STD)
+        enter_load_position(history, 0, past, load.length, 2)
+        gather(history, 0, 1, n)
+        if not farness(history, 1) <= tuning.gate_sigma * tuning.gate_sigma:
             return state
-        absorb(history, innovation, variance, n)
+        count = 1
     climb = past.v_quad[2] + load.length * past.q_cable_dot[2]
-    load_velocity_row(history, past, load.length, 2, n)
-    absorb(history, -climb, RESTING_STD * RESTING_STD, n)
+    scalar(history, count, -climb, RESTING_STD * RESTING_STD)
+    enter_load_velocity(history, count, past, load.length, 2)
+    gather(history, count, count + 1, n)
+    absorb(history, count + 1, n)
     state = inject(state, history)
     owed = state.aids.debt
     return with_aids(state, _owing(state.aids, (owed[0], owed[1], debt[2])))

@@ -1,0 +1,266 @@
+"""Eight numbers that machine code moves, adds and multiplies at once.
+
+LLVM leaves loops over small matrices as they are: it cannot know that their arrays do not overlap. `Wide` is
+a vector of eight doubles with + - *, each number by itself, so that machine code and Python agree to the bit:
+
+    put_wide(P, i, j, wide_at(P, i, j) + factor * wide_at(P, k, j))      # eight numbers of row i
+
+Arrays are two-dimensional, of float64, contiguous by rows. The numbers from column j to j + 7 must exist: as
+in kernels generally, nothing is checked.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, models, overload, register_model
+from numpy.typing import NDArray
+
+from autopilot.geometry.compiler import INLINED
+
+WIDTH = 8
+Array = NDArray[np.float64]
+
+
+class Wide:
+    """Eight numbers. A number times a `Wide` is that many times each of them."""
+
+    __slots__ = ("numbers",)
+
+    def __init__(self, numbers: tuple[float, ...]) -> None:
+        self.numbers = numbers
+
+    def __add__(self, other: Wide) -> Wide:
+        return Wide(tuple(a + b for a, b in zip(self.numbers, other.numbers, strict=True)))
+
+    def __sub__(self, other: Wide) -> Wide:
+        return Wide(tuple(a - b for a, b in zip(self.numbers, other.numbers, strict=True)))
+
+    def __rmul__(self, factor: float) -> Wide:
+        return Wide(tuple(factor * a for a in self.numbers))
+
+
+def wide_at(array: Array, i: int, j: int) -> Wide:
+    """The numbers array[i, j] ... array[i, j + 7]."""
+    return Wide(tuple(array[i, j : j + WIDTH].tolist()))
+
+
+def put_wide(array: Array, i: int, j: int, wide: Wide) -> None:
+    """Write them to array[i, j] ... array[i, j + 7]."""
+    array[i, j : j + WIDTH] = wide.numbers
+
+
+def transpose_blocks(array: Array, i: int, j: int) -> None:
+    """Exchange the blocks of 8 x 8 numbers that begin at [i, j] and [j, i], each transposed."""
+    upper = array[i : i + WIDTH, j : j + WIDTH].T.copy()
+    array[i : i + WIDTH, j : j + WIDTH] = array[j : j + WIDTH, i : i + WIDTH].T.copy()
+    array[j : j + WIDTH, i : i + WIDTH] = upper
+
+
+def mirror_block(array: Array, i: int, j: int) -> None:
+    """Write what lies above the diagonal in the block of 8 x 8 numbers at [i, j], j >= i, to below it."""
+    for row in range(i, i + WIDTH):
+        for column in range(max(j, row), j + WIDTH):
+            array[column, row] = array[row, column]
+
+
+# ---- for the compiler
+
+
+class _WideType(types.Type):  # type: ignore[misc]
+    def __init__(self) -> None:
+        super().__init__(name="Wide")
+
+
+_WIDE = _WideType()
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+_LANE = ir.IntType(32)
+
+
+@register_model(_WideType)
+class _WideModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _VECTOR)
+
+
+def _pointer(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) -> Any:
+    """Pointer to the eight numbers from array[i, j] on."""
+    held = context.make_array(kind)(context, builder, array)
+    columns = cgutils.unpack_tuple(builder, held.shape)[1]
+    place = builder.gep(held.data, [builder.add(builder.mul(i, columns), j)])
+    return builder.bitcast(place, _VECTOR.as_pointer())
+
+
+def _shuffled(builder: Any, a: Any, b: Any, lanes: list[int]) -> Any:
+    """Lanes 0-7 of a vector are those of `a`, 8-15 those of `b`."""
+    mask = ir.Constant(ir.VectorType(_LANE, WIDTH), [ir.Constant(_LANE, lane) for lane in lanes])
+    return builder.shuffle_vector(a, b, mask)
+
+
+def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+    """Eight vectors as the columns of the given eight rows: blocks of 4, 2 and 1 change places."""
+    rows = list(rows)
+    for size in (4, 2, 1):
+        for i in (k for k in range(WIDTH) if not k & size):
+            a, b = rows[i], rows[i + size]
+            first = [k if not k & size else WIDTH + k - size for k in range(WIDTH)]
+            second = [k + size if not k & size else WIDTH + k for k in range(WIDTH)]
+            rows[i], rows[i + size] = _shuffled(builder, a, b, first), _shuffled(builder, a, b, second)
+    return rows
+
+
+def _block(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) -> list[Any]:
+    """Pointers to the eight rows of the block at [i, j]."""
+    return [
+        _pointer(context, builder, kind, array, builder.add(i, ir.Constant(i.type, k)), j)
+        for k in range(WIDTH)
+    ]
+
+
+def _load(builder: Any, places: list[Any]) -> list[Any]:
+    return [builder.load(place, align=8) for place in places]
+
+
+def _store(builder: Any, rows: list[Any], places: list[Any]) -> None:
+    for row, place in zip(rows, places, strict=True):
+        builder.store(row, place, align=8)
+
+
+def _known(array: Any) -> bool:
+    return isinstance(array, types.Array) and array.ndim == 2 and array.layout == "C"
+
+
+@intrinsic
+def _taken(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        place = _pointer(context, builder, signature.args[0], *given)
+        return builder.load(place, align=8)
+
+    return _WIDE(array, types.intp, types.intp), made
+
+
+@intrinsic
+def _given(_: Any, array: Any, i: Any, j: Any, wide: Any) -> Any:
+    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        place = _pointer(context, builder, signature.args[0], *given[:3])
+        builder.store(given[3], place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp, _WIDE), made
+
+
+@intrinsic
+def _exchanged(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kind, (held, first, second) = signature.args[0], given
+        upper = _block(context, builder, kind, held, first, second)
+        lower = _block(context, builder, kind, held, second, first)
+        above, below = (_transposed(builder, _load(builder, places)) for places in (upper, lower))
+        _store(builder, below, upper)
+        _store(builder, above, lower)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp), made
+
+
+@intrinsic
+def _mirrored(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kind, (held, first, second) = signature.args[0], given
+        upper = _block(context, builder, kind, held, first, second)
+        lower = _block(context, builder, kind, held, second, first)
+        rows = _load(builder, upper)
+        columns = _transposed(builder, rows)
+        on_diagonal = builder.icmp_signed("==", first, second)
+        for k in range(WIDTH):
+            kept = [WIDTH + lane if lane < k else lane for lane in range(WIDTH)]
+            half = _shuffled(builder, rows[k], columns[k], kept)
+            builder.store(builder.select(on_diagonal, half, columns[k]), lower[k], align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp), made
+
+
+def _by_lane(name: str) -> Callable[..., Any]:
+    @intrinsic
+    def done(_: Any, a: Any, b: Any) -> Any:
+        def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            return getattr(builder, name)(*given)
+
+        return _WIDE(_WIDE, _WIDE), made
+
+    return done  # type: ignore[no-any-return]
+
+
+_added, _taken_off = _by_lane("fadd"), _by_lane("fsub")
+
+
+@intrinsic
+def _scaled(_: Any, factor: Any, wide: Any) -> Any:
+    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), given[0], ir.Constant(_LANE, 0))
+        return builder.fmul(_shuffled(builder, one, one, [0] * WIDTH), given[1])
+
+    return _WIDE(types.float64, _WIDE), made
+
+
+@overload(wide_at, jit_options=INLINED)
+def _wide_at(array: Any, i: Any, j: Any) -> Any:
+    def made(array: Any, i: Any, j: Any) -> Any:
+        return _taken(array, i, j)
+
+    return made if _known(array) else None
+
+
+@overload(put_wide, jit_options=INLINED)
+def _put_wide(array: Any, i: Any, j: Any, wide: Any) -> Any:
+    def made(array: Any, i: Any, j: Any, wide: Any) -> Any:
+        return _given(array, i, j, wide)
+
+    return made if _known(array) else None
+
+
+@overload(transpose_blocks, jit_options=INLINED)
+def _transpose_blocks(array: Any, i: Any, j: Any) -> Any:
+    def made(array: Any, i: Any, j: Any) -> Any:
+        return _exchanged(array, i, j)
+
+    return made if _known(array) else None
+
+
+@overload(mirror_block, jit_options=INLINED)
+def _mirror_block(array: Any, i: Any, j: Any) -> Any:
+    def made(array: Any, i: Any, j: Any) -> Any:
+        return _mirrored(array, i, j)
+
+    return made if _known(array) else None
+
+
+@overload(operator.add, jit_options=INLINED)
+def _add(a: Any, b: Any) -> Any:
+    def made(a: Any, b: Any) -> Any:
+        return _added(a, b)
+
+    return made if a == b == _WIDE else None
+
+
+@overload(operator.sub, jit_options=INLINED)
+def _sub(a: Any, b: Any) -> Any:
+    def made(a: Any, b: Any) -> Any:
+        return _taken_off(a, b)
+
+    return made if a == b == _WIDE else None
+
+
+@overload(operator.mul, jit_options=INLINED)
+def _mul(a: Any, b: Any) -> Any:
+    def made(a: Any, b: Any) -> Any:
+        return _scaled(a, b)
+
+    return made if a == types.float64 and b == _WIDE else None
