@@ -110,10 +110,6 @@ class FlightLog:
         if not armed:
             self._next_us = min(self._next_us, self._disarmed_us + TAIL_US)
 
-    def rehearse(self, sample: Sample) -> None:
-        """Make the records of an instant once, so that nothing is compiled in flight."""
-        self._records.of(sample, 0)
-
     def end(self) -> None:
         """Nothing more belongs to the open log."""
         if self._path is not None:

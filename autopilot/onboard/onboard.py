@@ -32,7 +32,7 @@ from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import Moment, Moments, Options
-from autopilot.services import stream_frames
+from autopilot.onboard.warmup import rehearse_telemetry
 from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.heartbeat import heartbeat_message
@@ -383,10 +383,7 @@ class Onboard:
         self._put_answer(0)
         health = packed(Condition())
         follow(health, self._sensors.imu, self.core.force_row, self._battery_row, 0, False, 0, 0.0)
-        sample = self.log_sample()
-        stream_frames.rehearse(sample.instant)
-        if self._log is not None:
-            self._log.rehearse(sample)
+        rehearse_telemetry(self.core.setup, self.parameters)
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):

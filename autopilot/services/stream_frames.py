@@ -94,11 +94,6 @@ def put_streams(
     return at
 
 
-def rehearse(instant: Row) -> None:
-    """Make the frames of all streams once, so that nothing is compiled in flight."""
-    StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2)).frames(sum(BITS.values()), instant)
-
-
 class StreamFrames:
     """Makes the frames of these streams on one link, in the sequences of its two components."""
 

@@ -37,6 +37,7 @@ class Part:
 
 
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
+_TELEMETRY = ROOT / "autopilot" / "onboard" / "warmup.py"
 SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 18.0)
 
 
@@ -46,6 +47,7 @@ def autopilot_parts(law: str) -> tuple[Part, ...]:
     return (
         Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 30.0),
         Part("the paths", module, ("paths", law), _AUTOPILOT, "paths", 5.0),
+        Part("the telemetry", module, ("telemetry", law), _TELEMETRY, "telemetry", 5.0),
     )
 
 

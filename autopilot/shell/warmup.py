@@ -1,4 +1,4 @@
-"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|paths LAW."""
+"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|paths|telemetry LAW."""
 
 from __future__ import annotations
 
@@ -13,13 +13,18 @@ def main(part: str, law: str) -> None:
     # only now: the import itself compiles the first ones
     from autopilot.core.warmup import PARTS
     from autopilot.onboard.onboard import build_setup
+    from autopilot.onboard.warmup import rehearse_telemetry
     from autopilot.vehicle.file import load_vehicle
     from autopilot.vehicle.parameters import LAWS, autopilot_parameters
 
     table = autopilot_parameters(load_vehicle("bebop"))
     table.set("CTL_LAW", LAWS.index(law))
     table.freeze()
-    PARTS[part](build_setup(table, 1))
+    setup = build_setup(table, 1)
+    if part == "telemetry":
+        rehearse_telemetry(setup, table)
+    else:
+        PARTS[part](setup)
 
 
 if __name__ == "__main__":
