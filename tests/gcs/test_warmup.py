@@ -38,7 +38,7 @@ def test_what_is_compiled_is_not_compiled_again():
     for one in parts_left(["lqr"]):
         one.done()
     assert parts_left(["lqr"]) == []
-    assert {one.mark for one in parts_left(["thesis"])} == {"tick-thesis", "law-thesis"}
+    assert {one.mark for one in parts_left(["thesis"])} == {"tick-thesis"}
 
 
 def test_all_parts_run_and_are_marked(monkeypatch, tmp_path, capsys):
