@@ -46,7 +46,7 @@ def autopilot_parts(law: str) -> tuple[Part, ...]:
     module = "autopilot.shell.warmup"
     return (
         Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 26.0),
-        Part("the simulator link", module, ("link", law), _ONBOARD, "link", 6.0),
+        Part("the messages", module, ("messages", law), _ONBOARD, "messages", 8.0),
         Part("the paths", module, ("paths", law), _AUTOPILOT, "paths", 3.0),
     )
 

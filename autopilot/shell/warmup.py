@@ -1,4 +1,4 @@
-"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|link|paths LAW."""
+"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|messages|paths LAW."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def main(part: str, law: str) -> None:
     table = autopilot_parameters(load_vehicle("bebop"))
     table.set("CTL_LAW", LAWS.index(law))
     table.freeze()
-    if part == "link":
-        Onboard(table, identity_of(table), Options(Home(), 0), None).rehearse_link()
+    if part == "messages":
+        Onboard(table, identity_of(table), Options(Home(), 0), None).rehearse_messages()
     else:
         PARTS[part](build_setup(table, 1))
 
