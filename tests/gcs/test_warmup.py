@@ -28,17 +28,17 @@ def nothing_compiled(tmp_path, monkeypatch):
 
 def test_a_flight_needs_its_law_alone_and_the_longest_part_comes_first():
     marks = [part.mark for part in parts_left(["lqr"])]
-    assert set(marks) == {"tick-lqr", "law-lqr", "paths", "world", "check"}
+    assert set(marks) == {"tick-lqr", "paths", "world", "check"}
     assert marks[0] == "tick-lqr"
     both = [part.mark for part in parts_left(["lqr", "thesis"])]
-    assert sorted(both) == sorted({*marks, "tick-thesis", "law-thesis"})
+    assert sorted(both) == sorted({*marks, "tick-thesis"})
 
 
 def test_what_is_compiled_is_not_compiled_again():
     for one in parts_left(["lqr"]):
         one.done()
     assert parts_left(["lqr"]) == []
-    assert {one.mark for one in parts_left(["thesis"])} == {"tick-thesis", "law-thesis"}
+    assert {one.mark for one in parts_left(["thesis"])} == {"tick-thesis"}
 
 
 def test_all_parts_run_and_are_marked(monkeypatch, tmp_path, capsys):
