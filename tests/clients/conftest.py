@@ -36,7 +36,7 @@ from gcs.shell.link import LOOPBACK, free_port
 PROGRAMS = Path(__file__).with_name("programs")
 LONG_S = 300.0  # of a busy machine
 END_S = 10.0
-AT_ONCE = 5  # flights: what two cores fly without any client waiting for its heartbeat
+AT_ONCE = 3  # flights: what two cores fly without any client waiting for its heartbeat
 
 # What no client may say, whatever it means by it
 COMPLAINT = re.compile(
