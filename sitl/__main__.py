@@ -41,6 +41,7 @@ _LOOK_S = 0.2  # between two looks at a request to stop, while nothing comes
 _TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another may take its place
 _LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
 _SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
+_TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
 _STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
 
 
@@ -63,6 +64,8 @@ class Link:
                 f"cannot send truth to {shown(truth)}: {reason(error)}; choose another with --truth"
             ) from None
         self._truth = truth
+        self._gathered: list[bytes] = []  # truth of this window
+        self._window_ends_us = 0
         self._timeout_s = 0.0
         self._say = say
         self._heard = 0.0  # when the peer last answered, monotonic clock
@@ -71,6 +74,7 @@ class Link:
 
     def close(self) -> None:
         self._socket.close()
+        self._tell_gathered()
         self._truth_socket.close()
 
     def timeout(self, seconds: float) -> None:
@@ -97,6 +101,20 @@ class Link:
         truth = simulator.truth_datagram()
         if truth is not None:
             send(self._truth_socket, truth, self._truth)
+
+    def gather_truth(self, simulator: HilSimulator) -> None:
+        """The truth of the present tick, if there is any; sent at the end of the window with all of it."""
+        truth, now_us = simulator.truth_datagram(), simulator.core.now_us
+        if truth is not None:
+            self._gathered.append(truth)
+        if not self._window_ends_us - _TRUTH_WINDOW_US < now_us < self._window_ends_us:
+            self._window_ends_us = now_us - now_us % _TRUTH_WINDOW_US + _TRUTH_WINDOW_US
+            self._tell_gathered()
+
+    def _tell_gathered(self) -> None:
+        if self._gathered:
+            send(self._truth_socket, b"".join(self._gathered), self._truth)
+            self._gathered.clear()
 
     def take(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
         """Hand a datagram on. True if it is a heartbeat whose sender is served from now on.
@@ -170,7 +188,7 @@ def run_lockstep(
             # what was waited for is not caught up with
             due = max(due, time.perf_counter_ns() - _STALL_NS) + period_ns
             _sleep_until(due)
-        link.send_truth(simulator)
+        link.gather_truth(simulator)
         link.send(simulator)
         began = sent = time.monotonic()
         silence_s = _RESEND_FIRST_S

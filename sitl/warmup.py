@@ -13,6 +13,7 @@ def main() -> None:
 
     simulator = HilSimulator.build()
     simulator.truth_datagram()
+    simulator.receive(b"")
     simulator.advance()
 
 

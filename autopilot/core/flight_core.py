@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
 from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of
@@ -43,7 +44,7 @@ from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import IDENTITY, ZERO
 from autopilot.geometry.packed import pack, packed, unpack, width
 from autopilot.guidance.layout import COLUMNS, jets_ahead
-from autopilot.guidance.legs import Catch, least_move_s, top_of
+from autopilot.guidance.legs import Catch, Leg, least_move_s, top_of
 from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.quiescence import RESTING, Stretch, at_rest, next_stretch
@@ -76,6 +77,16 @@ class Setup:
         return law_of(self.law).preview_s(self.law)
 
 
+class LaidOut(NamedTuple):
+    """Which setpoints lie in `CoreRows.targets`: of the first of these legs, from a tick on."""
+
+    legs: tuple[Leg, ...]
+    leg_start_us: int
+    first_us: int
+    period_us: int
+    times_s: NDArray[np.float64]  # into the leg, of each row
+
+
 class FlightCore:
     """One vehicle's flight software. `flight` is the supervisor's record; all else lies in `rows`."""
 
@@ -88,6 +99,7 @@ class FlightCore:
         self._dirty = True  # the flight has changed since the winch was told
         self.law_rows = new_rows(setup.law)
         self._fly: Callable[..., int] | None = None  # the tick's machine code for this law, once it was run
+        self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
         pilot = Pilot(NO_COMMAND, STOPPED, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
             estimator=packed(blank_state()),
@@ -205,6 +217,7 @@ class FlightCore:
         """The stretch that begins with this tick, and its setpoints."""
         flight, preview_s = self.flight, self.setup.preview_s
         stretch = next_stretch(flight, self.settings, now_us, period_us, preview_s)
+        self.laid = None
         if stretch.mode == RESTING:
             pack(stretch, self.rows.stretch, 0)
             return
@@ -223,9 +236,20 @@ class FlightCore:
             targets = references = jets_ahead(legs, times)
             if preview_s != 0.0:
                 references = jets_ahead(legs, times + preview_s)
+            # the rest of them are of legs that follow
+            own = int(np.searchsorted(times, leg.duration_s, side="left")) if len(legs) > 1 else ticks
+            self.laid = LaidOut(flight.legs, flight.leg_start_us, now_us, stretch.period_us, times[:own])
         stop_us = min(stretch.stop_us, now_us + stretch.period_us * len(targets))
         pack(stretch._replace(stop_us=stop_us), self.rows.stretch, 0)
         self.rows = self.rows._replace(targets=targets, references=references)
+
+    def setpoint_row(self, now_us: int) -> int:
+        """The row of `rows.targets` with the setpoint of the present leg at this instant; -1: none has it."""
+        laid, flight = self.laid, self.flight
+        if laid is None or flight.legs is not laid.legs or flight.leg_start_us != laid.leg_start_us:
+            return -1
+        at, off = divmod(now_us - laid.first_us, laid.period_us)
+        return at if off == 0 and 0 <= at < len(laid.times_s) else -1
 
     # ---- what comes between two ticks
 

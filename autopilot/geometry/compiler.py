@@ -9,6 +9,7 @@ runs twice as fast. References are not counted: a kernel makes no arrays, and it
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -159,14 +160,25 @@ class _Inner(CPUDispatcher):  # type: ignore[misc]
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A compiled function with two faces: one for Python, whose machine code is kept in `cache`, and one for
-    other kernels."""
+    """A compiled function with two faces: one for Python, whose machine code is kept in a cache, and one for
+    other kernels. Most kernels never show the first: their cache is not looked for."""
 
-    def __init__(self, function: Any, cache: Any) -> None:
+    def __init__(self, function: Any, cache_of: Callable[[Any], Any]) -> None:
+        self._kept: Any = None
+        self._cache_of = cache_of
         super().__init__(function, targetoptions=dict(_OPTIONS), pipeline_class=_OuterCompiler)
         inner = dict(_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
         self._inner = _Inner(function, targetoptions=inner, pipeline_class=_InnerCompiler)
-        self._cache = cache
+
+    @property
+    def _cache(self) -> Any:
+        if self._kept is None:
+            self._kept = self._cache_of(self.py_func)
+        return self._kept
+
+    @_cache.setter
+    def _cache(self, blank: Any) -> None:
+        """numba's constructor sets one that keeps nothing."""
 
     @property
     def _numba_type_(self) -> Any:

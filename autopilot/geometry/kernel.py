@@ -159,5 +159,5 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """
     if config.DISABLE_JIT:
         return function
-    compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache(function)), function)
+    compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache), function)
     return compiled

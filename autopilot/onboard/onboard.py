@@ -26,11 +26,13 @@ from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse
 from autopilot.estimation.filter import estimator_tuning
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.geometry.packed import pack, packed, unpack
-from autopilot.onboard.flight_log import FlightLog, LogChunk, Sample
+from autopilot.geometry.packed import pack, packed
+from autopilot.onboard.flight_log import FlightLog, LogChunk
+from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import Moment, Moments, Options
+from autopilot.onboard.warmup import rehearse_telemetry
 from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.heartbeat import heartbeat_message
@@ -54,7 +56,7 @@ from autopilot.supervisor.state import MissionPlan, Phase
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
-from autopilot.wire.convert import HilGps, Home
+from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, located_steps, unflown
@@ -131,10 +133,8 @@ class Onboard:
         self._options = options
         self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
         self._answer = b""
-        self._fixed = False  # a HIL_GPS was heard
         self._health = packed(Condition())
-        self._battery = battery_constants(parameters)
-        self._battery_row = packed(self._battery)
+        self._battery_row = packed(battery_constants(parameters))
         self._frame = np.zeros(FRAME_ROOM, np.uint8)
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._shortest_us = 0  # between two ticks so far
@@ -146,14 +146,14 @@ class Onboard:
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
-        self._moments = Moments(self.core, options, parameters)
+        self._moments = Moments(self.core, options, parameters, self._health, self._sensors.fix)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
         self._log: FlightLog | None = None
         if options.log:
             release = ".".join(map(str, identity.version))
-            self._log = FlightLog(parameters, release, options.boot_unix_us)
+            self._log = FlightLog(parameters, release, options.boot_unix_us, options.home)
             self.endpoint.on_text = self._log_text
 
     # ---- simulator link
@@ -218,7 +218,7 @@ class Onboard:
         self.tick += 1
         self.now_us = tick.now_us
         if tick.fixed:
-            self._fixed = True
+            self._moments.fixed = True
         for message in tick.aside:
             self._hear_simulator(message)
         if period_us > 0 and not 0 < self._shortest_us <= period_us:
@@ -249,10 +249,10 @@ class Onboard:
         for seq in report.reached:
             last = self.core.flight.mission.done and seq == report.reached[-1]
             self.endpoint.item_reached(seq, last)
-        if self._log is not None:
-            rate_hz = self.parameters["LOG_RATE_HZ"]
-            self._log.step(self.now_us, self.armed, rate_hz, self._log_names, self.log_sample)
-            self.endpoint.files.protected = self._log.path
+        log = self._log
+        if log is not None and log.due(tick.now_us, self.armed):
+            log.step(self.now_us, self.armed, self._log_names, self.log_sample)
+            self.endpoint.files.protected = log.path
 
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -277,6 +277,7 @@ class Onboard:
         """The shell could not store the log."""
         if self._log is not None:
             self._log.give_up()
+            self.endpoint.files.protected = None
         self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Flight log lost: {why}")
 
     def _log_names(self) -> set[str]:
@@ -288,7 +289,8 @@ class Onboard:
     def log_sample(self) -> Sample:
         """What the flight log records at this tick."""
         moment = self._snapshot()
-        return Sample(moment, self._sensors.sample, moment.accel_quad, lambda: moment.estimator)
+        sane = self._sensors.sample is not None
+        return Sample(moment, moment.instant, self._sensors.imu, sane, lambda: moment.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:
@@ -307,8 +309,8 @@ class Onboard:
             return
         self.fault = ""
         self.core.follow(build_setup(self.parameters, every))
-        self._battery = battery_constants(self.parameters)
-        pack(self._battery, self._battery_row, 0)
+        self._moments.battery = battery_constants(self.parameters)
+        pack(self._moments.battery, self._battery_row, 0)
         # a mission under way keeps the paths that it began with
         if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.mission.active:
             self._prepare()
@@ -377,10 +379,15 @@ class Onboard:
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
         rehearse(self.core.setup)
+        self.rehearse_messages()
+
+    def rehearse_messages(self) -> None:
+        """Of these the ones of the simulator link, of telemetry and of the flight log."""
         self._sensors.read(b"", -1)
         self._put_answer(0)
         health = packed(Condition())
         follow(health, self._sensors.imu, self.core.force_row, self._battery_row, 0, False, 0, 0.0)
+        rehearse_telemetry(self.core.setup, self.parameters)
 
     def _decide(self, request: object) -> Verdict:
         if isinstance(request, ChangeSigningKey):
@@ -464,6 +471,4 @@ class Onboard:
         self.core.change(replace(flight, mission=replace(flight.mission, plan=plan)))
 
     def _snapshot(self) -> Moment:
-        condition = unpack(Condition, self._health, 0)
-        fix = unpack(HilGps, self._sensors.fix, 0) if self._fixed else None
-        return Moment(self._moments, self.endpoint.mission, condition, self._battery, fix, self.now_us)
+        return Moment(self._moments, self.endpoint.mission, self.now_us)

@@ -6,19 +6,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, nan, sqrt
-from operator import itemgetter
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, cast
+
+import numpy as np
 
 from autopilot.control.load_motion import Drag
-from autopilot.core.flight_core import FlightCore
-from autopilot.core.health import BatteryConstants, Condition, remaining, sensors, vibration, voltage
-from autopilot.core.tick import Pilot, Seen
-from autopilot.estimation.records import TRACKER, EstimatorState
-from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
-from autopilot.geometry.packed import Row, width
-from autopilot.geometry.so3 import quat_from_rotation
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Run, asked_jet
+from autopilot.core.flight_core import FlightCore, LaidOut
+from autopilot.core.health import Condition, battery_constants, remaining, sensors, vibration, voltage
+from autopilot.estimation.records import TRACKER, Array, EstimatorState
+from autopilot.geometry.entry import entry_of
+from autopilot.geometry.linear import Vec3, norm, scale
+from autopilot.geometry.packed import Row, unpack, width
+from autopilot.guidance.layout import jets
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Run
+from autopilot.onboard.instant_row import NO_LEG, put_instant
 from autopilot.services import identity, snapshot
+from autopilot.services.instant import Instant
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.snapshot import GpsFix, Snapshot
 from autopilot.supervisor.requests.arming import arming_complaints
@@ -31,6 +34,7 @@ from autopilot.supervisor.state import (
     Phase,
     Selected,
     View,
+    carries,
     leg_time_s,
 )
 from autopilot.wire.convert import HilGps, Home
@@ -68,16 +72,7 @@ _LANDED_STATES = {
 }
 _ALWAYS = snapshot.MOTORS | snapshot.AHRS | snapshot.BATTERY
 _BY_TRACKER = snapshot.GPS | snapshot.MAG | snapshot.BARO
-_ESTIMATING = (
-    mavlink.ESTIMATOR_ATTITUDE
-    | mavlink.ESTIMATOR_VELOCITY_HORIZ
-    | mavlink.ESTIMATOR_VELOCITY_VERT
-    | mavlink.ESTIMATOR_POS_HORIZ_REL
-    | mavlink.ESTIMATOR_POS_HORIZ_ABS
-    | mavlink.ESTIMATOR_POS_VERT_ABS
-    | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
-    | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
-)
+_WIDTH = width(Instant)
 
 
 @dataclass(frozen=True)
@@ -164,30 +159,111 @@ def wind(push: Vec3, drag: Drag) -> Vec3:
     return scale(1.0 / slope, push) if slope > 0.0 else (nan, nan, nan)
 
 
+class Told(NamedTuple):
+    """What a flight record says to telemetry, whatever the estimate: fields of `Snapshot`."""
+
+    launch: Vec3
+    breach: str
+    breaches: int
+    breach_us: int
+    armed: bool
+    phase: int
+    main_mode: int
+    sub_mode: int
+    landed_state: int
+    seq: int
+    mission_current: int
+    mission_total: int
+    mission_state: int
+    reel_rate: float
+
+
+def told(flight: Flight, items: int) -> Told:
+    """What a flight record with a mission of so many items says."""
+    area, sequence = flight.area, flight.mission.plan.sequence
+    seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
+    return Told(
+        area.home,
+        area.breach,
+        area.breaches,
+        area.breach_us,
+        flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
+        int(flight.phase),
+        *mode_of(flight),
+        _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
+        seq,
+        seq,
+        items,
+        mission_state(flight, items),
+        flight.cable.reel_rate,
+    )
+
+
 class Moments:
     """Makes the snapshots of one flight core; remembers what follows from a flight record while it lasts."""
 
-    def __init__(self, core: FlightCore, options: Options, parameters: ParameterTable) -> None:
+    def __init__(
+        self, core: FlightCore, options: Options, parameters: ParameterTable, health: Row, fix: Row
+    ) -> None:
+        """`health` and `fix` are the rows of `Condition` and, once `fixed` is set, of the last HIL_GPS."""
         self.core = core
         self.options = options
         self.parameters = parameters
+        self.health = health
+        self.fix = fix
+        self.fixed = False
+        self.battery = battery_constants(parameters)
         self._flight: Flight | None = None
         self._items = 0
-        self._told: tuple[Any, ...] = ()
+        self._told = told(core.flight, 0)
+        self._asked: Array | None = None  # what the mission asks for, row by row as `_laid` has its setpoints
+        self._laid: LaidOut | None = None
+        self._put: Callable[..., None] | None = None  # machine code, once it was asked for
 
-    def told(self, flight: Flight, items: int) -> tuple[Any, ...]:
-        """The fields of `_flight`, of a flight record with a mission of so many items."""
+    def told(self, flight: Flight, items: int) -> Told:
+        """What a flight record with a mission of so many items says."""
         if flight is not self._flight or items != self._items:
-            self._flight, self._items = flight, items
-            area, sequence = flight.area, flight.mission.plan.sequence
-            seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
-            self._told = (
-                *(area.home, area.breach, area.breaches, area.breach_us),
-                *(flight.phase not in (Phase.DISARMED, Phase.FAILSAFE), int(flight.phase), *mode_of(flight)),
-                _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
-                *(seq, seq, items, mission_state(flight, items), flight.cable.reel_rate),
-            )
+            self._flight, self._items, self._told = flight, items, told(flight, items)
         return self._told
+
+    def instant(self, flight: Flight, seq: int, now_us: int) -> Row:
+        """The packed `Instant` at which the core stands with this flight."""
+        core, rows, setup = self.core, self.core.rows, self.core.setup
+        targets = asked = rows.targets
+        at, mode = 0, NO_LEG
+        if flight.legs:
+            leg, elapsed_s = flight.legs[0], leg_time_s(flight, now_us)
+            mode = leg.control_mode
+            duration_s = leg.duration_s if leg.duration_s < inf else nan
+            if mode in (LOAD_POSITION, QUAD_POSITION):
+                at = core.setpoint_row(now_us)
+                if at < 0:
+                    at, times_s = 0, np.array([elapsed_s])
+                    targets = asked = jets(leg, times_s)
+                    if isinstance(leg, Run):
+                        asked = jets(leg, times_s, asked=True)
+                elif isinstance(leg, Run):
+                    asked = self._all_asked(leg)
+        else:
+            elapsed_s, duration_s = (now_us - flight.phase_start_us) * 1e-6, nan
+        limits = (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
+        instant = np.empty(_WIDTH)
+        arguments = (
+            *(rows.seen, rows.estimator, rows.pilot, targets, asked, at, int(mode), elapsed_s),
+            *(float(duration_s), now_us, int(flight.phase), seq, flight.phase in CARRYING, carries(flight)),
+            *(*limits, instant),
+        )
+        if self._put is None:
+            self._put = entry_of(put_instant, *arguments)
+        self._put(*arguments)
+        return instant
+
+    def _all_asked(self, leg: Run) -> Array:
+        """What the mission asks for where the core has laid out the setpoints of this leg."""
+        laid = self.core.laid
+        if laid is not None and (self._asked is None or laid is not self._laid):
+            self._laid, self._asked = laid, jets(leg, laid.times_s, asked=True)
+        return cast(Array, self._asked)
 
 
 class Moment(Snapshot):
@@ -197,32 +273,31 @@ class Moment(Snapshot):
     them are sent.
     """
 
-    def __init__(
-        self,
-        moments: Moments,
-        mission: StoredMission,
-        condition: Condition,
-        battery: BatteryConstants,
-        receiver: HilGps | None,
-        now_us: int,
-    ) -> None:
+    def __init__(self, moments: Moments, mission: StoredMission, now_us: int) -> None:
         self.now_us = now_us
         self.boot_unix_us = moments.options.boot_unix_us
         self.home = moments.options.home
         self.moments = moments
         self.core = moments.core
         self.flight = moments.core.flight
-        self.items = len(mission.items)
-        self.condition = condition
-        self.battery = battery
-        self.receiver = receiver
+        self.told = moments.told(self.flight, len(mission.items))
+        # a vehicle that is not armed says whether it may be
+        self.unchanged = None if self.flight.phase == Phase.DISARMED else self.told
 
-    accel_quad: Vec3  # inertial acceleration, ENU: for the flight log
+    @cached_property
+    def instant(self) -> Row:  # type: ignore[override]
+        """What is sent and logged most often, as a row."""
+        return self.moments.instant(self.flight, self.told.seq, self.now_us)
 
     @cached_property
     def estimator(self) -> EstimatorState:
         """The estimate."""
         return self.core.estimator
+
+    @cached_property
+    def condition(self) -> Condition:
+        """Sensors heard, vibration, battery."""
+        return unpack(Condition, self.moments.health, 0)
 
     @cached_property
     def view(self) -> View:
@@ -266,112 +341,19 @@ def _makes(*names: str) -> Callable[[Part], Part]:
     return decorate
 
 
-def _slot(record: Any, *path: str) -> slice | int:
-    """Where in a packed record the numbers of a field lie: of a vector all, of a number its place."""
-    first, kind = 0, record
-    for name in path:
-        hints = get_type_hints(kind)
-        first += sum(width(hints[one]) for one in kind._fields[: kind._fields.index(name)])
-        kind = hints[name]
-    return first if width(kind) == 1 else slice(first, first + width(kind))
+@_makes(*Instant._fields)
+def _instant(m: Moment) -> tuple[Any, ...]:
+    return unpack(Instant, m.instant, 0)
 
 
-def _reader(record: Any, *paths: str) -> Callable[[Row], Any]:
-    """Reads the fields of a packed record that lie at these paths, a.b for the field b of the field a."""
-    take = itemgetter(*(_slot(record, *path.split(".")) for path in paths))
-    # of a tuple even a part is a tuple
-    return lambda row: take(tuple(row.tolist()))
+@_makes(*Told._fields)
+def _told(m: Moment) -> tuple[Any, ...]:
+    return m.told
 
 
-_read_seen = _reader(
-    Seen,
-    *(f"state.{name}" for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad")),
-    *("state.omega_body", "taut"),
-)
-_read_estimator = _reader(
-    EstimatorState,
-    *("vehicle.quat_wxyz", "load.tension", "doubt.horizontal", "doubt.vertical", "vehicle.accel_quad"),
-)
-_read_pilot = _reader(
-    Pilot,
-    *("control_mode", "slack_events", "mixed.saturated", "mixed.forces"),
-    *(f"command.{name}" for name in ("e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q")),
-    *(f"command.{name}" for name in ("q_c", "thrust", "moment")),
-)
-
-
-_read_attitude_asked = _reader(Pilot, "command.R_c")
-
-
-@_makes(
-    *("launch", "breach", "breaches", "breach_us", "armed", "phase", "main_mode", "sub_mode"),
-    *("landed_state", "seq", "mission_current", "mission_total", "mission_state", "reel_rate"),
-    "system_status",
-)
-def _flight(m: Moment) -> tuple[Any, ...]:
-    told, flight = m.moments.told(m.flight, m.items), m.flight
-    return (*told, system_status(flight, flight.phase == Phase.DISARMED and m.ready))
-
-
-@_makes("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad", "omega_body", "taut", "distance")
-def _motion(m: Moment) -> tuple[Any, ...]:
-    x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, taut = _read_seen(m.core.rows.seen)
-    distance = norm(sub(x_load, x_quad))
-    return x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, omega_body, taut != 0.0, distance
-
-
-@_makes("quat_wxyz", "tension", "horizontal_std", "vertical_std", "accel_quad")
-def _estimate(m: Moment) -> tuple[Any, ...]:
-    return _read_estimator(m.core.rows.estimator)  # type: ignore[no-any-return]
-
-
-@_makes("estimator_flags")
-def _flags(m: Moment) -> tuple[Any, ...]:
-    return (0 if m.view.complaints else _ESTIMATING,)
-
-
-@_makes(
-    *("control_mode", "slack_events", "saturated", "forces", "e_x", "e_v"),
-    *("e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q", "q_cable_c", "thrust", "moment"),
-)
-def _command(m: Moment) -> tuple[Any, ...]:
-    mode, slack_events, saturated, forces, e_x, e_v, *others = _read_pilot(m.core.rows.pilot)
-    if m.flight.phase not in CARRYING:
-        e_x = e_v = ZERO
-    return (int(mode), int(slack_events), int(saturated), forces, e_x, e_v, *others)
-
-
-@_makes("quat_c_wxyz")
-def _attitude_asked(m: Moment) -> tuple[Any, ...]:
-    r = _read_attitude_asked(m.core.rows.pilot)
-    return (quat_from_rotation((r[0:3], r[3:6], r[6:9])),)
-
-
-@_makes(
-    *("elapsed_s", "duration_s", "x_load_d", "v_load_d", "a_load_d", "x_load_asked", "v_load_asked"),
-    "x_quad_d",
-)
-def _setpoint(m: Moment) -> tuple[Any, ...]:
-    flight, now_us, x_load, nowhere = m.flight, m.now_us, m.x_load, (nan, nan, nan)
-    if not flight.legs:
-        elapsed = (now_us - flight.phase_start_us) * 1e-6
-        return elapsed, nan, x_load, ZERO, ZERO, x_load, ZERO, nowhere
-    leg, elapsed = flight.legs[0], leg_time_s(flight, now_us)
-    duration = leg.duration_s if leg.duration_s < inf else nan
-    if leg.control_mode == LOAD_POSITION:
-        jet = leg.jet(elapsed)
-        asked = (
-            asked_jet(leg, elapsed) if isinstance(leg, Run) else jet
-        )  # a second time only where it differs
-        return elapsed, duration, jet[0], jet[1], jet[2], asked[0], asked[1], nowhere
-    x_quad_d = leg.jet(elapsed)[0] if leg.control_mode == QUAD_POSITION else nowhere
-    return elapsed, duration, x_load, ZERO, ZERO, x_load, ZERO, x_quad_d
-
-
-@_makes("rotor_min", "rotor_max")
-def _limits(m: Moment) -> tuple[Any, ...]:
-    setup = m.core.setup
-    return (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
+@_makes("system_status")
+def _system_status(m: Moment) -> tuple[Any, ...]:
+    return (system_status(m.flight, m.flight.phase == Phase.DISARMED and m.ready),)
 
 
 @_makes("sensors_present", "sensors_healthy")
@@ -381,8 +363,8 @@ def _sensors(m: Moment) -> tuple[Any, ...]:
 
 @_makes("gps")
 def _gps(m: Moment) -> tuple[Any, ...]:
-    gps = m.receiver
-    if gps is not None:
+    if m.moments.fixed:
+        gps = unpack(HilGps, m.moments.fix, 0)
         place = (gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std)
         return (GpsFix(gps.time_us, gps.fix_type, *place, gps.satellites),)
     if m.fake_gps and tracked(m.estimator):
@@ -404,6 +386,6 @@ def _wind(m: Moment) -> tuple[Any, ...]:
 
 @_makes("battery_voltage", "battery_current", "battery_used_mah", "battery_remaining")
 def _battery(m: Moment) -> tuple[Any, ...]:
-    condition = m.condition
+    condition, battery = m.condition, m.moments.battery
     used_mah = condition.used_as / 3.6
-    return voltage(condition, m.battery), condition.current, used_mah, remaining(condition, m.battery)
+    return voltage(condition, battery), condition.current, used_mah, remaining(condition, battery)

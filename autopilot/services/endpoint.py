@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from autopilot.services.commands import CommandService
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
@@ -58,6 +60,7 @@ from autopilot.services.requests import (
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
+from autopilot.services.stream_frames import BITS
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import GROUPS, LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
 from autopilot.services.timesync import answer_ping, answer_timesync
@@ -70,7 +73,6 @@ from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
-PLANS = (mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
 REACHED_AGAIN = 4  # times that the end of a mission is said again
 REACHED_US = 300_000  # between two of them
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
@@ -81,6 +83,7 @@ _UINT16 = 2**16 - 1
 _ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
+_NO_INSTANT = np.zeros(0)
 
 _STREAMED = FollowSetpoint | FollowAttitude | FollowStick  # they change no mode
 _METADATA = {
@@ -134,6 +137,7 @@ class VehicleEndpoint:
         }
         self._own = (identity.system, AUTOPILOT_COMPONENT)
         self._watched: dict[int, Any] = {}
+        self._seen: tuple[object, Any] = (None, ())  # of the snapshot that was watched last
         self._asked_mode: int | None = None
         self._consequences: list[Output] = []  # of a decision
         self._work = False  # something waits in a queue
@@ -257,20 +261,33 @@ class VehicleEndpoint:
             self._follow_up(self._events)
             self._say_reached_again(now_us)
             self._work, self._stirred = False, True
-        keys = {
-            link: [*state.announced, *state.streams.take_due(now_us)] for link, state in self._links.items()
-        }
+        ahead = [(link, state, state.streams.take_due(now_us)) for link, state in self._links.items()]
         datagrams: list[tuple[Link, bytes]] = []
-        if any(keys.values()):
-            plans = [self._missions.plan_id(kind) for kind in PLANS]
+        instant, in_kernel = _NO_INSTANT, False
+        if any(keys or state.announced for _, state, keys in ahead):
             snapshot = make_snapshot()
-            snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, (plans[0], plans[1], plans[2])
+            snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, self._missions.plan_ids
             self._watch(snapshot)
+            # what is signed is written frame by frame
+            if snapshot.instant is not None and self._signing.signing is None:
+                instant, in_kernel = snapshot.instant, True
         built: dict[int, list[Outgoing]] = {}
-        for link, state in self._links.items():
-            outgoing: list[Outgoing] = [(self._own, message) for message in state.queue]
-            # what was announced just now is in its order before the streams
-            for key in dict.fromkeys((*state.announced, *keys[link])):
+        for link, state, streams in ahead:
+            outgoing: list[Outgoing | int] = [(self._own, message) for message in state.queue]
+            # what was announced, just now as well, comes before the streams
+            keys = dict.fromkeys((*state.announced, *streams)) if state.announced else streams
+            last = 0
+            for key in keys:
+                bit = BITS.get(key, 0) if in_kernel else 0
+                if bit:
+                    if 0 < last < bit:  # they are written together
+                        last |= bit
+                        outgoing[-1] = last
+                    else:
+                        last = bit
+                        outgoing.append(bit)
+                    continue
+                last = 0
                 made = built.get(key)
                 if made is None:
                     made = built[key] = self._build(key, snapshot)
@@ -278,7 +295,7 @@ class VehicleEndpoint:
             state.queue.clear()
             state.announced.clear()
             if outgoing:
-                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing)]
+                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing, instant)]
         self._next_us = min(self._timer_us, self._next_stream())
         return datagrams
 
@@ -305,6 +322,10 @@ class VehicleEndpoint:
 
     def _watch(self, snapshot: Snapshot) -> None:
         """Announce what changed since it was last looked at."""
+        seen = (snapshot.unchanged, snapshot.plan_ids)
+        if seen[0] is not None and seen[0] is self._seen[0] and seen[1] == self._seen[1]:
+            return
+        self._seen = seen
         for key, pick in WATCHED.items():
             picked = pick(snapshot)
             if self._watched.get(key) != picked:
@@ -346,7 +367,8 @@ class VehicleEndpoint:
     def _new_link(self, configured: bool, now_us: int) -> LinkState:
         taken = {state.number for state in self._links.values()}
         number = next(number for number in range(len(taken) + 1) if number not in taken)
-        return LinkState(configured, self._defaults, now_us, number & 0xFF, self._signing.signer)
+        signer, system = self._signing.signer, self.identity.system
+        return LinkState(configured, self._defaults, now_us, number & 0xFF, signer, system)
 
     def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)

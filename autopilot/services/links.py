@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from autopilot.geometry.packed import Row
+from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT
+from autopilot.services.stream_frames import StreamFrames
 from autopilot.services.streams import Streams
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import FrameWriter, split
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Sign
 
@@ -21,10 +24,26 @@ Outgoing = tuple[tuple[int, int], Any]
 class LinkState:
     """What the endpoint keeps for a link; a new one begins with a HEARTBEAT."""
 
-    __slots__ = ("announced", "configured", "heard_us", "number", "queue", "signer", "streams", "writers")
+    __slots__ = (
+        "_streams",
+        "announced",
+        "configured",
+        "heard_us",
+        "number",
+        "queue",
+        "signer",
+        "streams",
+        "writers",
+    )
 
     def __init__(
-        self, configured: bool, defaults: Mapping[int, int], now_us: int, number: int, signer: SignerOf
+        self,
+        configured: bool,
+        defaults: Mapping[int, int],
+        now_us: int,
+        number: int,
+        signer: SignerOf,
+        system: int,
     ) -> None:
         self.configured = configured  # never forgotten
         self.number = number  # that signatures bear
@@ -32,6 +51,8 @@ class LinkState:
         self.heard_us = now_us
         self.streams = Streams(defaults, now_us)
         self.writers: dict[tuple[int, int], FrameWriter] = {}
+        own, dialect = self._writer((system, AUTOPILOT_COMPONENT)), self._writer((system, DIALECT_COMPONENT))
+        self._streams = StreamFrames(own, dialect)
         self.queue: list[Any] = []  # answers of the autopilot
         # streamed messages out of turn, in their order
         self.announced: dict[int, None] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: None}
@@ -46,18 +67,25 @@ class LinkState:
             writer = self.writers[source] = FrameWriter(*source)
         return writer
 
-    def datagrams(self, outgoing: Iterable[Outgoing]) -> list[bytes]:
-        """Frames in their order, as many in a datagram as go in."""
+    def datagrams(self, outgoing: Iterable[Outgoing | int], instant: Row) -> list[bytes]:
+        """Frames in their order, as many in a datagram as go in. A number is a set of streams of `instant`,
+        as `StreamFrames` has them; of a link that signs there must be none."""
         datagrams: list[bytes] = []
         frames: list[bytes] = []
         size, sign, writers = 0, self.signer(self.number), self.writers
-        for source, message in outgoing:
-            frame = (writers.get(source) or self._writer(source)).frame(message, sign)
-            size += len(frame)
-            if size > DATAGRAM_BYTES:
-                datagrams.append(b"".join(frames))
-                frames, size = [], len(frame)
-            frames.append(frame)
+        for one in outgoing:
+            if isinstance(one, int):
+                made = self._streams.frames(one, instant)
+                several = [made] if size + len(made) <= DATAGRAM_BYTES else split(made)
+            else:
+                source, message = one
+                several = [(writers.get(source) or self._writer(source)).frame(message, sign)]
+            for frame in several:
+                size += len(frame)
+                if size > DATAGRAM_BYTES:
+                    datagrams.append(b"".join(frames))
+                    frames, size = [], len(frame)
+                frames.append(frame)
         if frames:
             datagrams.append(b"".join(frames))
         return datagrams

@@ -107,8 +107,13 @@ class MissionService:
         self._ended: _Ended | None = None
         self._numbered: dict[int, tuple[tuple[WireItem, ...], int]] = {}
 
-    def plan_id(self, kind: int) -> int:
-        """Number of the version of a plan in force (MAV_MISSION_TYPE); 0: there is none."""
+    @property
+    def plan_ids(self) -> tuple[int, int, int]:
+        """Numbers of the versions of mission, fence and rally points in force; 0: there is none."""
+        fence, rally = _AREAS
+        return (self._plan_id(_MISSION), self._plan_id(fence), self._plan_id(rally))
+
+    def _plan_id(self, kind: int) -> int:
         items = self.mission.items if kind == _MISSION else self.areas.get(kind, ())
         known = self._numbered.get(kind)
         if known is None or known[0] is not items:
@@ -247,7 +252,7 @@ class MissionService:
 
     def _accepted(self, peer: Peer, kind: int) -> Output:
         """The acknowledgement of a plan that is in force by now."""
-        return _ack(peer, _ACCEPTED, kind, self.plan_id(kind))
+        return _ack(peer, _ACCEPTED, kind, self._plan_id(kind))
 
     def _late_item(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
         ended = self._ended
@@ -348,7 +353,7 @@ class MissionService:
             return [_ack(peer, mavlink.MAV_MISSION_UNSUPPORTED, kind)]
         count = len(self._items_of(kind))
         answer = mavlink.MAVLink_mission_count_message(
-            peer.system, peer.component, count, kind, opaque_id=self.plan_id(kind)
+            peer.system, peer.component, count, kind, opaque_id=self._plan_id(kind)
         )
         return [Send(peer.link, answer)]
 

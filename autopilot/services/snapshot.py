@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
 from autopilot.wire.convert import Forces, Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -140,3 +141,6 @@ class Snapshot:
     mission_state: int = mavlink.MISSION_STATE_NO_MISSION
     reel_rate: float = 0.0  # m/s, at which the winch lets the cable out
     plan_ids: tuple[int, int, int] = (0, 0, 0)  # of mission, fence, rally points; 0: there is none
+
+    instant: Row | None = None  # the packed `Instant`, if it is there: frames are made of it in machine code
+    unchanged: object = None  # while it is the same object, nothing of `telemetry.WATCHED` changes but plans

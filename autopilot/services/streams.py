@@ -7,6 +7,7 @@ nothing drifts: at a tick of 4 ms, 8 ms is every second tick for ever, 50 ms alt
 from __future__ import annotations
 
 from collections.abc import Mapping
+from heapq import heapify, heapreplace
 
 OFF = -1  # MAV_CMD_SET_MESSAGE_INTERVAL: never
 DEFAULT = 0  # and: the default interval
@@ -21,14 +22,18 @@ class Streams:
         self._defaults = defaults
         self._interval = dict(defaults)
         self._order = {key: number for number, key in enumerate(defaults)}
-        # streams of one interval are due together: (interval, when due next): their keys
-        self._groups: dict[tuple[int, int], list[int]] = {}
-        for key, interval in defaults.items():
-            self._groups.setdefault((interval, _at_or_after(interval, now_us)), []).append(key)
-        self._look_ahead()
+        # streams of one interval are due together: a heap of (when due next, interval, their keys in order)
+        self._groups: list[tuple[int, int, tuple[int, ...]]] = []
+        self._regroup({key: _at_or_after(interval, now_us) for key, interval in defaults.items()})
 
-    def _look_ahead(self) -> None:
-        self.next_us = min((due_us for _, due_us in self._groups), default=NEVER_US)
+    def _regroup(self, due_us: Mapping[int, int]) -> None:
+        """Group all streams anew by interval and when each is due."""
+        groups: dict[tuple[int, int], list[int]] = {}
+        for key in self._order:
+            groups.setdefault((due_us[key], self._interval[key]), []).append(key)
+        self._groups = [(due, interval, tuple(keys)) for (due, interval), keys in groups.items()]
+        heapify(self._groups)
+        self.next_us = self._groups[0][0] if self._groups else NEVER_US
 
     def interval(self, key: int) -> int | None:
         """Interval in us, OFF, or None for a message that is never streamed."""
@@ -38,24 +43,29 @@ class Streams:
         """Change the interval of a known stream: DEFAULT, OFF or us."""
         interval = self._defaults[key] if interval_us == DEFAULT else interval_us
         self._interval[key] = interval
-        groups = {slot: [one for one in keys if one != key] for slot, keys in self._groups.items()}
-        groups.setdefault((interval, _at_or_after(interval, now_us)), []).append(key)
-        self._groups = {slot: keys for slot, keys in groups.items() if keys}
-        self._look_ahead()
+        due_us = self._due_us()
+        due_us[key] = _at_or_after(interval, now_us)
+        self._regroup(due_us)
 
     def take_due(self, now_us: int) -> list[int]:
         """What is due at this tick; each of them is due again at its next multiple."""
-        if now_us < self.next_us:
-            return []
         taken: list[int] = []
-        for slot in [slot for slot in self._groups if slot[1] <= now_us]:
-            keys = self._groups.pop(slot)
+        groups, several, last = self._groups, False, 0
+        twice = False  # a stream was set to this interval between two instants at which the others were due
+        while self.next_us <= now_us:
+            _, interval, keys = groups[0]
+            several, twice, last = bool(taken), twice or interval == last, interval
             taken += keys
-            interval = slot[0]
-            self._groups.setdefault((interval, _at_or_after(interval, now_us + 1)), []).extend(keys)
-        taken.sort(key=self._order.__getitem__)
-        self._look_ahead()
+            heapreplace(groups, (_at_or_after(interval, now_us + 1), interval, keys))
+            self.next_us = groups[0][0]
+        if several:
+            taken.sort(key=self._order.__getitem__)
+        if twice:
+            self._regroup(self._due_us())
         return taken
+
+    def _due_us(self) -> dict[int, int]:
+        return {key: due_us for due_us, _, keys in self._groups for key in keys}
 
 
 def _at_or_after(interval_us: int, now_us: int) -> int:

@@ -23,26 +23,28 @@ from autopilot.services.identity import (
     autopilot_version_message,
     protocol_version_message,
 )
+from autopilot.services.instant import (
+    attitude_of,
+    attitude_quaternion_of,
+    cascade_errors_of,
+    load_setpoint_of,
+    load_state_of,
+    local_position_ned_of,
+    rotor_state_of,
+)
 from autopilot.services.snapshot import PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import (
     ROTOR_FMAX,
     altitude_message,
-    attitude_message,
-    attitude_quaternion_message,
     attitude_target_message,
     boot_ms,
-    cascade_errors_message,
     global_position_int_message,
     gps_global_origin_message,
     gps_raw_int_message,
     home_position_message,
-    load_setpoint_message,
-    load_state_message,
-    local_position_ned_message,
     position_target_local_ned_message,
-    rotor_state_message,
     saturated,
     uint16,
     vfr_hud_message,
@@ -54,6 +56,12 @@ from autopilot.wire.dialect import plumbline as mavlink
 Builder = Callable[[Snapshot, Identity], tuple[Any, ...]]
 
 _ATTITUDE = layout_of(mavlink.MAVLink_attitude_message)
+_ATTITUDE_QUATERNION = layout_of(mavlink.MAVLink_attitude_quaternion_message)
+_LOCAL_POSITION_NED = layout_of(mavlink.MAVLink_local_position_ned_message)
+_LOAD_STATE = layout_of(mavlink.MAVLink_load_state_message)
+_LOAD_SETPOINT = layout_of(mavlink.MAVLink_load_setpoint_message)
+_CASCADE_ERRORS = layout_of(mavlink.MAVLink_cascade_errors_message)
+_ROTOR_STATE = layout_of(mavlink.MAVLink_rotor_state_message)
 _SERVO_OUTPUT_RAW = layout_of(mavlink.MAVLink_servo_output_raw_message)
 _DEBUG_VECT = layout_of(mavlink.MAVLink_debug_vect_message)
 _NAMED_VALUE_FLOAT = layout_of(mavlink.MAVLink_named_value_float_message)
@@ -61,7 +69,6 @@ _NAMED_VALUE_FLOAT = layout_of(mavlink.MAVLink_named_value_float_message)
 _UINT16 = 0xFFFF  # "unknown" in most unsigned fields
 _INT16 = 0x7FFF  # "unknown" temperature
 _UINT32 = 0xFFFFFFFF
-_ESTIMATED = mavlink.PLUMBLINE_SOURCE_ESTIMATED
 _IN_MISSION_MODE, _SUSPENDED = 1, 2  # MISSION_CURRENT.mission_mode
 _PWM_STOP, _PWM_FULL = 1000, 2000  # SERVO_OUTPUT_RAW as most tools expect it, us
 
@@ -163,15 +170,15 @@ def _home_position(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _local_position_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (local_position_ned_message(s.now_us, s.x_quad, s.v_quad),)
+    return ((_LOCAL_POSITION_NED, local_position_ned_of(s)),)
 
 
 def _attitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (attitude_message(s.now_us, s.quat_wxyz, s.omega_body),)
+    return ((_ATTITUDE, attitude_of(s)),)
 
 
 def _attitude_quaternion(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (attitude_quaternion_message(s.now_us, s.quat_wxyz, s.omega_body),)
+    return ((_ATTITUDE_QUATERNION, attitude_quaternion_of(s)),)
 
 
 def _altitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -309,23 +316,19 @@ def _autopilot_version(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _load_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    load = (s.x_load, s.v_load, s.q_cable, s.q_cable_dot, s.distance, s.tension, s.taut, s.slack_events)
-    return (load_state_message(s.now_us, _ESTIMATED, *load),)
+    return ((_LOAD_STATE, load_state_of(s)),)
 
 
 def _load_setpoint(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    desired = (s.x_load_d, s.v_load_d, s.a_load_d, s.q_cable_c, s.elapsed_s, s.duration_s)
-    asked = (s.x_load_asked, s.v_load_asked)
-    return (load_setpoint_message(s.now_us, s.phase, s.control_mode, s.seq, *desired, *asked),)
+    return ((_LOAD_SETPOINT, load_setpoint_of(s)),)
 
 
 def _cascade_errors(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    errors = (s.e_x, s.e_v, s.e_q, s.e_q_dot, s.e_R, s.e_Omega, s.psi_R, s.psi_q)
-    return (cascade_errors_message(s.now_us, s.control_mode, *errors, s.thrust, s.moment),)
+    return ((_CASCADE_ERRORS, cascade_errors_of(s)),)
 
 
 def _rotor_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (rotor_state_message(s.now_us, _ESTIMATED, s.forces, s.rotor_min, s.rotor_max, s.saturated),)
+    return ((_ROTOR_STATE, rotor_state_of(s)),)
 
 
 def _load_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

@@ -36,16 +36,18 @@ class Part:
         mark_ready(self.source, (self.mark,))
 
 
+_ONBOARD = ROOT / "autopilot" / "onboard" / "onboard.py"
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
-SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 18.0)
+SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 10.0)
 
 
 def autopilot_parts(law: str) -> tuple[Part, ...]:
     """What the autopilot needs to fly with this law, the longest first."""
     module = "autopilot.shell.warmup"
     return (
-        Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 30.0),
-        Part("the paths", module, ("paths", law), _AUTOPILOT, "paths", 5.0),
+        Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 26.0),
+        Part("the messages", module, ("messages", law), _ONBOARD, "messages", 8.0),
+        Part("the paths", module, ("paths", law), _AUTOPILOT, "paths", 3.0),
     )
 
 

@@ -1,4 +1,4 @@
-"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|paths LAW."""
+"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|messages|paths LAW."""
 
 from __future__ import annotations
 
@@ -12,14 +12,20 @@ def main(part: str, law: str) -> None:
     name_what_is_compiled()
     # only now: the import itself compiles the first ones
     from autopilot.core.warmup import PARTS
-    from autopilot.onboard.onboard import build_setup
+    from autopilot.onboard.onboard import Onboard, build_setup
+    from autopilot.onboard.snapshot import Options
+    from autopilot.services.identity import identity_of
     from autopilot.vehicle.file import load_vehicle
     from autopilot.vehicle.parameters import LAWS, autopilot_parameters
+    from autopilot.wire.convert import Home
 
     table = autopilot_parameters(load_vehicle("bebop"))
     table.set("CTL_LAW", LAWS.index(law))
     table.freeze()
-    PARTS[part](build_setup(table, 1))
+    if part == "messages":
+        Onboard(table, identity_of(table), Options(Home(), 0), None).rehearse_messages()
+    else:
+        PARTS[part](build_setup(table, 1))
 
 
 if __name__ == "__main__":

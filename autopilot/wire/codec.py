@@ -189,6 +189,16 @@ def announced_length(data: bytes, start: int) -> int:
     return _HEADER_V2 + data[start + 1] + _CRC + (_SIGNATURE if data[start + 2] & _SIGNED else 0)
 
 
+def split(frames: bytes) -> list[bytes]:
+    """The frames that stand one behind the other, as we have written them."""
+    found, start = [], 0
+    while start < len(frames):
+        end = start + announced_length(frames, start)
+        found.append(frames[start:end])
+        start = end
+    return found
+
+
 def whole_frames(stream: bytes) -> int:
     """How much of a byte stream can be decoded; what is behind may be the begin of a frame."""
     start = 0

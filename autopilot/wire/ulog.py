@@ -31,6 +31,7 @@ _CODES = {
     "char": "c",
 }
 _LONGEST_TEXT = 1000
+RECORD_HEAD = 5  # bytes before the time of a record
 
 
 class Topic(NamedTuple):
@@ -55,6 +56,18 @@ class Topic(NamedTuple):
             kind, bracket, count = field.split(" ")[0].partition("[")
             code += f"{int(count.rstrip(']')) if bracket else ''}{_CODES[kind]}"
         return struct.Struct(code)
+
+    @property
+    def numbers(self) -> tuple[tuple[int, bool, int], ...]:
+        """(bytes, is it a float, first byte in the record) of each number behind the time."""
+        found, at = [], _TIME.size
+        for field in self.fields:
+            kind, bracket, count = field.split(" ")[0].partition("[")
+            size = struct.calcsize("<" + _CODES[kind])
+            for _ in range(int(count.rstrip("]")) if bracket else 1):
+                found.append((size, _CODES[kind] in "fd", at))
+                at += size
+        return tuple(found)
 
 
 class UlogWriter:

@@ -21,14 +21,15 @@ _CHECK = Part(
     (),
     ROOT / "gcs" / "workflows" / "check_mission.py",
     "check",
-    4.0,
+    3.0,
 )
+_REPORT = Part("the report", "gcs.report.warm", (), ROOT / "gcs" / "report" / "style.py", "report", 3.0)
 
 
 def parts_left(laws: Sequence[str]) -> list[Part]:
     """What is not compiled yet of what flights with these laws need, the longest first."""
     parts = {part.mark: part for law in laws for part in autopilot_parts(law)}
-    left = [part for part in (*parts.values(), SIMULATOR, _CHECK) if not part.ready]
+    left = [part for part in (*parts.values(), SIMULATOR, _CHECK, _REPORT) if not part.ready]
     return sorted(left, key=lambda part: -part.cost_s)
 
 

@@ -28,7 +28,7 @@ def nothing_compiled(tmp_path, monkeypatch):
 
 def test_a_flight_needs_its_law_alone_and_the_longest_part_comes_first():
     marks = [part.mark for part in parts_left(["lqr"])]
-    assert set(marks) == {"tick-lqr", "paths", "world", "check"}
+    assert set(marks) == {"tick-lqr", "messages", "paths", "world", "check", "report"}
     assert marks[0] == "tick-lqr"
     both = [part.mark for part in parts_left(["lqr", "thesis"])]
     assert sorted(both) == sorted({*marks, "tick-thesis"})

@@ -20,13 +20,14 @@ PROGRAM = """
 import sys
 from numba.core import event
 from numba.core.errors import TypingError
+from autopilot.geometry.compiler import Kernel
 
 
 class Names(event.Listener):
     def on_start(self, event):
-        function = event.data["dispatcher"].py_func
-        if str(function.__module__).startswith("autopilot"):
-            print(function.__name__, event.data["args"], flush=True)
+        dispatcher = event.data["dispatcher"]
+        if isinstance(dispatcher, Kernel):  # not what is inside of one
+            print(dispatcher.py_func.__name__, event.data["args"], flush=True)
 
     def on_end(self, event):
         pass

@@ -10,10 +10,15 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from autopilot.onboard.flight_log import FAST, MOST_WAITING, SLOW, TAIL_US, FlightLog, LogChunk
+from autopilot.estimation.records import ImuReading
+from autopilot.geometry.frames import frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
+from autopilot.geometry.packed import pack, packed, unpack, width
+from autopilot.onboard.flight_log import MOST_WAITING, TAIL_US, FlightLog, LogChunk
+from autopilot.onboard.log_topics import FAST, SLOW
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
 from autopilot.services.identity import Identity
+from autopilot.services.instant import Instant
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
@@ -128,7 +133,7 @@ def test_no_log_where_none_is_wanted() -> None:
 
 
 def make_log() -> FlightLog:
-    return FlightLog(autopilot_parameters(load_vehicle("bebop")), "0.1.0", BOOT_US)
+    return FlightLog(autopilot_parameters(load_vehicle("bebop")), "0.1.0", BOOT_US, Home())
 
 
 def no_sample() -> Any:
@@ -138,7 +143,7 @@ def no_sample() -> Any:
 def test_a_second_flight_gets_a_name_of_its_own() -> None:
     log = make_log()
     with pytest.raises(AssertionError):  # due at once
-        log.step(0, True, 50.0, lambda: {"2026-01-01_00-00-00.ulg", "2026-01-01_00-00-00_001.ulg"}, no_sample)
+        log.step(0, True, lambda: {"2026-01-01_00-00-00.ulg", "2026-01-01_00-00-00_001.ulg"}, no_sample)
     assert log.path == ("log", "2026-01-01_00-00-00_002.ulg")
 
 
@@ -146,15 +151,15 @@ def test_texts_before_arming_begin_the_log_and_a_changed_parameter_is_in_it(
     tmp_path: Path, flown: Flown
 ) -> None:
     table = autopilot_parameters(load_vehicle("bebop"))
-    log = FlightLog(table, "0.1.0", BOOT_US)
+    log = FlightLog(table, "0.1.0", BOOT_US, Home())
     sample = flown.onboard.log_sample
     log.say(10, 4, "not ready")
-    log.step(1000, True, 50.0, set, sample)
+    log.step(1000, True, set, sample)
     table.set("NGC_KX", 7.0)
-    log.step(5000, True, 50.0, set, no_sample)
-    log.step(20_000, True, 50.0, set, sample)
-    log.step(30_000, False, 50.0, set, no_sample)
-    log.step(30_000 + TAIL_US, False, 50.0, set, no_sample)
+    log.step(5000, True, set, no_sample)
+    log.step(20_000, True, set, sample)
+    log.step(30_000, False, set, no_sample)
+    log.step(30_000 + TAIL_US, False, set, no_sample)
     chunk = log.take()
     assert chunk is not None
     assert chunk.ended
@@ -173,7 +178,7 @@ def test_records_that_nobody_takes_are_dropped_and_the_gap_is_told(tmp_path: Pat
     now_us = 0
     first: LogChunk | None = None
     while now_us < 200_000_000:
-        log.step(now_us, True, 50.0, set, lambda: sample)
+        log.step(now_us, True, set, lambda: sample)
         now_us += 20_000
         if now_us == 199_000_000:
             first = log.take()
@@ -191,9 +196,91 @@ def test_records_that_nobody_takes_are_dropped_and_the_gap_is_told(tmp_path: Pat
     assert gap_ms == pytest.approx(np.diff(stamps).max() / 1000, abs=20)  # one period
 
 
-def test_a_diverged_flight_is_still_logged(flown: Flown) -> None:
+def test_a_diverged_flight_is_still_logged(flown: Flown, tmp_path: Path) -> None:
     sample = flown.onboard.log_sample()
-    sample.snapshot.x_load, sample.snapshot.seq = (1e300, -1e300, 0.0), 70_000
+    instant = unpack(Instant, sample.instant, 0)
+    pack(instant._replace(x_load=(1e300, -1e300, 0.0), seq=70_000), sample.instant, 0)
     log = make_log()
-    log.step(0, True, 50.0, set, lambda: sample)
-    assert log.take() is not None
+    log.step(0, True, set, lambda: sample)
+    chunk = log.take()
+    assert chunk is not None
+    path = tmp_path / "log.ulg"
+    path.write_bytes(chunk.data)
+    position = ULog(str(path)).get_dataset("load_state").data
+    most = np.finfo(np.float32).max
+    assert (position["position[0]"][0], position["position[1]"][0]) == (-most, most)
+
+
+def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None:
+    """Every number of an instant is one of its own, so that none can stand in another's place."""
+    sample = flown.onboard.log_sample()
+    rng = np.random.default_rng(3)
+    row = np.zeros(width(Instant))
+    row[:] = rng.normal(size=len(row))
+    pack(unpack(Instant, row, 0)._replace(seq=9, phase=5, control_mode=2, saturated=3), row, 0)
+    said, imu = unpack(Instant, row, 0), packed(ImuReading((0.1, 0.2, 0.3), (1.0, 2.0, 3.0)))
+    log = make_log()
+    log.step(7, True, set, lambda: sample._replace(instant=row, imu=imu, imu_is_sane=True))
+    log.step(20_000, True, set, lambda: sample._replace(instant=row, imu=imu, imu_is_sane=False))
+    path = tmp_path / "log.ulg"
+    path.write_bytes(log.take().data)  # type: ignore[union-attr]
+    read = ULog(str(path))
+
+    def logged(topic: str, *names: str) -> tuple[float, ...]:
+        data = read.get_dataset(topic).data
+        return tuple(float(data[name][0]) for name in names)
+
+    def vector(topic: str, name: str, count: int = 3) -> tuple[float, ...]:
+        return logged(topic, *(f"{name}[{i}]" for i in range(count)))
+
+    def float32(numbers: Any) -> tuple[float, ...]:
+        return tuple(float(np.float32(number)) for number in numbers)
+
+    assert logged("vehicle_local_position", "x", "y", "z") == float32(ned_from_enu(said.x_quad))
+    assert logged("vehicle_local_position", "vx", "vy", "vz") == float32(ned_from_enu(said.v_quad))
+    assert logged("vehicle_local_position", "ax", "ay", "az") == float32(ned_from_enu(said.accel_quad))
+    assert logged("vehicle_local_position", "ref_lat", "ref_lon") == Home()[:2]
+    assert logged("vehicle_local_position", "eph", "epv", "xy_valid") == float32(
+        (said.horizontal_std, said.vertical_std, 1.0 if said.estimator_flags else 0.0)
+    )
+    assert vector("vehicle_attitude", "q", 4) == float32(quat_ned_frd_from_enu_flu(said.quat_wxyz))
+    assert vector("vehicle_attitude_setpoint", "q_d", 4) == float32(
+        quat_ned_frd_from_enu_flu(said.quat_c_wxyz)
+    )
+    assert vector("vehicle_angular_velocity", "xyz") == float32(frd_from_flu(said.omega_body))
+    assert vector("sensor_combined", "gyro_rad") == float32((0.1, -0.2, -0.3))
+    assert vector("sensor_combined", "accelerometer_m_s2") == (1.0, -2.0, -3.0)
+    assert len(read.get_dataset("sensor_combined").data["timestamp"]) == 1  # one was not sane
+    most = said.rotor_max if said.rotor_max > 0.0 else 1.0
+    shares = [min(max(force / most, 0.0), 1.0) for force in said.forces]
+    assert vector("actuator_motors", "control", 4) == float32(shares)
+    assert vector("actuator_outputs", "output", 5) == float32(
+        (*(1000.0 + 1000.0 * one for one in shares), 0.0)
+    )
+    for name, field in {
+        "position": said.x_load_d,
+        "velocity": said.v_load_d,
+        "acceleration": said.a_load_d,
+        "position_asked": said.x_load_asked,
+        "velocity_asked": said.v_load_asked,
+        "cable": said.q_cable_c,
+    }.items():
+        assert vector("load_setpoint", name) == float32(ned_from_enu(field))
+    assert logged("load_setpoint", "item", "phase", "control_mode") == (9.0, 5.0, 2.0)
+    assert logged("load_setpoint", "elapsed", "duration") == float32((said.elapsed_s, said.duration_s))
+    for name, field in {
+        "position": said.x_load,
+        "velocity": said.v_load,
+        "cable": said.q_cable,
+        "cable_rate": said.q_cable_dot,
+    }.items():
+        assert vector("load_state", name) == float32(ned_from_enu(field))
+    assert logged("load_state", "distance", "tension") == float32((said.distance, said.tension))
+    for name in ("e_x", "e_v", "e_q", "e_q_dot"):
+        assert vector("cascade_errors", name) == float32(ned_from_enu(getattr(said, name)))
+    assert vector("cascade_errors", "e_omega") == float32(frd_from_flu(said.e_Omega))
+    assert vector("cascade_errors", "moment") == float32(frd_from_flu(said.moment))
+    assert vector("rotor_forces", "force", 4) == float32(said.forces)
+    assert logged("rotor_forces", "force_min", "force_max", "saturated") == float32(
+        (said.rotor_min, said.rotor_max, 3.0)
+    )

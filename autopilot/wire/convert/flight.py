@@ -106,7 +106,8 @@ class LoadSetpoint(NamedTuple):
     asked_velocity: Vec3
 
 
-def load_setpoint_message(
+@register_jitable
+def load_setpoint_values(
     time_us: int,
     phase: int,
     control_mode: int,
@@ -119,9 +120,9 @@ def load_setpoint_message(
     duration: float,
     asked_position: Vec3,
     asked_velocity: Vec3,
-) -> Fields:
-    """LOAD_SETPOINT, see `LoadSetpoint`."""
-    return _LOAD_SETPOINT, (
+) -> tuple[float, ...]:
+    """LOAD_SETPOINT, see `LoadSetpoint`: the numbers in the order of the wire."""
+    return (
         time_us,
         *ned_from_enu(position),
         *ned_from_enu(velocity),
@@ -135,6 +136,11 @@ def load_setpoint_message(
         *ned_from_enu(asked_position),
         *ned_from_enu(asked_velocity),
     )
+
+
+def load_setpoint_message(*record: Any) -> Fields:
+    """LOAD_SETPOINT, see `LoadSetpoint`."""
+    return _LOAD_SETPOINT, load_setpoint_values(*record)
 
 
 def read_load_setpoint(m: Any) -> LoadSetpoint:
@@ -172,7 +178,8 @@ class CascadeErrors(NamedTuple):
     moment: Vec3  # body, N m
 
 
-def cascade_errors_message(
+@register_jitable
+def cascade_errors_values(
     time_us: int,
     control_mode: int,
     e_x: Vec3,
@@ -185,9 +192,9 @@ def cascade_errors_message(
     psi_q: float,
     thrust: float,
     moment: Vec3,
-) -> Fields:
-    """CASCADE_ERRORS, see `CascadeErrors`."""
-    return _CASCADE_ERRORS, (
+) -> tuple[float, ...]:
+    """CASCADE_ERRORS, see `CascadeErrors`: the numbers in the order of the wire."""
+    return (
         time_us,
         *ned_from_enu(e_x),
         *ned_from_enu(e_v),
@@ -201,6 +208,11 @@ def cascade_errors_message(
         *frd_from_flu(moment),
         control_mode,
     )
+
+
+def cascade_errors_message(*record: Any) -> Fields:
+    """CASCADE_ERRORS, see `CascadeErrors`."""
+    return _CASCADE_ERRORS, cascade_errors_values(*record)
 
 
 def read_cascade_errors(m: Any) -> CascadeErrors:

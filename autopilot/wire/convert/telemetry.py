@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from numba.extending import register_jitable
+
 from autopilot.geometry.frames import (
     enu_from_ned,
     flu_from_frd,
@@ -41,17 +43,24 @@ _WINCH_STATUS = layout_of(mavlink.MAVLink_winch_status_message)
 _POSITION_VELOCITY_ACCELERATION = 0xC00  # POSITION_TARGET_TYPEMASK: yaw and yaw rate are not given
 
 
+@register_jitable
 def boot_ms(now_us: int) -> int:
     """time_boot_ms of a message."""
     return now_us // 1000 & 0xFFFF_FFFF
 
 
+@register_jitable
 def euler_ned_frd(quat_wxyz: Quat) -> Vec3:
     """(roll, pitch, yaw) in rad of MAVLink, from the attitude body FLU to world ENU; yaw 0 is north."""
     w, x, y, z = quat_ned_frd_from_enu_flu(quat_wxyz)
+    sine = 2.0 * (w * y - z * x)
+    if not sine > -1.0:
+        sine = -1.0
+    elif sine > 1.0:
+        sine = 1.0
     return (
         math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x)))),
+        math.asin(sine),
         math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
     )
 
@@ -62,9 +71,15 @@ def heading_cdeg(quat_wxyz: Quat) -> int:
     return 0xFFFF if math.isnan(yaw) else round(math.degrees(yaw) * 100.0) % 36000
 
 
+@register_jitable
+def attitude_values(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> tuple[float, ...]:
+    """ATTITUDE: the numbers in the order of the wire."""
+    return (boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body))
+
+
 def attitude_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
     """ATTITUDE."""
-    return _ATTITUDE, (boot_ms(now_us), *euler_ned_frd(quat_wxyz), *frd_from_flu(omega_body))
+    return _ATTITUDE, attitude_values(now_us, quat_wxyz, omega_body)
 
 
 class AttitudeQuaternion(NamedTuple):
@@ -75,14 +90,20 @@ class AttitudeQuaternion(NamedTuple):
     omega_body: Vec3
 
 
-def attitude_quaternion_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
-    """ATTITUDE_QUATERNION."""
-    return _ATTITUDE_QUATERNION, (
+@register_jitable
+def attitude_quaternion_values(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> tuple[float, ...]:
+    """ATTITUDE_QUATERNION: the numbers in the order of the wire."""
+    return (
         boot_ms(now_us),
         *quat_ned_frd_from_enu_flu(quat_wxyz),
         *frd_from_flu(omega_body),
         *_NO_OFFSET,
     )
+
+
+def attitude_quaternion_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3) -> Fields:
+    """ATTITUDE_QUATERNION."""
+    return _ATTITUDE_QUATERNION, attitude_quaternion_values(now_us, quat_wxyz, omega_body)
 
 
 def read_attitude_quaternion(m: Any) -> AttitudeQuaternion:
@@ -102,9 +123,15 @@ class LocalPosition(NamedTuple):
     velocity: Vec3
 
 
+@register_jitable
+def local_position_ned_values(now_us: int, position: Vec3, velocity: Vec3) -> tuple[float, ...]:
+    """LOCAL_POSITION_NED: the numbers in the order of the wire."""
+    return (boot_ms(now_us), *ned_from_enu(position), *ned_from_enu(velocity))
+
+
 def local_position_ned_message(now_us: int, position: Vec3, velocity: Vec3) -> Fields:
     """LOCAL_POSITION_NED."""
-    return _LOCAL_POSITION_NED, (boot_ms(now_us), *ned_from_enu(position), *ned_from_enu(velocity))
+    return _LOCAL_POSITION_NED, local_position_ned_values(now_us, position, velocity)
 
 
 def read_local_position_ned(m: Any) -> LocalPosition:

@@ -1,0 +1,153 @@
+"""An instant of the flight, put together from the rows of the flight core."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Any, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.core.tick import Pilot, Seen
+from autopilot.estimation.records import Array, EstimatorState
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import norm, sub
+from autopilot.geometry.packed import Row, width
+from autopilot.geometry.so3 import quat_from_rotation
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION
+from autopilot.services.instant import Instant
+from autopilot.wire.dialect import plumbline as mavlink
+
+NO_LEG = -1  # in place of a leg's control mode
+_ESTIMATING = (
+    mavlink.ESTIMATOR_ATTITUDE
+    | mavlink.ESTIMATOR_VELOCITY_HORIZ
+    | mavlink.ESTIMATOR_VELOCITY_VERT
+    | mavlink.ESTIMATOR_POS_HORIZ_REL
+    | mavlink.ESTIMATOR_POS_HORIZ_ABS
+    | mavlink.ESTIMATOR_POS_VERT_ABS
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL
+    | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+)
+
+
+def _place(record: Any, path: str) -> int:
+    """Where in a packed record the numbers of a field begin, a.b for the field b of the field a."""
+    first, kind = 0, record
+    for name in path.split("."):
+        hints = get_type_hints(kind)
+        first += sum(width(hints[one]) for one in kind._fields[: kind._fields.index(name)])
+        kind = hints[name]
+    return first
+
+
+def _copies(record: Any, paths: dict[str, str]) -> NDArray[np.int64]:
+    """(n, 2) where in an `Instant`, and whence in a record, the numbers of these fields are copied."""
+    hints = get_type_hints(Instant)
+    return np.array(
+        [
+            (_place(Instant, name) + i, _place(record, path) + i)
+            for name, path in paths.items()
+            for i in range(width(hints[name]))
+        ]
+    )
+
+
+_OF_SEEN = _copies(
+    Seen,
+    {name: f"state.{name}" for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad")}
+    | {"omega_body": "state.omega_body", "taut": "taut"},
+)
+_OF_ESTIMATOR = _copies(
+    EstimatorState,
+    {
+        "quat_wxyz": "vehicle.quat_wxyz",
+        "accel_quad": "vehicle.accel_quad",
+        "horizontal_std": "doubt.horizontal",
+        "vertical_std": "doubt.vertical",
+        "tension": "load.tension",
+    },
+)
+_OF_PILOT = _copies(
+    Pilot,
+    {
+        name: f"command.{name}"
+        for name in ("e_x", "e_v", "e_q", "e_q_dot", "e_R", "e_Omega", "psi_R", "psi_q", "thrust", "moment")
+    }
+    | {
+        "q_cable_c": "command.q_c",
+        "control_mode": "control_mode",
+        "slack_events": "slack_events",
+        "saturated": "mixed.saturated",
+        "forces": "mixed.forces",
+    },
+)
+_VEHICLE_COMPLAINT, _LOAD_COMPLAINT = _place(Seen, "vehicle_complaint"), _place(Seen, "load_complaint")
+_R_C = _place(Pilot, "command.R_c")
+_NOW_US, _PHASE, _SEQ = (_place(Instant, name) for name in ("now_us", "phase", "seq"))
+_FLAGS, _DISTANCE = _place(Instant, "estimator_flags"), _place(Instant, "distance")
+_ELAPSED, _DURATION = _place(Instant, "elapsed_s"), _place(Instant, "duration_s")
+_X_LOAD, _X_QUAD, _X_QUAD_D = (_place(Instant, name) for name in ("x_load", "x_quad", "x_quad_d"))
+_X_LOAD_D, _V_LOAD_D, _A_LOAD_D = (_place(Instant, name) for name in ("x_load_d", "v_load_d", "a_load_d"))
+_X_ASKED, _V_ASKED = _place(Instant, "x_load_asked"), _place(Instant, "v_load_asked")
+_QUAT_C, _E_X, _E_V = (_place(Instant, name) for name in ("quat_c_wxyz", "e_x", "e_v"))
+_LEAST, _MOST = _place(Instant, "rotor_min"), _place(Instant, "rotor_max")
+
+
+@kernel
+def put_instant(
+    seen: Row,
+    estimator: Row,
+    pilot: Row,
+    targets: Array,
+    asked: Array,
+    at: int,
+    control_mode: int,
+    elapsed_s: float,
+    duration_s: float,
+    now_us: int,
+    phase: int,
+    seq: int,
+    carrying: bool,
+    carries: bool,
+    rotor_min: float,
+    rotor_max: float,
+    instant: Row,
+) -> None:
+    """Write an `Instant` into its row.
+
+    `seen`, `estimator` and `pilot` are those of `CoreRows`. The leg in force has this control mode (NO_LEG:
+    there is none); `targets[at]` is its setpoint, as `layout.jets` gives it, and `asked[at]` what the
+    mission asks for. `carrying`: in a phase in which the load is tracked; `carries`: the load must be known.
+    """
+    for i in range(_OF_SEEN.shape[0]):
+        instant[_OF_SEEN[i, 0]] = seen[_OF_SEEN[i, 1]]
+    for i in range(_OF_ESTIMATOR.shape[0]):
+        instant[_OF_ESTIMATOR[i, 0]] = estimator[_OF_ESTIMATOR[i, 1]]
+    for i in range(_OF_PILOT.shape[0]):
+        instant[_OF_PILOT[i, 0]] = pilot[_OF_PILOT[i, 1]]
+    instant[_NOW_US], instant[_PHASE], instant[_SEQ] = now_us, phase, seq
+    instant[_ELAPSED], instant[_DURATION] = elapsed_s, duration_s
+    instant[_LEAST], instant[_MOST] = rotor_min, rotor_max
+    vague = seen[_VEHICLE_COMPLAINT] != 0.0 or (carries and seen[_LOAD_COMPLAINT] != 0.0)
+    instant[_FLAGS] = 0 if vague else _ESTIMATING
+    x_load = (instant[_X_LOAD], instant[_X_LOAD + 1], instant[_X_LOAD + 2])
+    x_quad = (instant[_X_QUAD], instant[_X_QUAD + 1], instant[_X_QUAD + 2])
+    instant[_DISTANCE] = norm(sub(x_load, x_quad))
+    for j in range(3):
+        instant[_X_LOAD_D + j] = instant[_X_ASKED + j] = x_load[j]
+        instant[_V_LOAD_D + j] = instant[_A_LOAD_D + j] = instant[_V_ASKED + j] = 0.0
+        instant[_X_QUAD_D + j] = nan
+        if control_mode == LOAD_POSITION:
+            instant[_X_LOAD_D + j] = targets[at, j]
+            instant[_V_LOAD_D + j] = targets[at, 3 + j]
+            instant[_A_LOAD_D + j] = targets[at, 6 + j]
+            instant[_X_ASKED + j], instant[_V_ASKED + j] = asked[at, j], asked[at, 3 + j]
+        elif control_mode == QUAD_POSITION:
+            instant[_X_QUAD_D + j] = targets[at, j]
+        if not carrying:
+            instant[_E_X + j] = instant[_E_V + j] = 0.0
+    r = pilot[_R_C : _R_C + 9]
+    q = quat_from_rotation(((r[0], r[1], r[2]), (r[3], r[4], r[5]), (r[6], r[7], r[8])))
+    for i in range(4):
+        instant[_QUAT_C + i] = q[i]

@@ -1,0 +1,159 @@
+"""The records of the fast topics of the flight log, in machine code, from an instant's row of numbers.
+
+`put_sample` copies numbers by a table that follows from the columns of `log_topics`, into records whose
+heads and constants are there already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite, isinf
+from typing import Any, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.geometry.entry import entry_of
+from autopilot.geometry.frames import quat_ned_frd_from_enu_flu
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.packed import Row, packed, width
+from autopilot.onboard.log_topics import FAST, Column, Derived, Sample
+from autopilot.services.instant import Instant
+from autopilot.wire.compiled import Bytes
+from autopilot.wire.convert import Home
+from autopilot.wire.ulog import RECORD_HEAD, UlogWriter
+
+_STOP, _FULL = 1000.0, 2000.0  # actuator_outputs, us
+_FLOAT32_MAX = 3.4028234663852886e38
+_SENSED = next(i for i, (topic, _) in enumerate(FAST) if topic.name == "sensor_combined")
+_FLOAT, _DOUBLE = -4, -8  # kinds of numbers; integers: their bytes
+
+
+def _place(record: Any, name: str) -> int:
+    hints = get_type_hints(record)
+    return sum(width(hints[one]) for one in record._fields[: record._fields.index(name)])
+
+
+# the row that is copied from: an `Instant`, a `Derived`, the time
+_DERIVED = width(Instant)
+_TIME = _DERIVED + width(Derived)
+_FORCES, _MOST = _place(Instant, "forces"), _place(Instant, "rotor_max")
+_QUAT, _QUAT_C = _place(Instant, "quat_wxyz"), _place(Instant, "quat_c_wxyz")
+_FLAGS = _place(Instant, "estimator_flags")
+_HOME, _IMU = _DERIVED + _place(Derived, "latitude_deg"), _DERIVED + _place(Derived, "gyro")
+_VALID = _DERIVED + _place(Derived, "valid")
+_QUAT_NED, _QUAT_C_NED = _DERIVED + _place(Derived, "quat_ned"), _DERIVED + _place(Derived, "quat_c_ned")
+_SHARES, _PULSES = _DERIVED + _place(Derived, "shares"), _DERIVED + _place(Derived, "pulses")
+
+
+@kernel
+def put_sample(
+    instant: Row,
+    imu: Row,
+    home: Row,
+    now_us: int,
+    row: Row,
+    copies: NDArray[np.int64],
+    wide: Bytes,
+    records: Bytes,
+) -> None:
+    """Write the numbers of an instant into its records. `imu` and `home`: packed `ImuReading` and `Home`.
+
+    `copies` has a line for each number: where it is in `row`, 1 or -1 by which it is multiplied, its kind,
+    its first byte. `row` and `wide`, eight bytes, are scratch. A float beyond float32 becomes the greatest.
+    """
+    for i in range(_DERIVED):
+        row[i] = instant[i]
+    for i in range(3):
+        row[_HOME + i] = home[i]
+    for i in range(6):
+        row[_IMU + i] = imu[i]
+    row[_VALID] = 1.0 if instant[_FLAGS] != 0.0 else 0.0
+    row[_TIME] = now_us
+    q = instant[_QUAT : _QUAT + 4]
+    c = instant[_QUAT_C : _QUAT_C + 4]
+    q_ned = quat_ned_frd_from_enu_flu((q[0], q[1], q[2], q[3]))
+    c_ned = quat_ned_frd_from_enu_flu((c[0], c[1], c[2], c[3]))
+    most = instant[_MOST]
+    if not (isfinite(most) and most > 0.0):
+        most = 1.0
+    for i in range(4):
+        row[_QUAT_NED + i], row[_QUAT_C_NED + i] = q_ned[i], c_ned[i]
+        share = instant[_FORCES + i] / most
+        if share < 0.0:
+            share = 0.0
+        elif share > 1.0:
+            share = 1.0
+        row[_SHARES + i], row[_PULSES + i] = share, _STOP + (_FULL - _STOP) * share
+    doubles, floats, integers = wide.view(np.float64), wide.view(np.float32), wide.view(np.int64)
+    for k in range(copies.shape[0]):
+        number = row[copies[k, 0]]
+        if copies[k, 1] < 0:
+            number = -number
+        size = copies[k, 2]
+        if size == _FLOAT:
+            floats[0] = number
+            if isinf(floats[0]) and not isinf(number):
+                floats[0] = _FLOAT32_MAX if number > 0.0 else -_FLOAT32_MAX
+            size = 4
+        elif size == _DOUBLE:
+            doubles[0] = number
+            size = 8
+        else:
+            integers[0] = int(number)
+        for i in range(size):
+            records[copies[k, 3] + i] = wide[i]
+
+
+def _sources(column: Column) -> list[tuple[int, int]]:
+    """(place in the row, sign) of each number of a column."""
+    record, first = (Instant, 0) if column.name in Instant._fields else (Derived, _DERIVED)
+    first += _place(record, column.name)
+    places = range(1, 1 + width(get_type_hints(record)[column.name]))
+    # what the axes do to three numbers shows which goes where, and with which sign
+    turned = column.axes(tuple(map(float, places))) if column.axes else places
+    return [(first + abs(int(one)) - 1, 1 if one > 0 else -1) for one in turned] * column.times
+
+
+class SampleRecords:
+    """Makes the records of the fast topics."""
+
+    def __init__(self, writer: UlogWriter, home: Home) -> None:
+        copies: list[tuple[int, int, int, int]] = []
+        records: list[bytes] = []
+        self._home = packed(home)
+        at = 0
+        for number, (topic, columns) in enumerate(FAST):
+            constants: list[float] = []
+            kinds = topic.numbers
+            copies.append((_TIME, 1, 8, at + RECORD_HEAD))
+            for column in columns:
+                if not isinstance(column, Column):
+                    constants += column
+                    continue
+                for place, sign in _sources(column):
+                    size, is_float, first = kinds[len(constants)]
+                    kind = -size if is_float else size
+                    copies.append((place, sign, kind, at + RECORD_HEAD + first))
+                    constants.append(0)
+            records.append(writer.record(number, 0, *constants))
+            if number == _SENSED:
+                self._sensed = (at, at + len(records[-1]))
+            at += len(records[-1])
+        self._copies = np.array(copies)
+        self._records = np.frombuffer(b"".join(records), np.uint8).copy()
+        self._row = np.zeros(_TIME + 1)
+        self._wide = np.zeros(8, np.uint8)
+        self._put: Callable[..., None] | None = None  # machine code, once it was asked for
+
+    def of(self, sample: Sample, now_us: int) -> bytes:
+        """The records of an instant, one behind the other; that of the inertial sample only if it is sane."""
+        arguments = (sample.instant, sample.imu, self._home, now_us, self._row, self._copies)
+        if self._put is None:
+            self._put = entry_of(put_sample, *arguments, self._wide, self._records)
+        self._put(*arguments, self._wide, self._records)
+        data = self._records.tobytes()
+        if sample.imu_is_sane:
+            return data
+        begin, end = self._sensed
+        return data[:begin] + data[end:]

@@ -1,0 +1,31 @@
+"""Every kernel of telemetry and flight log called once, so that none has to be compiled in the air."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from autopilot.core.flight_core import FlightCore, Setup
+from autopilot.core.health import Condition
+from autopilot.estimation.records import ImuReading
+from autopilot.geometry.linear import ZERO
+from autopilot.geometry.packed import packed, width
+from autopilot.onboard.log_records import SampleRecords
+from autopilot.onboard.log_topics import FAST, Sample
+from autopilot.onboard.snapshot import Moment, Moments, Options
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.stream_frames import BITS, StreamFrames
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.convert import HilGps, Home
+from autopilot.wire.parameter_table import ParameterTable
+from autopilot.wire.ulog import UlogWriter
+
+
+def rehearse_telemetry(setup: Setup, parameters: ParameterTable) -> None:
+    """Put an instant together, send and log it."""
+    core, options = FlightCore(setup), Options(Home(), 0)
+    moments = Moments(core, options, parameters, packed(Condition()), np.zeros(width(HilGps)))
+    moment = Moment(moments, StoredMission(), 0)
+    StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2)).frames(sum(BITS.values()), moment.instant)
+    imu = packed(ImuReading(ZERO, ZERO))
+    sample = Sample(moment, moment.instant, imu, True, lambda: moment.estimator)
+    SampleRecords(UlogWriter(topic for topic, _ in FAST), Home()).of(sample, 0)

@@ -1,0 +1,311 @@
+"""How fast Plumbline is here and now, each figure beside a floor or a neighbour measured in the same run.
+
+    python benchmarks/performance.py [--flights 200] [--real-time 60] [--linear] [--docs docs/performance.md]
+
+Seconds are the machine's, and the machine's neighbours'; ratios are what can be compared. What is repeated is
+flown in turn, and the median counts. With --docs the tables are written into the page, between its markers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import os
+import platform
+import re
+import resource
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+from gcs.closed_loop import Conditions
+from gcs.closed_loop import fly as fly_with_wire
+from gcs.sweep.flight import boarding, fly
+from missions.fileformat import load_mission
+from missions.model import Land, Mission, Takeoff, Waypoint
+
+MISSION = "case-b"
+TICKS_PER_S = 250  # as the simulator has them by default
+SENSORS_BYTES, ANSWER_BYTES = 330, 52  # of a tick with the sensors of the lab, and of its answer
+REAL_TIME_HZ = 500
+BEGIN, END = "<!-- measured -->", "<!-- end -->"
+
+
+class NoLog:
+    """Takes frames and forgets them."""
+
+    def write(self, unix_us: int, *frames: bytes) -> None:
+        """Nothing."""
+
+
+# ---- the wire
+
+
+def over_udp(folder: Path) -> tuple[dict[str, float], float, float]:
+    """The record of `gcs fly` in lockstep, the seconds until the vehicle is heard, and those in all."""
+    out = folder / f"flight-{time.monotonic_ns()}"
+    command = [sys.executable, "-m", "gcs", "fly", MISSION, "--sensors", "lab", "--out", str(out)]
+    began = time.perf_counter()
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    assert child.stderr is not None
+    heard = next((time.perf_counter() - began for line in child.stderr if "telemetry" in line), float("nan"))
+    child.communicate()
+    whole = time.perf_counter() - began
+    if child.returncode != 0:
+        raise SystemExit(f"gcs fly failed: exit code {child.returncode}")
+    return json.loads((out / "summary.json").read_text(encoding="utf-8")), heard, whole
+
+
+def _echo(port: int, core: int) -> None:
+    """The other end: answers until an empty datagram comes."""
+    os.sched_setaffinity(0, {core})
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
+        end.connect(("127.0.0.1", port))
+        end.send(b"")
+        answer = bytes(ANSWER_BYTES)
+        while end.recv(65535):
+            end.send(answer)
+
+
+def ping_pong(exchanges: int) -> float:
+    """Wall seconds of so many exchanges between two Python processes, blocking, on one core."""
+    cores = os.sched_getaffinity(0)
+    core = max(cores)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as end:
+        end.bind(("127.0.0.1", 0))
+        other = multiprocessing.Process(target=_echo, args=(end.getsockname()[1], core))
+        other.start()
+        _, peer = end.recvfrom(65535)
+        end.connect(peer)
+        os.sched_setaffinity(0, {core})
+        sensors = bytes(SENSORS_BYTES)
+        began = time.perf_counter()
+        for _ in range(exchanges):
+            end.send(sensors)
+            end.recv(65535)
+        wall_s = time.perf_counter() - began
+        os.sched_setaffinity(0, cores)
+        end.send(b"")
+        other.join()
+    return wall_s
+
+
+# ---- without the wire
+
+
+def processor_s(run: Callable[[], object]) -> float:
+    """Processor seconds of a call: other work on the machine counts little."""
+    began = time.process_time()
+    run()
+    return time.process_time() - began
+
+
+def sweep_s(flights: int) -> float:
+    """Wall seconds of a sweep of so many flights on all cores, as `gcs sweep` says them."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "gcs", "sweep", MISSION, "--seeds", str(flights)]
+        done = subprocess.run(
+            [*command, "--out", str(Path(folder) / "sweep"), "--quiet", "--json"],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    return float(json.loads(done.stdout)["wall_s"])
+
+
+def holding(seconds: float) -> Mission:
+    """Take off and hold."""
+    return Mission("hold", "Hold", "", (), (Takeoff(1.0), Waypoint(0.0, 0.0, 1.0, hold_s=seconds), Land()))
+
+
+# ---- real time
+
+
+def real_time(seconds: float, folder: Path) -> str:
+    """What `sitl` says of its timeliness after so many seconds at REAL_TIME_HZ."""
+    port, truth = "127.0.0.1:14571", "127.0.0.1:14572"
+    simulator = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "sitl",
+            "--listen",
+            port,
+            "--truth",
+            truth,
+            "--set",
+            f"SIM_RATE_HZ={REAL_TIME_HZ}",
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    autopilot = subprocess.Popen(
+        [sys.executable, "-m", "autopilot", "--sim", port, "--storage", str(folder / "card"), "--quiet"],
+    )
+    time.sleep(seconds)
+    simulator.send_signal(signal.SIGINT)
+    said, _ = simulator.communicate()
+    autopilot.send_signal(signal.SIGINT)
+    autopilot.wait()
+    return said.strip().splitlines()[-1].removeprefix("sitl: ")
+
+
+# ---- the tables
+
+Rows = list[tuple[str, ...]]
+
+
+def lockstep_rows(repeat: int, folder: Path) -> Rows:
+    """Through three processes, in one, and what UDP allows."""
+    mission, conditions = load_mission(MISSION), Conditions()
+    over_udp(folder)  # loads everything once
+    flown, heard, whole, floor, one = [], [], [], [], []
+    for _ in range(repeat):
+        record, heard_s, whole_s = over_udp(folder)
+        wall_s = record["recorded_s"] / record["real_time_factor"]
+        flown.append(record["real_time_factor"])
+        heard.append(heard_s)
+        whole.append(whole_s)
+        floor.append(ping_pong(round(record["recorded_s"] * TICKS_PER_S)) / wall_s)
+        began = time.perf_counter()
+        fly_with_wire(mission, conditions, NoLog())
+        one.append(record["recorded_s"] / (time.perf_counter() - began))
+    median = statistics.median
+    return [
+        (
+            "three processes over UDP in lockstep",
+            f"{median(flown):.0f} x real time",
+            f"{median(floor):.0%} of a ping-pong of UDP datagrams, as many and as large",
+        ),
+        (
+            "the same cores in one process",
+            f"{median(one):.0f} x real time",
+            f"{median(one) / median(flown):.1f} x three processes",
+        ),
+        ("`gcs fly`, from the command to the vehicle's first word", f"{median(heard):.1f} s", ""),
+        ("`gcs fly`, from the command to the prompt, with its report", f"{median(whole):.1f} s", ""),
+    ]
+
+
+def sweep_rows(repeat: int, flights: int) -> Rows:
+    """One flight without the wire, and many on all cores."""
+    mission = load_mission(MISSION)
+    rows: Rows = []
+    for sensors in ("lab", "ideal"):
+        board = boarding(mission, Conditions(sensors=sensors))
+        flown = fly(mission, Conditions(sensors=sensors), board)
+        timed = [
+            processor_s(partial(fly, mission, Conditions(sensors=sensors, seed=2 + k), board))
+            for k in range(max(repeat, 5))
+        ]
+        speed = flown.flight_s / statistics.median(timed)
+        rows.append(
+            (
+                f"one flight without the wire, {sensors}",
+                f"{speed:.0f} x real time",
+                f"{1e6 * statistics.median(timed) / (flown.flight_s * TICKS_PER_S):.1f} us a tick",
+            )
+        )
+    wall_s = sweep_s(flights)
+    cores = len(os.sched_getaffinity(0))
+    rows.append(
+        (
+            f"a sweep of {flights} flights on {cores} cores",
+            f"{flights / wall_s:.1f} flights/s",
+            f"10,000 flights in {1e4 * wall_s / flights:.0f} s",
+        )
+    )
+    return rows
+
+
+def light_rows(repeat: int) -> Rows:
+    """Processor time of commands that only say something; `gcs status` listens for a vehicle, in vain."""
+    rows: Rows = []
+    for words in (["--help"], ["status", "--connect", "14573"]):
+        timed = []
+        for _ in range(max(repeat, 5)):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            with suppress(subprocess.TimeoutExpired):
+                subprocess.run(
+                    [sys.executable, "-m", "gcs", *words], capture_output=True, timeout=1.0, check=False
+                )
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            timed.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        rows.append((f"`gcs {words[0]}`", f"{statistics.median(timed):.2f} s", "processor time"))
+    return rows
+
+
+def linear_rows() -> Rows:
+    """Microseconds a tick over three decades of flights and of ticks, and over the rates there are."""
+    rows: Rows = []
+    mission, conditions = load_mission(MISSION), Conditions()
+    board = boarding(mission, conditions)
+
+    def flown(flights: Iterable[tuple[Mission, Conditions]], ticks_per_s: float) -> str:
+        began = time.process_time()
+        flight_s = sum(fly(one, under, board).flight_s for one, under in flights)
+        return f"{1e6 * (time.process_time() - began) / (flight_s * ticks_per_s):.2f}"
+
+    for count in (1, 10, 100, 1000):
+        cost = flown(((mission, Conditions(seed=k)) for k in range(count)), TICKS_PER_S)
+        rows.append((f"{count} flights of {MISSION}", cost))
+    for seconds in (10.0, 100.0, 1000.0, 10_000.0):
+        cost = flown([(holding(seconds), conditions)], TICKS_PER_S)
+        rows.append((f"one flight that holds for {seconds:g} s", cost))
+    for rate in (250, 500, 1000):
+        faster = Conditions(settings={"SIM_RATE_HZ": float(rate)})
+        rows.append((f"{MISSION} at {rate} Hz", flown([(mission, faster)], rate)))
+    return rows
+
+
+def table(head: Sequence[str], rows: Rows) -> str:
+    """Markdown."""
+    lines = ["| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *rows)]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure, print, and write the page if so asked."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--flights", type=int, default=200, help="of the sweep")
+    parser.add_argument(
+        "--real-time", type=float, default=0.0, metavar="S", help="seconds at 500 Hz; 0: none"
+    )
+    parser.add_argument("--linear", action="store_true", help="the table of cost over three decades")
+    parser.add_argument("--docs", type=Path)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rows = lockstep_rows(options.repeat, folder) + sweep_rows(options.repeat, options.flights)
+        rows += light_rows(options.repeat)
+        if options.real_time:
+            rows.append(
+                (
+                    f"real time at {REAL_TIME_HZ} Hz, {options.real_time:g} s",
+                    real_time(options.real_time, folder),
+                    "",
+                )
+            )
+    text = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}.\n\n"
+    text += table(("Case B", "measured", "beside it"), rows) + "\n"
+    if options.linear:
+        text += "\n" + table(("without the wire, sensors of the lab", "us a tick"), linear_rows()) + "\n"
+    print(text)
+    if options.docs:
+        page = options.docs.read_text(encoding="utf-8")
+        made = re.sub(f"{BEGIN}.*{END}", f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
+        options.docs.write_text(made, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
