@@ -31,7 +31,7 @@ fly: $(STAMP) ## fly Case B through three real processes and show the report
 
 test: $(DEV_STAMP) ## run the tests
 	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist worksteal -m 'not processes'
-	$(BIN)/pytest -m processes # these keep to the wall clock, and have the machine to themselves
+	$(BIN)/pytest --numprocesses 2 --dist loadfile -m processes # these keep to the wall clock
 
 lint: $(DEV_STAMP) ## ruff: lint and format
 	$(BIN)/ruff check .

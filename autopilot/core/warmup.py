@@ -10,11 +10,13 @@ from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
 from autopilot.guidance.layout import jets_ahead
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, Run, transfer_leg
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, Pass, Run, transfer_leg
 from autopilot.guidance.setpoint_follower import begin_following
 from autopilot.trajectory.prepare import prepare
 from autopilot.trajectory.rotor_demand import demand
 from autopilot.trajectory.shaping import shape
+from autopilot.trajectory.splines import COLUMNS
+from autopilot.trajectory.waypoint_path import Passage
 from missions.model import Signals, Sine, Term, Waypoint
 
 
@@ -36,6 +38,7 @@ def rehearse_paths(setup: Setup) -> None:
         transfer_leg(load, over, 1.0, 1.0, LOAD_POSITION),
         Creep(over, ZERO, QUAD_POSITION),
         Run(load, shape(wave, setup.settings.limits.body, setup.settings.limits.bounds)),
+        Pass(Passage(np.zeros((1, COLUMNS)), 0.0, 1.0, load), ZERO, 1.0),
         begin_following((load, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), 1.0),
     )
     tangent(E3, ZERO)  # for the supervisor, when a swing is calmed

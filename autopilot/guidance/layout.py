@@ -57,13 +57,13 @@ def _runs(
 def _passes(
     times: Floats, table: PieceTable, begin_s: float, offset: Vec3, fade_s: float, out: Floats
 ) -> None:
-    fading = np.zeros(COLUMNS)
     for k in range(times.shape[0]):
         at = begin_s + times[k]
         _put(out[k], evaluate_path(table, at))
-        _put(fading, transfer(offset, ZERO, fade_s, at))
-        for j in range(COLUMNS):
-            out[k, j] = out[k, j] + fading[j]
+        fading = transfer(offset, ZERO, fade_s, at)
+        for i in range(7):
+            for j in range(3):
+                out[k, 3 * i + j] = out[k, 3 * i + j] + fading[i][j]
 
 
 def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:

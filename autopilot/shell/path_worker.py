@@ -16,7 +16,7 @@ from autopilot.trajectory.prepare import Prepared
 class Aside:
     """Work for which the control loop must not wait, done by a process of its own that is kept ready.
 
-    Until that has loaded, which takes a second or two, a vehicle on the ground does its work itself.
+    Where it was not started, because the clock waits, a vehicle on the ground does its work itself.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class Aside:
             self._hear(self._pipe, onboard)
         if onboard.work is None or self._work is not None:
             return  # what it is at may be of no use any more, but does not take long
-        if not self._loaded and onboard.phase in ON_GROUND:
+        if self._pipe is None and onboard.phase in ON_GROUND:
             onboard.finish(onboard.work, onboard.work.done())
             return
         if self._pipe is None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 PACKAGES = ("autopilot", "gcs", "missions", "sitl")  # of this project; other libraries are not followed
@@ -80,15 +81,27 @@ def _imports(path: Path, module: str) -> Iterator[str]:
     A file that calls `iter_modules` imports what lies beside it.
     """
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    for node in ast.walk(ast.parse(path.read_bytes(), str(path))):
-        if isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] == "iter_modules":
-            yield from (f"{package}.{found.stem}" for found in sorted(path.parent.glob("*.py")))
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = node.module or ""
-            if node.level:
-                above = package.split(".")
-                base = ".".join([*above[: len(above) - node.level + 1], *([base] if base else [])])
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+    names, finds_modules = _imported(path.read_bytes(), package)
+    yield from names
+    if finds_modules:
+        yield from (f"{package}.{found.stem}" for found in sorted(path.parent.glob("*.py")))
+
+
+@cache
+def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
+    """Dotted names that a source in this package imports, and whether it calls `iter_modules`."""
+    names: list[str] = []
+    finds_modules = False
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.Call(func=ast.Name(id="iter_modules") | ast.Attribute(attr="iter_modules")):
+                finds_modules = True
+            case ast.Import():
+                names += [alias.name for alias in node.names]
+            case ast.ImportFrom():
+                base = node.module or ""
+                if node.level:
+                    above = package.split(".")
+                    base = ".".join([*above[: len(above) - node.level + 1], *([base] if base else [])])
+                names += [base, *(f"{base}.{alias.name}" for alias in node.names)]
+    return tuple(names), finds_modules

@@ -192,13 +192,15 @@ class Stage:
     def __init__(self, directory: Path) -> None:
         self.directory = directory
         self.storage = directory / "storage"
-        self.gcs, self.second_gcs, self.api, self.tcp = (str(free_port()) for _ in range(4))
+        self.gcs = self.second_gcs = self.api = self.tcp = ""  # ports
         self.witness: Witness
         self._running: list[subprocess.Popen[Any]] = []
         self._mavproxies: list[Mavproxy] = []
 
     def begin(self, *options: str, speed: float = 1.0) -> None:
         """Start the vehicle with such options, wait until it flies with its simulator."""
+        # a free port may be taken by others until it is used
+        self.gcs, self.second_gcs, self.api, self.tcp = (str(free_port()) for _ in range(4))
         (truth, truth_at), (ground, ground_at) = _bound(), _bound()
         self.witness = Witness(truth, ground)
         threading.Thread(target=self.witness.watch, daemon=True).start()

@@ -385,7 +385,7 @@ import autopilot
 from dataclasses import replace
 from autopilot.control.records import State
 from autopilot.core.flight_core import FlightCore
-from autopilot.core.tick import Seen
+from autopilot.core.tick import Seen, control_tick
 from autopilot.geometry.packed import pack, unpack
 from autopilot.guidance.legs import Hold
 from autopilot.onboard.onboard import build_setup
@@ -412,6 +412,7 @@ asked = []
 for now_us in (4000, 8000, 12000):
     pack(Seen(state, True, 0.0, weight, 0.0, 0, 0), core.rows.seen, 0)
     core.decide(now_us, 4000)
+    control_tick(core.rows, core.law_rows, 0)
     asked.append([core.pilot.command.thrust, sum(core.forces)])
 print(json.dumps({"laws": LAWS, "asked": asked, "phase": core.flight.phase.name, "at": autopilot.__file__}))
 """

@@ -12,6 +12,7 @@ import pytest
 PROGRAM = """
 import sys
 from numba.core.dispatcher import Dispatcher
+from autopilot.guidance.legs import Pass
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as m
 from missions.model import Takeoff, Waypoint
@@ -40,7 +41,8 @@ def stick():
     return m.MAVLink_manual_control_message(1, 500, 0, 500, 0, 0)
 
 
-craft = Craft(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0))
+steps = Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0)
+craft = Craft(*steps)
 craft.onboard.rehearse()
 craft.wait(1.0)
 before = census()
@@ -65,6 +67,9 @@ for message, command in (
             assert craft.command(*command) == ACCEPTED, command
         else:
             craft.tick()
+craft = Craft(*steps)
+craft.begin()
+craft.run(lambda craft: bool(craft.flight.legs) and isinstance(craft.flight.legs[0], Pass))
 left = {name for name, count in census().items() if count != before.get(name, 0)}
 assert not left, left
 """

@@ -74,7 +74,17 @@ def test_what_is_asked_for_later_is_done_when_what_goes_on_is_over(aside: Aside)
     assert [work for work, _ in onboard.finished] == [first, later]
 
 
-def test_on_the_ground_nobody_waits_for_a_process_that_still_loads(aside: Aside) -> None:
+def test_the_loop_goes_on_while_the_process_still_loads(aside: Aside) -> None:
+    onboard = Waiting(Phase.DISARMED)
+    aside.start(onboard.rehearsal)
+    work = onboard.ask(1.0)
+    aside.attend(onboard)  # type: ignore[arg-type]
+    assert onboard.work is work
+    attend(aside, onboard, lambda: onboard.work is None)
+    assert onboard.finished == [(work, work.done())]
+
+
+def test_on_the_ground_no_process_is_started_where_there_was_none(aside: Aside) -> None:
     onboard = Waiting(Phase.DISARMED)
     work = onboard.ask(1.0)
     aside.attend(onboard)  # type: ignore[arg-type]

@@ -271,8 +271,17 @@ def test_a_mission_at_its_landing_is_begun_only_where_the_table_has_a_landing(ph
 def entries(tree: ast.AST) -> list[int]:
     """Lines at which a phase is entered: a record gets one, or a private function of the machine is used."""
     found = []
+    told = {
+        id(inner)  # what a decorator names is read, or said to come of a function
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef)
+        for decorator in function.decorator_list
+        for inner in ast.walk(decorator)
+    }
     for node in ast.walk(tree):
         match node:
+            case ast.Constant() if id(node) in told:
+                continue
             case ast.Call(func=ast.Name(id="Flight"), args=[_, *_]):
                 found.append(node.lineno)
             case ast.Call(keywords=keywords) if any(k.arg in ("phase", None) for k in keywords):

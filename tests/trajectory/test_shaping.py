@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from math import acos, cos, inf, nextafter, pi, radians
 
 import numpy as np
@@ -24,6 +26,17 @@ BOUNDS = Bounds(0.294, 1.666, 0.294, cos(radians(45.0)), 0.02)
 LIMITS = Limits(BODY, BOUNDS, True, 0.05, REFUSE, 1.5, 1.5, False)
 # samples of an optimisation are 10 ms apart, those here 1 ms: in between a bound may be passed by so much
 BETWEEN_N = 0.05
+
+
+HASTY = 1.0, 0.7  # m, s: a step that no vehicle flies
+
+
+@pytest.fixture(scope="module", autouse=True)
+def shaped_once() -> Iterator[None]:
+    """Each path is shaped once, whoever asks for it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("autopilot.trajectory.prepare.shape", cache(shape))
+        yield
 
 
 def signals_of(name: str) -> Signals:
@@ -128,7 +141,7 @@ def test_any_step_is_within_the_bounds_or_said_not_to_be(
 
 
 def test_preparation_slows_refuses_or_flies_as_asked() -> None:
-    hasty = edge(1.0, 0.5)
+    hasty = edge(*HASTY)
     for choice in (AS_ASKED, SLOW_DOWN, REFUSE):
         prepared = prepare((hasty,), (3,), LIMITS._replace(when_infeasible=choice))
         (made,) = prepared.made
@@ -144,12 +157,13 @@ def test_preparation_slows_refuses_or_flies_as_asked() -> None:
 
 
 def test_slowing_down_is_no_slower_than_it_must_be() -> None:
-    hasty = edge(1.0, 0.7)
+    hasty = edge(*HASTY)
     slowed = slow_down(hasty, LIMITS)
     assert slowed is not None
     assert trouble_of(slowed, LIMITS) == ""
     # the search ends within a few percent
-    quicker = edge(1.0, 0.7 * slowed.slowed * 0.93)
+    height, rise = HASTY
+    quicker = edge(height, rise * slowed.slowed * 0.93)
     assert trouble_of(shape(quicker, BODY, BOUNDS), LIMITS) != ""
 
 

@@ -41,6 +41,15 @@ def records(scene):
     return [result(scene.ngc, "flights/a"), result(scene.lqr, "flights/b")]
 
 
+@pytest.fixture(scope="module")
+def drawn(scene, tmp_path_factory):
+    """(directory, figures) of one step, one of whose flights is lost."""
+    directory = tmp_path_factory.mktemp("figures")
+    found = []
+    draw_figures(scene, directory, found.append)
+    return directory, found
+
+
 def test_a_flight_is_cut_where_the_signals_begin_and_the_reference_rests(scene):
     flown = scene.ngc
     assert flown.start_s == pytest.approx(recorded_flights.BEFORE_S, abs=tolerances.TICK_S * 1.1)
@@ -117,12 +126,11 @@ def test_every_figure_family_is_there_for_every_case_and_vehicle():
     assert "fig-a-5-inputs-case-c-bebop.png" in files
 
 
-def test_every_figure_of_a_step_is_drawn_also_when_one_flight_is_lost(scene, tmp_path):
-    drawn = []
-    draw_figures(scene, tmp_path, drawn.append)
-    assert [d.figure.number for d in drawn] == ["4-1", "4-7", "4-8", "4-9", "4-10", "4-11", "4-12", "A-2"]
-    for one in drawn:
-        assert (tmp_path / one.file).read_bytes().startswith(b"\x89PNG")
+def test_every_figure_of_a_step_is_drawn_also_when_one_flight_is_lost(drawn):
+    directory, found = drawn
+    assert [d.figure.number for d in found] == ["4-1", "4-7", "4-8", "4-9", "4-10", "4-11", "4-12", "A-2"]
+    for one in found:
+        assert (directory / one.file).read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_page_holds_every_table_and_figure_and_nothing_from_elsewhere(records):
@@ -142,10 +150,10 @@ def test_a_page_without_markers_is_refused(tmp_path, records, text):
     assert page.read_text() == text
 
 
-def test_tables_and_key_figures_go_into_the_page(tmp_path, records, scene):
+def test_tables_and_key_figures_go_into_the_page(tmp_path, records, drawn):
     figures = tmp_path / "figures"
-    draw_figures(scene, figures, lambda one: None)
-    some = (figures / "fig-4-07-tracking-case-a.png").read_bytes()
+    figures.mkdir()
+    some = (drawn[0] / "fig-4-07-tracking-case-a.png").read_bytes()
     for file in thesis.KEY_FIGURES:
         (figures / file).write_bytes(some)
     page = tmp_path / "docs" / "page.md"

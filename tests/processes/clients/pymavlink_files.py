@@ -19,7 +19,7 @@ def main(port: str, directory: Path) -> None:
     link.wait_heartbeat(timeout=LONG_S)
     ftp = MAVFTP(link, link.target_system, link.target_component)
     # commands without a transfer end by a silence, which need not be long here
-    ftp.ftp_settings.idle_detection_time = 1.2
+    ftp.ftp_settings.read_retry_time, ftp.ftp_settings.idle_detection_time = 0.4, 0.5
 
     def done(*words: str) -> int:
         result = ftp.cmd_ftp([*words])
