@@ -36,9 +36,14 @@ def both(rows: Rows, factor: float) -> float:
     return scaled(rows.first, factor, 2) + scaled(rows.second, factor, 3)
 
 
+def compiled(function: Any) -> Any:
+    """The kernel compiled here and now, not loaded."""
+    return Kernel(function.py_func, lambda _: NullCache())
+
+
 def test_a_kernel_inside_of_a_kernel_has_no_machine_code_and_one_version_for_all_literals() -> None:
     rows = Rows(np.ones(4), np.ones(4))
-    assert both(rows, 2.0) == 10.0
+    assert compiled(both)(rows, 2.0) == 10.0
     assert rows.first.tolist() == [2.0, 2.0, 1.0, 1.0]
     assert len(numba.typeof(scaled).dispatcher.signatures) == 1
     assert scaled(np.ones(4), 3.0, 1) == 3.0
@@ -50,7 +55,7 @@ def test_references_are_not_counted_and_none_is_lost() -> None:
     for _ in range(10):
         both(rows, 1.0)
     assert [sys.getrefcount(array) for array in rows] == before
-    uncached = Kernel(both.py_func, lambda _: NullCache())  # type: ignore[attr-defined]
+    uncached = compiled(both)
     assert uncached(rows, 1.0) == 5.0
     assert "NRT_" not in uncached.inspect_llvm(uncached.signatures[0])
 
