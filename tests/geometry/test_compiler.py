@@ -40,7 +40,7 @@ def test_a_kernel_inside_of_a_kernel_has_no_machine_code_and_one_version_for_all
     rows = Rows(np.ones(4), np.ones(4))
     assert both(rows, 2.0) == 10.0
     assert rows.first.tolist() == [2.0, 2.0, 1.0, 1.0]
-    assert len(scaled._numba_type_.dispatcher.signatures) == 1  # type: ignore[attr-defined]
+    assert len(numba.typeof(scaled).dispatcher.signatures) == 1
     assert scaled(np.ones(4), 3.0, 1) == 3.0
 
 
