@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -11,6 +12,8 @@ from multiprocessing.context import SpawnProcess
 from autopilot.onboard.onboard import Onboard, Work
 from autopilot.supervisor.state import ON_GROUND
 from autopilot.trajectory.prepare import Prepared
+
+_LONGEST_IN_VAIN_S = 1.0  # about what another process takes to load
 
 
 class Aside:
@@ -21,6 +24,7 @@ class Aside:
 
     def __init__(self) -> None:
         self._work: Work | None = None  # what it is at
+        self._since = 0.0  # when that began
         self._loaded = False
         self._process: SpawnProcess | None = None
         self._pipe: Connection | None = None
@@ -37,14 +41,19 @@ class Aside:
         """Begin what waits; hand over what is done."""
         if (self._work is not None or not self._loaded) and self._pipe is not None and self._pipe.poll():
             self._hear(self._pipe, onboard)
-        if onboard.work is None or self._work is not None:
-            return  # what it is at may be of no use any more, but does not take long
+        if onboard.work is None or self._work is onboard.work:
+            return
+        if self._work is not None:  # of no use any more, which most often does not take long
+            if not self._loaded or time.monotonic() - self._since < _LONGEST_IN_VAIN_S:
+                return
+            self.close()
+            self.start(onboard.rehearsal)
         if self._pipe is None and onboard.phase in ON_GROUND:
             onboard.finish(onboard.work, onboard.work.done())
             return
         if self._pipe is None:
             self.start(onboard.rehearsal)
-        self._work = onboard.work
+        self._work, self._since = onboard.work, time.monotonic()
         with suppress(OSError):  # it has died idle: the next look finds that out
             self._pipe.send(self._work)  # type: ignore[union-attr]
 
@@ -59,7 +68,7 @@ class Aside:
                 onboard.finish(work, Prepared(refusal=text, notes=(text,)))
             return
         if not self._loaded:
-            self._loaded = True  # its first word
+            self._loaded, self._since = True, time.monotonic()  # its first word
         elif self._work is not None:
             work, self._work = self._work, None
             onboard.finish(work, prepared)

@@ -91,6 +91,16 @@ def test_on_the_ground_no_process_is_started_where_there_was_none(aside: Aside) 
     assert onboard.finished == [(work, work.done())]
 
 
+def test_what_takes_long_and_is_of_no_use_any_more_is_given_up(aside: Aside) -> None:
+    onboard = Waiting()
+    places = tuple(Waypoint(float(i % 7), float(i % 5), 2.0) for i in range(400))
+    onboard.work = Work(places, tuple(range(400)), onboard.rehearsal.limits)
+    aside.attend(onboard)  # type: ignore[arg-type]
+    later = onboard.ask(2.0)
+    attend(aside, onboard, lambda: onboard.work is None)
+    assert [work for work, _ in onboard.finished] == [later]
+
+
 def test_a_process_that_dies_at_its_work_is_a_refusal(aside: Aside) -> None:
     onboard = Waiting()
     work = onboard.ask(1.0)
