@@ -196,10 +196,16 @@ def forget(P: Array, first: int, count: int) -> None:
 
 
 @kernel
+def _clear(array: Array, row: int) -> None:
+    """Zero a row, also of what is no number: a multiple of that would stay."""
+    for j in range(array.shape[1]):
+        array[row, j] = 0.0
+
+
+@kernel
 def begin(history: History) -> None:
     """Begin the correction of another reading."""
-    for j in range(0, SIZE, WIDTH):
-        put_wide(history.error, 0, j, 0.0 * wide_at(history.error, 0, j))
+    _clear(history.error, 0)
 
 
 @kernel
@@ -275,8 +281,7 @@ def absorb(history: History, count: int, n: int) -> float:
             put_wide(gain, k, j, root * row)
     for first in range(0, count, 3):
         for k in range(count, first + 3):
-            for j in range(0, n, WIDTH):
-                put_wide(gain, k, j, 0.0 * wide_at(gain, 0, j))
+            _clear(gain, k)
         _narrow(history.covariance, gain, first, n)
     return nis
 
