@@ -52,7 +52,7 @@ from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Report, View, carries, leg_time_s
 
-LAID_OUT = 50  # setpoints that a process lays out at once; a sweep takes more
+LAID_OUT = 250  # setpoints that a process lays out at once, a second of them; a sweep takes more
 _NO_ROWS = np.zeros((1, COLUMNS))
 _NOTHING = Report()
 
@@ -97,6 +97,7 @@ class FlightCore:
         self._laid_out = laid_out
         self._cable_m: float | None = None  # that `settings` were made for
         self._dirty = True  # the flight has changed since the winch was told
+        self._reeling: tuple[tuple[Leg, ...], bool] = ((), False)  # legs, and whether the first of them reels
         self.law_rows = new_rows(setup.law)
         self._fly: Callable[..., int] | None = None  # the tick's machine code for this law, once it was run
         self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
@@ -140,6 +141,14 @@ class FlightCore:
     def state(self) -> State:
         """State passed to the control laws."""
         return unpack(Seen, self.rows.seen, 0).state
+
+    @property
+    def reels(self) -> bool:
+        """Whether the present leg moves the winch."""
+        legs = self.flight.legs
+        if legs is not self._reeling[0]:
+            self._reeling = (legs, bool(legs) and top_of(legs[0]) is not None)
+        return self._reeling[1]
 
     def view(self, now_us: int, pulls: bool = False) -> View:
         """What the supervisor sees; of the cable's pull only during a tick."""
@@ -189,8 +198,7 @@ class FlightCore:
     def move_cable(self, now_us: int) -> None:
         """Let the cable be as the winch has it at this instant."""
         flight = self.flight
-        reels = bool(flight.legs) and top_of(flight.legs[0]) is not None
-        if not (reels or self._dirty):
+        if not (self._dirty or self.reels):
             return
         before_m = flight.cable.length_m
         flight = self.flight = with_cable_now(flight, now_us)

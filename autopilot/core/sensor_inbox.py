@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isnan
 from typing import Any, NamedTuple
 
@@ -30,6 +31,7 @@ from autopilot.estimation.records import (
     LoadReading,
     PoseReading,
 )
+from autopilot.geometry.entry import entry_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack, packed, unpack, width
@@ -184,6 +186,7 @@ class SensorInbox:
         self.fix = np.zeros(width(HilGps))  # `HilGps`, the last one
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._writer = FrameWriter(1, 1)
+        self._entry: Callable[..., tuple[int, int, int, bool]] | None = None  # machine code, once it was asked for
 
     def read(self, datagram: bytes, since_us: int) -> Tick | None:
         """The tick in a datagram, or None where there is none (garbage, another message).
@@ -204,10 +207,13 @@ class SensorInbox:
         return Tick(now_us, count, fields, fixed, aside)
 
     def _read(self, datagram: bytes, since_us: int) -> tuple[int, int, int, bool]:
-        found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+        kept = (self.imu, self.fix, self._payload)
+        if self._entry is None:
+            self._entry = entry_of(_read, datagram, self._home, since_us, self.rows, *kept)
+        found = self._entry(datagram, self._home, since_us, self.rows, *kept)
         if found[0] > len(self.rows):
             self.rows = new_inbox(2 * found[0])
-            found = _read(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+            found = self._entry(datagram, self._home, since_us, self.rows, *kept)
         return found
 
     @property

@@ -6,7 +6,7 @@ waits until the shell hands it over, between two ticks.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -25,6 +25,7 @@ from autopilot.core.scheduler import RateError, divider
 from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse
 from autopilot.estimation.filter import estimator_tuning
+from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
@@ -54,7 +55,7 @@ from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -66,9 +67,11 @@ from autopilot.wire.simulator_frames import put_answer
 from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
+_TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
+_UNARMED = (Phase.DISARMED, Phase.FAILSAFE)
 MOST_NAMED = 8  # items in one text
 AT_ONCE_STEPS = (
     30  # of a mission that begins as soon as it is asked for; some 0.4 s if nobody has prepared it
@@ -139,7 +142,11 @@ class Onboard:
         self._health = packed(Condition())
         self._battery_row = packed(battery_constants(parameters))
         self._frame = np.zeros(FRAME_ROOM, np.uint8)
+        self._written = memoryview(self._frame)
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
+        # machine code, once it was asked for
+        self._put: Callable[..., int] | None = None
+        self._follow: Callable[..., None] | None = None
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
@@ -166,45 +173,41 @@ class Onboard:
 
         None for anything else: garbage, or a tick that is over.
         """
-        before_us = self.now_us
-        tick = self._sensors.read(datagram, before_us if self.tick >= 0 else -1)
+        before_us, begun = self.now_us, self.tick >= 0
+        tick = self._sensors.read(datagram, before_us if begun else -1)
         if tick is None:
             return None
         now_us = tick.now_us
-        if now_us < before_us or (self.tick >= 0 and now_us > before_us + LEAP_US):
+        if now_us < before_us or (begun and now_us > before_us + LEAP_US):
             self.out_of_time += 1
             return None
         self.out_of_time = 0
-        if now_us == before_us and self.tick >= 0:
+        if now_us == before_us and begun:
             return self._answer
         self._run(tick)
-        self._answer = self._put_answer(now_us)
+        answer = self._put_answer(now_us)
         writer = self._writer
         writer.sequence = (writer.sequence + 1) & 0xFF
         aside = self._world.messages(now_us)
         if self._reboot:
             aside.append(_REBOOT)
         if aside:
-            self._answer += b"".join(map(writer.frame, aside))
-        return self._answer
+            answer += b"".join(map(writer.frame, aside))
+        self._answer = answer
+        return answer
 
     def _put_answer(self, now_us: int) -> bytes:
         """HIL_ACTUATOR_CONTROLS of this tick."""
-        flight, writer = self.core.flight, self._writer
-        end = put_answer(
-            self._frame,
-            self._payload,
-            writer.sequence,
-            writer.system,
-            writer.component,
-            now_us,
-            self.core.force_row,
-            self.armed,
-            self._options.lockstep,
-            flight.cable.released,
-            commanded_rate(flight, now_us, self._shortest_us * 1e-6),
+        core, writer = self.core, self._writer
+        arguments = (
+            *(self._frame, self._payload, writer.sequence, writer.system, writer.component, now_us),
+            *(core.force_row, self.armed, self._options.lockstep, core.flight.cable.released),
+            commanded_rate(core.flight, now_us, self._shortest_us * 1e-6) if core.reels else 0.0,
         )
-        return self._frame[:end].tobytes()
+        if self._put is None:
+            self._put = entry_of(put_answer, *arguments)
+        end = self._put(*arguments)
+        return self._written[:end].tobytes()
 
     @property
     def phase(self) -> Phase:
@@ -214,7 +217,7 @@ class Onboard:
     @property
     def armed(self) -> bool:
         """Whether rotors may turn."""
-        return self.phase not in (Phase.DISARMED, Phase.FAILSAFE)
+        return self.core.flight.phase not in _UNARMED
 
     def _run(self, tick: Tick) -> None:
         period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
@@ -237,16 +240,7 @@ class Onboard:
         if sensors.rows is not core.rows.inbox:
             core.take_inbox(sensors.rows)
         report = core.step(tick.readings, tick.now_us, self.tick, dt)
-        follow(
-            self._health,
-            sensors.imu,
-            core.force_row,
-            self._battery_row,
-            tick.fields_updated,
-            tick.fixed,
-            tick.now_us,
-            dt,
-        )
+        self._follow_health(tick.fields_updated, tick.fixed, dt)
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
@@ -256,6 +250,12 @@ class Onboard:
         if log is not None and log.due(tick.now_us, self.armed):
             log.step(self.now_us, self.armed, self._log_names, self.log_sample)
             self.endpoint.files.protected = log.path
+
+    def _follow_health(self, fields: int, fixed: bool, dt: float) -> None:
+        rows = (self._health, self._sensors.imu, self.core.force_row, self._battery_row)
+        if self._follow is None:
+            self._follow = entry_of(follow, *rows, fields, fixed, self.now_us, dt)
+        self._follow(*rows, fields, fixed, self.now_us, dt)
 
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -343,9 +343,8 @@ class Onboard:
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
         """What is due on the ground links at this tick."""
-        percent = self.parameters["SIM_LOSS_PCT"]
         sent = self.endpoint.poll(self._snapshot, self.now_us)
-        if percent > 0.0:
+        if sent and (percent := self.parameters["SIM_LOSS_PCT"]) > 0.0:
             sent = [
                 (link, datagram) for link, datagram in sent if not self._sent_loss.drops(datagram, percent)
             ]
@@ -359,7 +358,7 @@ class Onboard:
         if self.now_us < self._next_question_us:
             return None
         self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
-        return self.endpoint.datagram(link, mavlink.MAVLink_timesync_message(0, self.now_us * 1000))
+        return self.endpoint.datagram(link, (_TIMESYNC, (0, self.now_us * 1000)))
 
     def restore_world(self, values: Mapping[str, float]) -> None:
         """What the simulator's parameters were saved as; it is told when it is there."""

@@ -6,19 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, nan, sqrt
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from autopilot.control.load_motion import Drag
-from autopilot.core.flight_core import FlightCore, LaidOut
+from autopilot.core.flight_core import FlightCore, LaidOut, Setup
 from autopilot.core.health import Condition, battery_constants, remaining, sensors, vibration, voltage
 from autopilot.estimation.records import TRACKER, Array, EstimatorState
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import Vec3, norm, scale
 from autopilot.geometry.packed import Row, unpack, width
 from autopilot.guidance.layout import jets
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Run
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Leg, Run
 from autopilot.onboard.instant_row import NO_LEG, put_instant
 from autopilot.services import identity, snapshot
 from autopilot.services.instant import Instant
@@ -35,7 +35,6 @@ from autopilot.supervisor.state import (
     Selected,
     View,
     carries,
-    leg_time_s,
 )
 from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -216,8 +215,7 @@ class Moments:
         self._flight: Flight | None = None
         self._items = 0
         self._told = told(core.flight, 0)
-        self._asked: Array | None = None  # what the mission asks for, row by row as `_laid` has its setpoints
-        self._laid: LaidOut | None = None
+        self._standing = _standing(core, core.flight, None)
         self._put: Callable[..., None] | None = None  # machine code, once it was asked for
 
     def told(self, flight: Flight, items: int) -> Told:
@@ -228,42 +226,79 @@ class Moments:
 
     def instant(self, flight: Flight, seq: int, now_us: int) -> Row:
         """The packed `Instant` at which the core stands with this flight."""
-        core, rows, setup = self.core, self.core.rows, self.core.setup
-        targets = asked = rows.targets
-        at, mode = 0, NO_LEG
-        if flight.legs:
-            leg, elapsed_s = flight.legs[0], leg_time_s(flight, now_us)
-            mode = leg.control_mode
-            duration_s = leg.duration_s if leg.duration_s < inf else nan
-            if mode in (LOAD_POSITION, QUAD_POSITION):
-                at = core.setpoint_row(now_us)
-                if at < 0:
-                    at, times_s = 0, np.array([elapsed_s])
-                    targets = asked = jets(leg, times_s)
-                    if isinstance(leg, Run):
-                        asked = jets(leg, times_s, asked=True)
-                elif isinstance(leg, Run):
-                    asked = self._all_asked(leg)
-        else:
-            elapsed_s, duration_s = (now_us - flight.phase_start_us) * 1e-6, nan
-        limits = (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
+        core = self.core
+        known = self._standing
+        if flight is not known.flight or core.laid is not known.laid or core.setup is not known.setup:
+            known = self._standing = _standing(core, flight, known)
+        elapsed_s = (now_us - known.since_us) * 1e-6
+        targets, asked, at = known.targets, known.asked, 0
+        if known.tracks:
+            at = core.setpoint_row(now_us)
+            if at < 0:
+                at, (targets, asked) = 0, _setpoint(flight.legs[0], elapsed_s)
         instant = np.empty(_WIDTH)
         arguments = (
-            *(rows.seen, rows.estimator, rows.pilot, targets, asked, at, int(mode), elapsed_s),
-            *(float(duration_s), now_us, int(flight.phase), seq, flight.phase in CARRYING, carries(flight)),
-            *(*limits, instant),
+            *(*known.rows, targets, asked, at, known.control_mode, elapsed_s, known.duration_s, now_us),
+            *(known.phase, seq, *known.facts, instant),
         )
         if self._put is None:
             self._put = entry_of(put_instant, *arguments)
         self._put(*arguments)
         return instant
 
-    def _all_asked(self, leg: Run) -> Array:
-        """What the mission asks for where the core has laid out the setpoints of this leg."""
-        laid = self.core.laid
-        if laid is not None and (self._asked is None or laid is not self._laid):
-            self._laid, self._asked = laid, jets(leg, laid.times_s, asked=True)
-        return cast(Array, self._asked)
+
+class _Standing(NamedTuple):
+    """What is the same in each instant while flight record, setpoints and parameters are: arguments of
+    `put_instant`."""
+
+    flight: Flight
+    laid: LaidOut | None
+    setup: Setup
+    rows: tuple[Row, Row, Row]  # `seen`, `estimator`, `pilot`
+    tracks: bool  # the leg has setpoints:
+    targets: Array
+    asked: Array  # what the mission asks for, row by row as `targets`
+    control_mode: int
+    since_us: int  # when the leg began, or without one the phase
+    duration_s: float
+    phase: int
+    facts: tuple[bool, bool, float, float]  # `carrying`, `carries`, `rotor_min`, `rotor_max`
+
+
+def _standing(core: FlightCore, flight: Flight, before: _Standing | None) -> _Standing:
+    rows, setup, laid = core.rows, core.setup, core.laid
+    targets = asked = rows.targets
+    mode, since_us, duration_s = NO_LEG, flight.phase_start_us, nan
+    if flight.legs:
+        leg = flight.legs[0]
+        mode, since_us = int(leg.control_mode), flight.leg_start_us
+        duration_s = leg.duration_s if leg.duration_s < inf else nan
+        if isinstance(leg, Run) and laid is not None and laid.legs is flight.legs:
+            # while a winch reels, the flight record is another one at each tick
+            same = before is not None and before.laid is laid and before.flight.legs is flight.legs
+            asked = before.asked if before and same else jets(leg, laid.times_s, asked=True)
+    limits = (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
+    return _Standing(
+        flight,
+        laid,
+        setup,
+        (rows.seen, rows.estimator, rows.pilot),
+        mode in (LOAD_POSITION, QUAD_POSITION),
+        targets,
+        asked,
+        mode,
+        since_us,
+        float(duration_s),
+        int(flight.phase),
+        (flight.phase in CARRYING, carries(flight), *limits),
+    )
+
+
+def _setpoint(leg: Leg, elapsed_s: float) -> tuple[Array, Array]:
+    """What a leg has for this instant, and what the mission asks for, where neither is laid out."""
+    times_s = np.array([elapsed_s])
+    targets = jets(leg, times_s)
+    return targets, jets(leg, times_s, asked=True) if isinstance(leg, Run) else targets
 
 
 class Moment(Snapshot):
@@ -283,11 +318,7 @@ class Moment(Snapshot):
         self.told = moments.told(self.flight, len(mission.items))
         # a vehicle that is not armed says whether it may be
         self.unchanged = None if self.flight.phase == Phase.DISARMED else self.told
-
-    @cached_property
-    def instant(self) -> Row:  # type: ignore[override]
-        """What is sent and logged most often, as a row."""
-        return self.moments.instant(self.flight, self.told.seq, self.now_us)
+        self.instant = moments.instant(self.flight, self.told.seq, now_us)
 
     @cached_property
     def estimator(self) -> EstimatorState:

@@ -60,7 +60,7 @@ from autopilot.services.requests import (
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
-from autopilot.services.stream_frames import BITS
+from autopilot.services.stream_frames import parts_of
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import GROUPS, LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
 from autopilot.services.timesync import answer_ping, answer_timesync
@@ -129,6 +129,7 @@ class VehicleEndpoint:
         )
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
+        self._learned: dict[Link, LinkState] = {}  # of these the ones that were not configured
         table: dict[int, Stream] = STREAMS | (LOAD_STREAMS if identity.load_system else {})
         self._defaults = {key: stream.interval_us for key, stream in table.items()}
         self._built_by = {
@@ -170,7 +171,8 @@ class VehicleEndpoint:
 
     def add_link(self, link: Link, now_us: int = 0) -> None:
         """A link that always gets telemetry, whether or not somebody is heard on it."""
-        self._links[link] = self._new_link(True, now_us)
+        self._links[link] = self._new_link(now_us)
+        self._learned.pop(link, None)
         self._work = True
 
     def remove_link(self, link: Link) -> None:
@@ -254,49 +256,60 @@ class VehicleEndpoint:
             self._look_ahead()
         if now_us < self._next_us and not self._work:
             return []
-        self._forget_silent(now_us)
+        if self._learned:
+            self._forget_silent(now_us)
         if self._work or now_us >= self._timer_us or self._signing.signing is not None:
             for service in self._timed:
                 self._do(service.poll(now_us), self._events)
             self._follow_up(self._events)
             self._say_reached_again(now_us)
             self._work, self._stirred = False, True
-        ahead = [(link, state, state.streams.take_due(now_us)) for link, state in self._links.items()]
-        datagrams: list[tuple[Link, bytes]] = []
-        instant, in_kernel = _NO_INSTANT, False
-        if any(keys or state.announced for _, state, keys in ahead):
-            snapshot = make_snapshot()
-            snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, self._missions.plan_ids
-            self._watch(snapshot)
-            # what is signed is written frame by frame
-            if snapshot.instant is not None and self._signing.signing is None:
-                instant, in_kernel = snapshot.instant, True
+        due: list[tuple[Link, LinkState, tuple[int, ...]]] = []
+        streams, next_us = False, self._timer_us
+        for link, state in self._links.items():
+            keys = state.streams.take_due(now_us)
+            due.append((link, state, keys))
+            streams = streams or bool(keys or state.announced)
+            next_us = min(next_us, state.streams.next_us)
+        self._next_us = next_us
+        snapshot = self._look(make_snapshot) if streams else None
+        return self._datagrams(due, snapshot)
+
+    def _look(self, make_snapshot: SnapshotFactory) -> Snapshot:
+        """The instant at which streams are due; what has changed is announced."""
+        snapshot = make_snapshot()
+        snapshot.asked_mode, snapshot.plan_ids = self._asked_mode, self._missions.plan_ids
+        self._watch(snapshot)
+        return snapshot
+
+    def _datagrams(
+        self, due: list[tuple[Link, LinkState, tuple[int, ...]]], snapshot: Snapshot | None
+    ) -> list[tuple[Link, bytes]]:
+        """What waits on each link, and the streams that are due there."""
+        instant = None if snapshot is None else snapshot.instant
+        # what is signed is written frame by frame
+        written = instant is not None and self._signing.signing is None
         built: dict[int, list[Outgoing]] = {}
-        for link, state, streams in ahead:
+        datagrams: list[tuple[Link, bytes]] = []
+        for link, state, keys in due:
             outgoing: list[Outgoing | int] = [(self._own, message) for message in state.queue]
-            # what was announced, just now as well, comes before the streams
-            keys = dict.fromkeys((*state.announced, *streams)) if state.announced else streams
-            last = 0
-            for key in keys:
-                bit = BITS.get(key, 0) if in_kernel else 0
-                if bit:
-                    if 0 < last < bit:  # they are written together
-                        last |= bit
-                        outgoing[-1] = last
-                    else:
-                        last = bit
-                        outgoing.append(bit)
-                    continue
-                last = 0
-                made = built.get(key)
-                if made is None:
-                    made = built[key] = self._build(key, snapshot)
-                outgoing += made
             state.queue.clear()
-            state.announced.clear()
+            if state.announced:
+                # what was announced, just now as well, comes before the streams
+                keys = tuple(dict.fromkeys((*state.announced, *keys)))
+                state.announced.clear()
+            for part in parts_of(keys) if written else (keys,):
+                if isinstance(part, int):
+                    outgoing.append(part)
+                    continue
+                for key in part:
+                    made = built.get(key)
+                    if made is None:
+                        made = built[key] = self._build(key, snapshot)
+                    outgoing += made
             if outgoing:
-                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing, instant)]
-        self._next_us = min(self._timer_us, self._next_stream())
+                given = _NO_INSTANT if instant is None else instant
+                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing, given)]
         return datagrams
 
     def _look_ahead(self) -> None:
@@ -364,33 +377,30 @@ class VehicleEndpoint:
 
     # ---- links
 
-    def _new_link(self, configured: bool, now_us: int) -> LinkState:
+    def _new_link(self, now_us: int) -> LinkState:
         taken = {state.number for state in self._links.values()}
         number = next(number for number in range(len(taken) + 1) if number not in taken)
         signer, system = self._signing.signer, self.identity.system
-        return LinkState(configured, self._defaults, now_us, number & 0xFF, signer, system)
+        return LinkState(self._defaults, now_us, number & 0xFF, signer, system)
 
     def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)
         if state is None:
-            self._make_room()
-            state = self._links[link] = self._new_link(False, now_us)
+            if len(self._learned) >= MAX_LINKS:
+                self._forget(min(self._learned, key=lambda link: self._learned[link].heard_us))
+            state = self._links[link] = self._learned[link] = self._new_link(now_us)
             self._work = True
         state.heard_us = now_us
         return state
 
-    def _make_room(self) -> None:
-        learned = {link: state for link, state in self._links.items() if not state.configured}
-        if len(learned) >= MAX_LINKS:
-            self._forget(min(learned, key=lambda link: learned[link].heard_us))
-
     def _forget_silent(self, now_us: int) -> None:
-        for link, state in list(self._links.items()):
-            if not state.configured and now_us - state.heard_us > LINK_SILENCE_US:
+        for link, state in list(self._learned.items()):
+            if now_us - state.heard_us > LINK_SILENCE_US:
                 self._forget(link)
 
     def _forget(self, link: Link) -> None:
         del self._links[link]
+        self._learned.pop(link, None)
         for service in (self._parameters, self._ftp, self._logs):
             service.forget(link)
 

@@ -27,7 +27,6 @@ class LinkState:
     __slots__ = (
         "_streams",
         "announced",
-        "configured",
         "heard_us",
         "number",
         "queue",
@@ -38,14 +37,12 @@ class LinkState:
 
     def __init__(
         self,
-        configured: bool,
         defaults: Mapping[int, int],
         now_us: int,
         number: int,
         signer: SignerOf,
         system: int,
     ) -> None:
-        self.configured = configured  # never forgotten
         self.number = number  # that signatures bear
         self.signer = signer
         self.heard_us = now_us
@@ -70,22 +67,29 @@ class LinkState:
     def datagrams(self, outgoing: Iterable[Outgoing | int], instant: Row) -> list[bytes]:
         """Frames in their order, as many in a datagram as go in. A number is a set of streams of `instant`,
         as `StreamFrames` has them; of a link that signs there must be none."""
-        datagrams: list[bytes] = []
-        frames: list[bytes] = []
-        size, sign, writers = 0, self.signer(self.number), self.writers
+        sign, writers = self.signer(self.number), self.writers
+        pieces: list[bytes] = []
         for one in outgoing:
             if isinstance(one, int):
-                made = self._streams.frames(one, instant)
-                several = [made] if size + len(made) <= DATAGRAM_BYTES else split(made)
+                pieces.append(self._streams.frames(one, instant))
             else:
                 source, message = one
-                several = [(writers.get(source) or self._writer(source)).frame(message, sign)]
-            for frame in several:
-                size += len(frame)
-                if size > DATAGRAM_BYTES:
-                    datagrams.append(b"".join(frames))
-                    frames, size = [], len(frame)
-                frames.append(frame)
-        if frames:
-            datagrams.append(b"".join(frames))
-        return datagrams
+                pieces.append((writers.get(source) or self._writer(source)).frame(message, sign))
+        whole = b"".join(pieces)
+        return [whole] if 0 < len(whole) <= DATAGRAM_BYTES else _packed(split(whole))
+
+
+def _packed(frames: Iterable[bytes]) -> list[bytes]:
+    """Datagrams of these frames in their order, as many in each as go in."""
+    datagrams: list[bytes] = []
+    together: list[bytes] = []
+    size = 0
+    for frame in frames:
+        size += len(frame)
+        if size > DATAGRAM_BYTES:
+            datagrams.append(b"".join(together))
+            together, size = [], len(frame)
+        together.append(frame)
+    if together:
+        datagrams.append(b"".join(together))
+    return datagrams

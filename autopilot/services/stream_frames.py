@@ -6,6 +6,7 @@ The bytes are those that `FrameWriter` makes of the same streams of `telemetry`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
@@ -45,6 +46,29 @@ BITS = {
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE: 64,
 }
 _OF_AUTOPILOT = 1 | 2 | 4  # the others leave from the component of the dialect
+
+# a set of streams that are written together, or the keys of streams that are not written here
+Part = int | tuple[int, ...]
+
+
+@lru_cache(maxsize=256)
+def parts_of(keys: tuple[int, ...]) -> tuple[Part, ...]:
+    """Streams in the order in which they are sent, those together that are written together."""
+    parts: list[Part] = []
+    last: Part = 0
+    for key in keys:
+        bit = BITS.get(key, 0)
+        if not bit:
+            if isinstance(last, tuple):
+                parts.pop()
+            last = (*last, key) if isinstance(last, tuple) else (key,)
+        elif isinstance(last, int) and 0 < last < bit:
+            parts.pop()
+            last |= bit
+        else:
+            last = bit
+        parts.append(last)
+    return tuple(parts)
 
 
 @kernel
@@ -102,6 +126,7 @@ class StreamFrames:
         self._dialect = dialect
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._buffer = np.zeros(len(BITS) * FRAME_ROOM, np.uint8)
+        self._written = memoryview(self._buffer)
         self._put: Callable[..., int] | None = None  # the machine code, once it was asked for
 
     def frames(self, streams: int, instant: Row) -> bytes:
@@ -116,4 +141,4 @@ class StreamFrames:
         end = self._put(*arguments)
         autopilot.sequence = (autopilot.sequence + (streams & _OF_AUTOPILOT).bit_count()) & 0xFF
         dialect.sequence = (dialect.sequence + (streams & ~_OF_AUTOPILOT).bit_count()) & 0xFF
-        return self._buffer[:end].tobytes()
+        return self._written[:end].tobytes()

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from heapq import heapify, heapreplace
+from itertools import chain
 
 OFF = -1  # MAV_CMD_SET_MESSAGE_INTERVAL: never
 DEFAULT = 0  # and: the default interval
 NEVER_US = 2**63 - 1
+_MOST_MET = 64  # sets of groups that are remembered; a client may choose intervals that seldom meet again
 
 
 class Streams:
@@ -33,6 +35,7 @@ class Streams:
             groups.setdefault((due_us[key], self._interval[key]), []).append(key)
         self._groups = [(due, interval, tuple(keys)) for (due, interval), keys in groups.items()]
         heapify(self._groups)
+        self._met: dict[tuple[tuple[int, ...], ...], tuple[int, ...]] = {}  # groups that were due together
         self.next_us = self._groups[0][0] if self._groups else NEVER_US
 
     def interval(self, key: int) -> int | None:
@@ -47,22 +50,32 @@ class Streams:
         due_us[key] = _at_or_after(interval, now_us)
         self._regroup(due_us)
 
-    def take_due(self, now_us: int) -> list[int]:
+    def take_due(self, now_us: int) -> tuple[int, ...]:
         """What is due at this tick; each of them is due again at its next multiple."""
-        taken: list[int] = []
-        groups, several, last = self._groups, False, 0
-        twice = False  # a stream was set to this interval between two instants at which the others were due
+        groups = self._groups
+        taken: tuple[tuple[int, ...], ...] = ()
+        last, twice = 0, False
         while self.next_us <= now_us:
             _, interval, keys = groups[0]
-            several, twice, last = bool(taken), twice or interval == last, interval
-            taken += keys
+            # a stream was set to this interval between two instants at which the others were due
+            twice, last = twice or interval == last, interval
+            taken += (keys,)
             heapreplace(groups, (_at_or_after(interval, now_us + 1), interval, keys))
             self.next_us = groups[0][0]
-        if several:
-            taken.sort(key=self._order.__getitem__)
         if twice:
             self._regroup(self._due_us())
-        return taken
+        return self._together(taken)
+
+    def _together(self, groups: tuple[tuple[int, ...], ...]) -> tuple[int, ...]:
+        """The keys of these groups in their order. The same groups meet again and again."""
+        if len(groups) <= 1:
+            return groups[0] if groups else ()
+        keys = self._met.get(groups)
+        if keys is None:
+            if len(self._met) >= _MOST_MET:
+                self._met.clear()
+            keys = self._met[groups] = tuple(sorted(chain(*groups), key=self._order.__getitem__))
+        return keys
 
     def _due_us(self) -> dict[int, int]:
         return {key: due_us for due_us, _, keys in self._groups for key in keys}
