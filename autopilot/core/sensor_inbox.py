@@ -186,7 +186,9 @@ class SensorInbox:
         self.fix = np.zeros(width(HilGps))  # `HilGps`, the last one
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._writer = FrameWriter(1, 1)
-        self._entry: Callable[..., tuple[int, int, int, bool]] | None = None  # machine code, once it was asked for
+        self._entry: Callable[..., tuple[int, int, int, bool]] | None = (
+            None  # machine code, once it was asked for
+        )
 
     def read(self, datagram: bytes, since_us: int) -> Tick | None:
         """The tick in a datagram, or None where there is none (garbage, another message).

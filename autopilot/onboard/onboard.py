@@ -142,7 +142,7 @@ class Onboard:
         self._health = packed(Condition())
         self._battery_row = packed(battery_constants(parameters))
         self._frame = np.zeros(FRAME_ROOM, np.uint8)
-        self._written = memoryview(self._frame)
+        self._written = self._frame.data
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         # machine code, once it was asked for
         self._put: Callable[..., int] | None = None

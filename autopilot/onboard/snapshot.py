@@ -308,6 +308,8 @@ class Moment(Snapshot):
     them are sent.
     """
 
+    instant: Row  # what is sent and logged most often
+
     def __init__(self, moments: Moments, mission: StoredMission, now_us: int) -> None:
         self.now_us = now_us
         self.boot_unix_us = moments.options.boot_unix_us
@@ -318,6 +320,7 @@ class Moment(Snapshot):
         self.told = moments.told(self.flight, len(mission.items))
         # a vehicle that is not armed says whether it may be
         self.unchanged = None if self.flight.phase == Phase.DISARMED else self.told
+        self.armed, self.phase = self.told.armed, self.told.phase
         self.instant = moments.instant(self.flight, self.told.seq, now_us)
 
     @cached_property

@@ -25,7 +25,7 @@ def rehearse_telemetry(setup: Setup, parameters: ParameterTable) -> None:
     core, options = FlightCore(setup), Options(Home(), 0)
     moments = Moments(core, options, parameters, packed(Condition()), np.zeros(width(HilGps)))
     moment = Moment(moments, StoredMission(), 0)
-    StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2)).frames(sum(BITS.values()), moment.instant)
+    StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2), Home()).frames(sum(BITS.values()), moment.instant)
     imu = packed(ImuReading(ZERO, ZERO))
     sample = Sample(moment, moment.instant, imu, True, lambda: moment.estimator)
     SampleRecords(UlogWriter(topic for topic, _ in FAST), Home()).of(sample, 0)

@@ -108,6 +108,7 @@ class VehicleEndpoint:
         boot_unix_us: int = 0,
     ) -> None:
         self.identity = identity
+        self._home = home
         self._signing = SigningService(signing, boot_unix_us)
         self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
         self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
@@ -285,32 +286,42 @@ class VehicleEndpoint:
     def _datagrams(
         self, due: list[tuple[Link, LinkState, tuple[int, ...]]], snapshot: Snapshot | None
     ) -> list[tuple[Link, bytes]]:
-        """What waits on each link, and the streams that are due there."""
-        instant = None if snapshot is None else snapshot.instant
-        # what is signed is written frame by frame
-        written = instant is not None and self._signing.signing is None
+        """What waits on each link, and of an instant the streams that are due there."""
         built: dict[int, list[Outgoing]] = {}
+        instant = _NO_INSTANT if snapshot is None or snapshot.instant is None else snapshot.instant
         datagrams: list[tuple[Link, bytes]] = []
         for link, state, keys in due:
             outgoing: list[Outgoing | int] = [(self._own, message) for message in state.queue]
             state.queue.clear()
-            if state.announced:
-                # what was announced, just now as well, comes before the streams
-                keys = tuple(dict.fromkeys((*state.announced, *keys)))
-                state.announced.clear()
-            for part in parts_of(keys) if written else (keys,):
-                if isinstance(part, int):
-                    outgoing.append(part)
-                    continue
-                for key in part:
-                    made = built.get(key)
-                    if made is None:
-                        made = built[key] = self._build(key, snapshot)
-                    outgoing += made
+            if snapshot is not None:
+                outgoing += self._streams(state, keys, snapshot, built)
             if outgoing:
-                given = _NO_INSTANT if instant is None else instant
-                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing, given)]
+                datagrams += [(link, datagram) for datagram in state.datagrams(outgoing, instant)]
         return datagrams
+
+    def _streams(
+        self, state: LinkState, keys: tuple[int, ...], snapshot: Snapshot, built: dict[int, list[Outgoing]]
+    ) -> list[Outgoing | int]:
+        """The streams that are due on a link; `built` has those that were built for others."""
+        if state.announced:
+            # what was announced, just now as well, comes before the streams
+            keys = tuple(dict.fromkeys((*state.announced, *keys)))
+            state.announced.clear()
+        # what is signed is written frame by frame
+        written = snapshot.instant is not None and self._signing.signing is None
+        outgoing: list[Outgoing | int] = []
+        for part in parts_of(keys) if written else (keys,):
+            if isinstance(part, int):
+                outgoing.append(part)
+                continue
+            for key in part:
+                made = built.get(key)
+                if made is None:
+                    source, build = self._built_by[key]
+                    messages = build(snapshot, self.identity)
+                    made = built[key] = [(source, message) for message in messages]
+                outgoing += made
+        return outgoing
 
     def _look_ahead(self) -> None:
         """Note when there is something to do next, if nothing comes in before."""
@@ -328,10 +339,6 @@ class VehicleEndpoint:
             self._reached_left, self._reached_us = self._reached_left - 1, now_us + REACHED_US
 
     # ---- sending
-
-    def _build(self, key: int, snapshot: Snapshot) -> list[Outgoing]:
-        source, build = self._built_by[key]
-        return [(source, message) for message in build(snapshot, self.identity)]
 
     def _watch(self, snapshot: Snapshot) -> None:
         """Announce what changed since it was last looked at."""
@@ -381,7 +388,7 @@ class VehicleEndpoint:
         taken = {state.number for state in self._links.values()}
         number = next(number for number in range(len(taken) + 1) if number not in taken)
         signer, system = self._signing.signer, self.identity.system
-        return LinkState(self._defaults, now_us, number & 0xFF, signer, system)
+        return LinkState(self._defaults, now_us, number & 0xFF, signer, system, self._home)
 
     def _heard(self, link: Link, now_us: int) -> LinkState:
         state = self._links.get(link)

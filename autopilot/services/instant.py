@@ -6,26 +6,42 @@ flight a message has stands once, for the streams that are written in machine co
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.so3 import Quat
+from autopilot.wire.convert import ROTOR_FMAX, Home
+from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.flight import (
     cascade_errors_values,
     load_setpoint_values,
     load_state_values,
     rotor_state_values,
 )
+from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.convert.simulator import Forces
 from autopilot.wire.convert.telemetry import (
+    altitude_values,
     attitude_quaternion_values,
+    attitude_target_values,
     attitude_values,
+    global_position_int_values,
+    heading_cdeg,
     local_position_ned_values,
+    position_target_local_ned_values,
+    vfr_hud_values,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 
+_UINT32 = 0xFFFFFFFF
+_PWM_STOP, _PWM_FULL = 1000, 2000  # SERVO_OUTPUT_RAW as most tools expect it, us
+_NO_MORE_PORTS = (0,) * 13  # the first port has four outputs; others give nothing
+# names of DEBUG_VECT and NAMED_VALUE_FLOAT, in the order in which they are sent
+DEBUG_VECTORS = (b"LOAD_POS", b"LOAD_VEL", b"CABLE_Q", b"LOAD_ERR")
+NAMED_VALUES = (b"TENSION", b"SWING", b"LOAD_ERR", b"PSI_R", b"PSI_Q")
 _ESTIMATED = mavlink.PLUMBLINE_SOURCE_ESTIMATED
 
 
@@ -99,6 +115,79 @@ def attitude_quaternion_of(s: Any) -> tuple[float, ...]:
 def local_position_ned_of(s: Any) -> tuple[float, ...]:
     """LOCAL_POSITION_NED."""
     return local_position_ned_values(s.now_us, s.x_quad, s.v_quad)
+
+
+@register_jitable
+def global_position_int_of(s: Any, home: Home) -> tuple[float, ...]:
+    """GLOBAL_POSITION_INT of the vehicle."""
+    return global_position_int_values(s.now_us, s.x_quad, s.v_quad, heading_cdeg(s.quat_wxyz), home)
+
+
+@register_jitable
+def altitude_of(s: Any, home: Home) -> tuple[float, ...]:
+    """ALTITUDE of the vehicle."""
+    return altitude_values(s.now_us, s.x_quad[2], home)
+
+
+@register_jitable
+def force_share(force: float, s: Any) -> float:
+    """Share of what one rotor can give; a rotor without limit counts as the nominal one."""
+    return force / (s.rotor_max if 0.0 < s.rotor_max < math.inf else ROTOR_FMAX)
+
+
+@register_jitable
+def vfr_hud_of(s: Any, home: Home) -> tuple[float, ...]:
+    """VFR_HUD."""
+    mean = 0.25 * (s.forces[0] + s.forces[1] + s.forces[2] + s.forces[3])
+    return vfr_hud_values(s.v_quad, s.quat_wxyz, s.x_quad[2], force_share(mean, s), home)
+
+
+@register_jitable
+def position_target_local_ned_of(s: Any) -> tuple[float, ...]:
+    """POSITION_TARGET_LOCAL_NED; there is none where the vehicle is wanted nowhere, and `x_quad_d` is NaN."""
+    return position_target_local_ned_values(s.now_us, s.x_quad_d, ZERO, ZERO)
+
+
+@register_jitable
+def attitude_target_of(s: Any) -> tuple[float, ...]:
+    """ATTITUDE_TARGET."""
+    return attitude_target_values(s.now_us, s.quat_c_wxyz, ZERO, force_share(0.25 * s.thrust, s))
+
+
+@register_jitable
+def _pulse_us(force: float, s: Any) -> int:
+    return saturated(_PWM_STOP + (_PWM_FULL - _PWM_STOP) * force_share(force, s), _PWM_STOP, _PWM_FULL)
+
+
+@register_jitable
+def servo_output_raw_of(s: Any) -> tuple[float, ...]:
+    """SERVO_OUTPUT_RAW."""
+    f = s.forces
+    pulses = (_pulse_us(f[0], s), _pulse_us(f[1], s), _pulse_us(f[2], s), _pulse_us(f[3], s))
+    return (s.now_us & _UINT32, *pulses, *_NO_MORE_PORTS)
+
+
+@register_jitable
+def debug_vectors_of(s: Any) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """NED, what the DEBUG_VECT of `DEBUG_VECTORS` say."""
+    return (
+        ned_from_enu(s.x_load),
+        ned_from_enu(s.v_load),
+        ned_from_enu(s.q_cable),
+        ned_from_enu(s.e_x),
+    )
+
+
+@register_jitable
+def named_values_of(s: Any) -> tuple[float, float, float, float, float]:
+    """What the NAMED_VALUE_FLOAT of `NAMED_VALUES` say."""
+    down = -s.q_cable[2]
+    if not down < 1.0:
+        down = 1.0
+    elif not down > -1.0:
+        down = -1.0
+    x, y, z = s.e_x
+    return (s.tension, math.degrees(math.acos(down)), math.sqrt(x * x + y * y + z * z), s.psi_R, s.psi_q)
 
 
 @register_jitable

@@ -10,6 +10,7 @@ from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT
 from autopilot.services.stream_frames import StreamFrames
 from autopilot.services.streams import Streams
 from autopilot.wire.codec import FrameWriter, split
+from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Sign
 
@@ -42,6 +43,7 @@ class LinkState:
         number: int,
         signer: SignerOf,
         system: int,
+        home: Home,
     ) -> None:
         self.number = number  # that signatures bear
         self.signer = signer
@@ -49,7 +51,7 @@ class LinkState:
         self.streams = Streams(defaults, now_us)
         self.writers: dict[tuple[int, int], FrameWriter] = {}
         own, dialect = self._writer((system, AUTOPILOT_COMPONENT)), self._writer((system, DIALECT_COMPONENT))
-        self._streams = StreamFrames(own, dialect)
+        self._streams = StreamFrames(own, dialect, home)
         self.queue: list[Any] = []  # answers of the autopilot
         # streamed messages out of turn, in their order
         self.announced: dict[int, None] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: None}

@@ -105,20 +105,22 @@ class MissionService:
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
         self._ended: _Ended | None = None
-        self._numbered: dict[int, tuple[tuple[WireItem, ...], int]] = {}
+        self._numbered: tuple[tuple[WireItem, ...], ...] = ((), (), ())  # that `_plan_ids` were made of
+        self._plan_ids = (0, 0, 0)
 
     @property
     def plan_ids(self) -> tuple[int, int, int]:
         """Numbers of the versions of mission, fence and rally points in force; 0: there is none."""
         fence, rally = _AREAS
-        return (self._plan_id(_MISSION), self._plan_id(fence), self._plan_id(rally))
+        mission, fence_items, rally_items = self.mission.items, self.areas[fence], self.areas[rally]
+        known = self._numbered
+        if mission is not known[0] or fence_items is not known[1] or rally_items is not known[2]:
+            self._numbered = (mission, fence_items, rally_items)
+            self._plan_ids = (plan_id(mission), plan_id(fence_items), plan_id(rally_items))
+        return self._plan_ids
 
     def _plan_id(self, kind: int) -> int:
-        items = self.mission.items if kind == _MISSION else self.areas.get(kind, ())
-        known = self._numbered.get(kind)
-        if known is None or known[0] is not items:
-            known = self._numbered[kind] = (items, plan_id(items))
-        return known[1]
+        return self.plan_ids[(_MISSION, *_AREAS).index(kind)]
 
     # ---- upload
 

@@ -101,10 +101,7 @@ class Snapshot:
     v_load_asked: Vec3 = ZERO
     q_cable_c: Vec3 = _DOWN
     x_quad_d: Vec3 = _UNKNOWN  # where that wants the vehicle; NaN while it is not wanted anywhere
-    v_quad_d: Vec3 = ZERO
-    a_quad_d: Vec3 = ZERO
     quat_c_wxyz: Quat = _LEVEL
-    omega_c_body: Vec3 = ZERO
 
     # its errors and what it asks of the mixer
     e_x: Vec3 = ZERO

@@ -7,45 +7,84 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from math import isnan
+from typing import Any
 
 import numpy as np
 
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.packed import Row, unpack
+from autopilot.geometry.linear import Vec3
+from autopilot.geometry.packed import Row, packed, unpack
 from autopilot.services.instant import (
+    DEBUG_VECTORS,
+    NAMED_VALUES,
     Instant,
+    altitude_of,
     attitude_of,
     attitude_quaternion_of,
+    attitude_target_of,
     cascade_errors_of,
+    debug_vectors_of,
+    global_position_int_of,
     load_setpoint_of,
     load_state_of,
     local_position_ned_of,
+    named_values_of,
+    position_target_local_ned_of,
     rotor_state_of,
+    servo_output_raw_of,
+    vfr_hud_of,
 )
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM, Bytes, Origin, put_frame, wire_record
+from autopilot.wire.convert import Home, boot_ms
 from autopilot.wire.dialect import plumbline as mavlink
 
 ATTITUDE = wire_record(mavlink.MAVLink_attitude_message, __name__)
 ATTITUDE_QUATERNION = wire_record(mavlink.MAVLink_attitude_quaternion_message, __name__)
 LOCAL_POSITION_NED = wire_record(mavlink.MAVLink_local_position_ned_message, __name__)
+GLOBAL_POSITION_INT = wire_record(mavlink.MAVLink_global_position_int_message, __name__)
+ALTITUDE = wire_record(mavlink.MAVLink_altitude_message, __name__)
+VFR_HUD = wire_record(mavlink.MAVLink_vfr_hud_message, __name__)
+POSITION_TARGET_LOCAL_NED = wire_record(mavlink.MAVLink_position_target_local_ned_message, __name__)
+ATTITUDE_TARGET = wire_record(mavlink.MAVLink_attitude_target_message, __name__)
+SERVO_OUTPUT_RAW = wire_record(mavlink.MAVLink_servo_output_raw_message, __name__)
+DEBUG_VECT = wire_record(mavlink.MAVLink_debug_vect_message, __name__)
+NAMED_VALUE_FLOAT = wire_record(mavlink.MAVLink_named_value_float_message, __name__)
 LOAD_STATE = wire_record(mavlink.MAVLink_load_state_message, __name__)
 LOAD_SETPOINT = wire_record(mavlink.MAVLink_load_setpoint_message, __name__)
 CASCADE_ERRORS = wire_record(mavlink.MAVLink_cascade_errors_message, __name__)
 ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
 
 # a set of these streams is the sum of their bits, which rise in the order in which they are sent
-BITS = {
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: 1,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 2,
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 4,
-    mavlink.MAVLINK_MSG_ID_LOAD_STATE: 8,
-    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: 16,
-    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: 32,
-    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: 64,
-}
-_OF_AUTOPILOT = 1 | 2 | 4  # the others leave from the component of the dialect
+_WRITTEN = (
+    mavlink.MAVLINK_MSG_ID_ATTITUDE,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_ALTITUDE,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+    mavlink.MAVLINK_MSG_ID_DEBUG_VECT,
+    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE,  # from here on they leave from the component of the dialect
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
+)
+BITS = {key: 1 << i for i, key in enumerate(_WRITTEN)}
+_MOST_FRAMES = len(BITS) + len(DEBUG_VECTORS) + len(NAMED_VALUES)
+
+
+def _name(name: bytes) -> tuple[int, ...]:
+    return tuple(name.ljust(10, b"\0"))
+
+
+_POSITION, _VELOCITY, _CABLE, _ERROR = (_name(name) for name in DEBUG_VECTORS)
+_TENSION, _SWING, _DISTANCE, _PSI_R, _PSI_Q = (_name(name) for name in NAMED_VALUES)
 
 # a set of streams that are written together, or the keys of streams that are not written here
 Part = int | tuple[int, ...]
@@ -72,9 +111,24 @@ def parts_of(keys: tuple[int, ...]) -> tuple[Part, ...]:
 
 
 @kernel
+def _put_vector(
+    now_us: int, vector: Vec3, name: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin
+) -> int:
+    return put_frame(DEBUG_VECT, (now_us, *vector, *name), payload, buffer, at, origin)
+
+
+@kernel
+def _put_value(
+    now_us: int, value: float, name: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin
+) -> int:
+    return put_frame(NAMED_VALUE_FLOAT, (boot_ms(now_us), value, *name), payload, buffer, at, origin)
+
+
+@kernel
 def put_streams(
     streams: int,
     instant: Row,
+    home: Row,
     system: int,
     component: int,
     sequence: int,
@@ -82,63 +136,108 @@ def put_streams(
     dialect_sequence: int,
     payload: Bytes,
     buffer: Bytes,
-) -> int:
-    """Write the frames of a set of streams (`BITS`) at the begin of a buffer; how many bytes they have.
+) -> tuple[int, int, int]:
+    """Write the frames of a set of streams (`BITS`) at the begin of a buffer.
 
-    `instant` is a packed `Instant`; sequence numbers are those of the first frame of each component.
+    `instant` is a packed `Instant`, `home` a packed `Home`; sequence numbers are those of the first frame of
+    each component. Returns how many bytes there are, and the sequence numbers of the next frames.
     """
-    s = unpack(Instant, instant, 0)
+    s, place = unpack(Instant, instant, 0), unpack(Home, home, 0)
     at = 0
+    origin = Origin(sequence, system, component)
     if streams & 1:
-        origin = Origin(sequence, system, component)
         at = put_frame(ATTITUDE, attitude_of(s), payload, buffer, at, origin)
-        sequence += 1
+        origin = _next(origin)
     if streams & 2:
-        origin = Origin(sequence, system, component)
         at = put_frame(ATTITUDE_QUATERNION, attitude_quaternion_of(s), payload, buffer, at, origin)
-        sequence += 1
+        origin = _next(origin)
     if streams & 4:
-        origin = Origin(sequence, system, component)
         at = put_frame(LOCAL_POSITION_NED, local_position_ned_of(s), payload, buffer, at, origin)
+        origin = _next(origin)
     if streams & 8:
-        origin = Origin(dialect_sequence, system, dialect_component)
-        at = put_frame(LOAD_STATE, load_state_of(s), payload, buffer, at, origin)
-        dialect_sequence += 1
+        at = put_frame(GLOBAL_POSITION_INT, global_position_int_of(s, place), payload, buffer, at, origin)
+        origin = _next(origin)
     if streams & 16:
-        origin = Origin(dialect_sequence, system, dialect_component)
-        at = put_frame(LOAD_SETPOINT, load_setpoint_of(s), payload, buffer, at, origin)
-        dialect_sequence += 1
+        at = put_frame(ALTITUDE, altitude_of(s, place), payload, buffer, at, origin)
+        origin = _next(origin)
     if streams & 32:
-        origin = Origin(dialect_sequence, system, dialect_component)
+        at = put_frame(VFR_HUD, vfr_hud_of(s, place), payload, buffer, at, origin)
+        origin = _next(origin)
+    if streams & 64 and not isnan(s.x_quad_d[0]):
+        at = put_frame(
+            POSITION_TARGET_LOCAL_NED, position_target_local_ned_of(s), payload, buffer, at, origin
+        )
+        origin = _next(origin)
+    if streams & 128:
+        at = put_frame(ATTITUDE_TARGET, attitude_target_of(s), payload, buffer, at, origin)
+        origin = _next(origin)
+    if streams & 256:
+        at = put_frame(SERVO_OUTPUT_RAW, servo_output_raw_of(s), payload, buffer, at, origin)
+        origin = _next(origin)
+    if streams & 512:
+        position, velocity, cable, error = debug_vectors_of(s)
+        at = _put_vector(s.now_us, position, _POSITION, payload, buffer, at, origin)
+        origin = _next(origin)
+        at = _put_vector(s.now_us, velocity, _VELOCITY, payload, buffer, at, origin)
+        origin = _next(origin)
+        at = _put_vector(s.now_us, cable, _CABLE, payload, buffer, at, origin)
+        origin = _next(origin)
+        at = _put_vector(s.now_us, error, _ERROR, payload, buffer, at, origin)
+        origin = _next(origin)
+    if streams & 1024:
+        tension, swing, distance, psi_r, psi_q = named_values_of(s)
+        at = _put_value(s.now_us, tension, _TENSION, payload, buffer, at, origin)
+        origin = _next(origin)
+        at = _put_value(s.now_us, swing, _SWING, payload, buffer, at, origin)
+        origin = _next(origin)
+        at = _put_value(s.now_us, distance, _DISTANCE, payload, buffer, at, origin)
+        origin = _next(origin)
+        at = _put_value(s.now_us, psi_r, _PSI_R, payload, buffer, at, origin)
+        origin = _next(origin)
+        at = _put_value(s.now_us, psi_q, _PSI_Q, payload, buffer, at, origin)
+        origin = _next(origin)
+    own_sequence = origin.sequence
+    origin = Origin(dialect_sequence, system, dialect_component)
+    if streams & 2048:
+        at = put_frame(LOAD_STATE, load_state_of(s), payload, buffer, at, origin)
+        origin = _next(origin)
+    if streams & 4096:
+        at = put_frame(LOAD_SETPOINT, load_setpoint_of(s), payload, buffer, at, origin)
+        origin = _next(origin)
+    if streams & 8192:
         at = put_frame(CASCADE_ERRORS, cascade_errors_of(s), payload, buffer, at, origin)
-        dialect_sequence += 1
-    if streams & 64:
-        origin = Origin(dialect_sequence, system, dialect_component)
+        origin = _next(origin)
+    if streams & 16384:
         at = put_frame(ROTOR_STATE, rotor_state_of(s), payload, buffer, at, origin)
-    return at
+        origin = _next(origin)
+    return at, own_sequence & 0xFF, origin.sequence & 0xFF
+
+
+@kernel
+def _next(origin: Origin) -> Origin:
+    return Origin(origin.sequence + 1, origin.system, origin.component)
 
 
 class StreamFrames:
     """Makes the frames of these streams on one link, in the sequences of its two components."""
 
-    def __init__(self, autopilot: FrameWriter, dialect: FrameWriter) -> None:
+    def __init__(self, autopilot: FrameWriter, dialect: FrameWriter, home: Home) -> None:
         self._autopilot = autopilot
         self._dialect = dialect
+        self._home = packed(home)
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
-        self._buffer = np.zeros(len(BITS) * FRAME_ROOM, np.uint8)
-        self._written = memoryview(self._buffer)
-        self._put: Callable[..., int] | None = None  # the machine code, once it was asked for
+        self._buffer = np.zeros(_MOST_FRAMES * FRAME_ROOM, np.uint8)
+        self._written = self._buffer.data
+        self._put: Callable[..., tuple[int, int, int]] | None = None  # machine code, once it was asked for
 
     def frames(self, streams: int, instant: Row) -> bytes:
         """The frames of a set of streams (`BITS`), one behind the other."""
         autopilot, dialect = self._autopilot, self._dialect
         arguments = (
-            *(streams, instant, autopilot.system, autopilot.component, autopilot.sequence),
+            *(streams, instant, self._home, autopilot.system, autopilot.component, autopilot.sequence),
             *(dialect.component, dialect.sequence, self._payload, self._buffer),
         )
         if self._put is None:
             self._put = entry_of(put_streams, *arguments)
-        end = self._put(*arguments)
-        autopilot.sequence = (autopilot.sequence + (streams & _OF_AUTOPILOT).bit_count()) & 0xFF
-        dialect.sequence = (dialect.sequence + (streams & ~_OF_AUTOPILOT).bit_count()) & 0xFF
+        end, autopilot.sequence, dialect.sequence = self._put(*arguments)
         return self._written[:end].tobytes()

@@ -24,30 +24,35 @@ from autopilot.services.identity import (
     protocol_version_message,
 )
 from autopilot.services.instant import (
+    DEBUG_VECTORS,
+    NAMED_VALUES,
+    altitude_of,
     attitude_of,
     attitude_quaternion_of,
+    attitude_target_of,
     cascade_errors_of,
+    debug_vectors_of,
+    global_position_int_of,
     load_setpoint_of,
     load_state_of,
     local_position_ned_of,
+    named_values_of,
+    position_target_local_ned_of,
     rotor_state_of,
+    servo_output_raw_of,
+    vfr_hud_of,
 )
 from autopilot.services.snapshot import PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import (
-    ROTOR_FMAX,
-    altitude_message,
-    attitude_target_message,
     boot_ms,
     global_position_int_message,
     gps_global_origin_message,
     gps_raw_int_message,
     home_position_message,
-    position_target_local_ned_message,
     saturated,
     uint16,
-    vfr_hud_message,
     winch_status_message,
 )
 from autopilot.wire.convert.axes import ned_from_enu
@@ -62,21 +67,18 @@ _LOAD_STATE = layout_of(mavlink.MAVLink_load_state_message)
 _LOAD_SETPOINT = layout_of(mavlink.MAVLink_load_setpoint_message)
 _CASCADE_ERRORS = layout_of(mavlink.MAVLink_cascade_errors_message)
 _ROTOR_STATE = layout_of(mavlink.MAVLink_rotor_state_message)
+_GLOBAL_POSITION_INT = layout_of(mavlink.MAVLink_global_position_int_message)
+_ALTITUDE = layout_of(mavlink.MAVLink_altitude_message)
+_VFR_HUD = layout_of(mavlink.MAVLink_vfr_hud_message)
+_POSITION_TARGET_LOCAL_NED = layout_of(mavlink.MAVLink_position_target_local_ned_message)
+_ATTITUDE_TARGET = layout_of(mavlink.MAVLink_attitude_target_message)
 _SERVO_OUTPUT_RAW = layout_of(mavlink.MAVLink_servo_output_raw_message)
 _DEBUG_VECT = layout_of(mavlink.MAVLink_debug_vect_message)
 _NAMED_VALUE_FLOAT = layout_of(mavlink.MAVLink_named_value_float_message)
 
 _UINT16 = 0xFFFF  # "unknown" in most unsigned fields
 _INT16 = 0x7FFF  # "unknown" temperature
-_UINT32 = 0xFFFFFFFF
 _IN_MISSION_MODE, _SUSPENDED = 1, 2  # MISSION_CURRENT.mission_mode
-_PWM_STOP, _PWM_FULL = 1000, 2000  # SERVO_OUTPUT_RAW as most tools expect it, us
-
-
-def _force_fraction(force: float, snapshot: Snapshot) -> float:
-    """Share of what one rotor can give; a rotor without limit counts as the nominal one."""
-    scale = snapshot.rotor_max if math.isfinite(snapshot.rotor_max) else ROTOR_FMAX
-    return force / scale
 
 
 def _heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -158,7 +160,7 @@ def _gps_raw_int(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _global_position_int(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (global_position_int_message(s.now_us, s.x_quad, s.v_quad, s.quat_wxyz, s.home),)
+    return ((_GLOBAL_POSITION_INT, global_position_int_of(s, s.home)),)
 
 
 def _gps_global_origin(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -182,12 +184,11 @@ def _attitude_quaternion(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 
 def _altitude(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (altitude_message(s.now_us, s.x_quad[2], s.home),)
+    return ((_ALTITUDE, altitude_of(s, s.home)),)
 
 
 def _vfr_hud(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    throttle = _force_fraction(0.25 * sum(s.forces), s)
-    return (vfr_hud_message(s.v_quad, s.quat_wxyz, s.x_quad[2], throttle, s.home),)
+    return ((_VFR_HUD, vfr_hud_of(s, s.home)),)
 
 
 def _fence_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -269,42 +270,25 @@ def _protocol_version(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 def _position_target_local_ned(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     if math.isnan(s.x_quad_d[0]):
         return ()
-    return (position_target_local_ned_message(s.now_us, s.x_quad_d, s.v_quad_d, s.a_quad_d),)
+    return ((_POSITION_TARGET_LOCAL_NED, position_target_local_ned_of(s)),)
 
 
 def _attitude_target(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    thrust = _force_fraction(0.25 * s.thrust, s)
-    return (attitude_target_message(s.now_us, s.quat_c_wxyz, s.omega_c_body, thrust),)
+    return ((_ATTITUDE_TARGET, attitude_target_of(s)),)
 
 
 def _servo_output_raw(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    span = _PWM_FULL - _PWM_STOP
-    pwm = [saturated(_PWM_STOP + span * _force_fraction(f, s), _PWM_STOP, _PWM_FULL) for f in s.forces]
-    return (
-        (_SERVO_OUTPUT_RAW, (s.now_us & _UINT32, *pwm, *(0,) * 13)),
-    )  # the first port; others give nothing
+    return ((_SERVO_OUTPUT_RAW, servo_output_raw_of(s)),)
 
 
 def _debug_vect(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    vectors = (
-        (b"LOAD_POS", s.x_load),
-        (b"LOAD_VEL", s.v_load),
-        (b"CABLE_Q", s.q_cable),
-        (b"LOAD_ERR", s.e_x),
-    )
-    return tuple((_DEBUG_VECT, (s.now_us, *ned_from_enu(vector), name)) for name, vector in vectors)
+    named = zip(debug_vectors_of(s), DEBUG_VECTORS, strict=True)
+    return tuple((_DEBUG_VECT, (s.now_us, *vector, name)) for vector, name in named)
 
 
 def _named_value_float(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    swing = math.degrees(math.acos(max(-1.0, min(1.0, -s.q_cable[2]))))
-    values = (
-        (b"TENSION", s.tension),
-        (b"SWING", swing),
-        (b"LOAD_ERR", math.hypot(*s.e_x)),
-        (b"PSI_R", s.psi_R),
-        (b"PSI_Q", s.psi_q),
-    )
-    return tuple((_NAMED_VALUE_FLOAT, (boot_ms(s.now_us), value, name)) for name, value in values)
+    named = zip(named_values_of(s), NAMED_VALUES, strict=True)
+    return tuple((_NAMED_VALUE_FLOAT, (boot_ms(s.now_us), value, name)) for value, name in named)
 
 
 def _winch_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

@@ -44,6 +44,7 @@ _NUMBERS = {
     "int16_t": (2, "int16"),
     "uint8_t": (1, "uint8"),
     "int8_t": (1, "int8"),
+    "char": (1, "uint8"),  # a text is the numbers of its bytes
 }
 
 
@@ -79,7 +80,7 @@ _LAYOUTS: dict[Any, _Layout] = {}
 
 
 def wire_record(message_type: Any, module: str) -> Any:
-    """The record type of one of pymavlink's classes; a message with text raises KeyError.
+    """The record type of one of pymavlink's classes; a text in it is a tuple of the numbers of its bytes.
 
     It must be kept in this module under the name of the message, where numba finds it when it loads machine
     code.

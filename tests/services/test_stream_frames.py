@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from types import SimpleNamespace
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -23,6 +24,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing
 from tests.services.conftest import make_table
 
+HOME = Home(-33.5, 179.9999, 120.0)  # where degrees of longitude end
 ALL = sum(BITS.values())
 KINDS = [get_type_hints(Instant)[name] for name in Instant._fields]
 
@@ -46,12 +48,12 @@ def row_of(rng: np.random.Generator, hostile: bool) -> Any:
 
 
 def made_one_by_one(streams: int, said: Instant, writers: dict[int, FrameWriter]) -> bytes:
-    snapshot: Any = said
+    snapshot: Any = SimpleNamespace(**said._asdict(), home=HOME)
     frames = []
     for key, bit in BITS.items():
         if streams & bit:
-            (message,) = STREAMS[key].build(snapshot, Identity())
-            frames.append(writers[STREAMS[key].component].frame(message))
+            writer = writers[STREAMS[key].component]
+            frames += [writer.frame(message) for message in STREAMS[key].build(snapshot, Identity())]
     return b"".join(frames)
 
 
@@ -61,8 +63,10 @@ def numbers(datagram: bytes) -> list[tuple[int, int, int, list[Any]]]:
     assert junk == 0
     found = []
     for one in received:
-        fields = np.hstack([np.ravel(v) for k, v in one.message.to_dict().items() if k != "mavpackettype"])
-        said = ["NaN" if math.isnan(number) else float(number) for number in fields]
+        message = one.message
+        fields = (getattr(message, name) for name in message.fieldnames)
+        values = [value for field in fields for value in (field if isinstance(field, list) else [field])]
+        said = ["NaN" if isinstance(value, float) and math.isnan(value) else value for value in values]
         found.append((one.sequence, one.component, one.id, said))
     return found
 
@@ -70,7 +74,8 @@ def numbers(datagram: bytes) -> list[tuple[int, int, int, list[Any]]]:
 @pytest.mark.parametrize("hostile", [False, True])
 def test_frames_are_those_of_the_general_writer(hostile: bool) -> None:
     rng = np.random.default_rng(1)
-    link = StreamFrames(FrameWriter(7, AUTOPILOT_COMPONENT), FrameWriter(7, DIALECT_COMPONENT))
+    own, dialect = FrameWriter(7, AUTOPILOT_COMPONENT), FrameWriter(7, DIALECT_COMPONENT)
+    link = StreamFrames(own, dialect, HOME)
     writers = {component: FrameWriter(7, component) for component in (AUTOPILOT_COMPONENT, DIALECT_COMPONENT)}
     for _ in range(600):
         row, streams = row_of(rng, hostile), int(rng.integers(1, ALL + 1))

@@ -182,9 +182,16 @@ def test_a_signed_frame_and_one_of_version_1_are_left_to_the_general_decoder() -
     assert frame_end(b"\xfe" + SENSOR_FRAME[1:], 0) == 0
 
 
-def test_a_message_with_text_has_no_record() -> None:
-    with pytest.raises(KeyError):
-        wire_record(mavlink.MAVLink_statustext_message, __name__)
+def test_a_text_is_written_as_the_numbers_of_its_bytes() -> None:
+    record = wire_record(mavlink.MAVLink_named_value_float_message, __name__)
+    payload, buffer = np.zeros(PAYLOAD_ROOM, np.uint8), np.zeros(FRAME_ROOM, np.uint8)
+    name = tuple(b"SWING".ljust(10, b"\0"))
+    end = put_frame(record, (7, 0.5, *name), payload, buffer, 0, Origin(3, 1, 1))
+    link = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    link.seq = 3
+    assert bytes(buffer[:end]) == mavlink.MAVLink_named_value_float_message(7, b"SWING", 0.5).pack(link)
+    assert holds(record, bytes(buffer[:end]), 0, payload)
+    assert taken(record, payload).name == name
 
 
 # ---- the answer to a tick

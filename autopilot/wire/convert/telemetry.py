@@ -27,6 +27,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 _UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
 _NO_OFFSET: Quat = (0.0, 0.0, 0.0, 0.0)  # ATTITUDE_QUATERNION.repr_offset_q: none is given
+_NO_HEADING = 0xFFFF
 _NOTHING_MORE = (0,) * 6  # GPS_RAW_INT: its accuracies are in the dilutions, and it has no heading
 _ATTITUDE = layout_of(mavlink.MAVLink_attitude_message)
 _ATTITUDE_QUATERNION = layout_of(mavlink.MAVLink_attitude_quaternion_message)
@@ -65,10 +66,11 @@ def euler_ned_frd(quat_wxyz: Quat) -> Vec3:
     )
 
 
+@register_jitable
 def heading_cdeg(quat_wxyz: Quat) -> int:
     """Heading in 0 ... 35999 hundredths of a degree from north; 65535 (unknown) for an attitude of NaN."""
     yaw = euler_ned_frd(quat_wxyz)[2]
-    return 0xFFFF if math.isnan(yaw) else round(math.degrees(yaw) * 100.0) % 36000
+    return _NO_HEADING if math.isnan(yaw) else round(math.degrees(yaw) * 100.0) % 36000
 
 
 @register_jitable
@@ -139,13 +141,14 @@ def read_local_position_ned(m: Any) -> LocalPosition:
     return LocalPosition(m.time_boot_ms, enu_from_ned((m.x, m.y, m.z)), enu_from_ned((m.vx, m.vy, m.vz)))
 
 
-def global_position_int_message(
-    now_us: int, position: Vec3, velocity: Vec3, quat_wxyz: Quat | None, home: Home
-) -> Fields:
-    """GLOBAL_POSITION_INT; without an attitude the heading is unknown."""
+@register_jitable
+def global_position_int_values(
+    now_us: int, position: Vec3, velocity: Vec3, heading: int, home: Home
+) -> tuple[float, ...]:
+    """GLOBAL_POSITION_INT: the numbers in the order of the wire; `heading` in hundredths of a degree."""
     latitude, longitude, altitude = geodetic_from_enu(position, home)
     north, east, down = ned_from_enu(velocity)
-    return _GLOBAL_POSITION_INT, (
+    return (
         boot_ms(now_us),
         latitude,
         longitude,
@@ -154,8 +157,16 @@ def global_position_int_message(
         int16(north * 100.0),
         int16(east * 100.0),
         int16(down * 100.0),
-        0xFFFF if quat_wxyz is None else heading_cdeg(quat_wxyz),
+        heading,
     )
+
+
+def global_position_int_message(
+    now_us: int, position: Vec3, velocity: Vec3, quat_wxyz: Quat | None, home: Home
+) -> Fields:
+    """GLOBAL_POSITION_INT; without an attitude the heading is unknown."""
+    heading = _NO_HEADING if quat_wxyz is None else heading_cdeg(quat_wxyz)
+    return _GLOBAL_POSITION_INT, global_position_int_values(now_us, position, velocity, heading, home)
 
 
 def gps_raw_int_message(
@@ -186,23 +197,44 @@ def gps_raw_int_message(
     )
 
 
-def altitude_message(now_us: int, height: float, home: Home) -> Fields:
-    """ALTITUDE for a height in m above home; the ground is flat at home's altitude."""
+@register_jitable
+def altitude_values(now_us: int, height: float, home: Home) -> tuple[float, ...]:
+    """ALTITUDE: the numbers in the order of the wire, for a height in m above home; the ground is flat at
+    home's altitude."""
     above_sea = home.altitude_m + height
-    return _ALTITUDE, (now_us, height, above_sea, height, height, home.altitude_m, height)
+    return (now_us, height, above_sea, height, height, home.altitude_m, height)
+
+
+def altitude_message(now_us: int, height: float, home: Home) -> Fields:
+    """ALTITUDE for a height in m above home."""
+    return _ALTITUDE, altitude_values(now_us, height, home)
+
+
+@register_jitable
+def vfr_hud_values(
+    velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home
+) -> tuple[float, ...]:
+    """VFR_HUD: the numbers in the order of the wire; `throttle` is a fraction, speeds are taken through
+    still air."""
+    heading = heading_cdeg(quat_wxyz)
+    east, north, up = velocity
+    level = east * east + north * north
+    share = 0.0
+    if throttle > 0.0:
+        share = throttle if throttle < 1.0 else 1.0
+    return (
+        math.sqrt(level + up * up),
+        math.sqrt(level),
+        home.altitude_m + height,
+        up,
+        0 if heading == _NO_HEADING else heading // 100,
+        uint16(share * 100.0),
+    )
 
 
 def vfr_hud_message(velocity: Vec3, quat_wxyz: Quat, height: float, throttle: float, home: Home) -> Fields:
-    """VFR_HUD; `throttle` is a fraction, speeds are taken through still air."""
-    heading = heading_cdeg(quat_wxyz)
-    return _VFR_HUD, (
-        math.hypot(*velocity),
-        math.hypot(velocity[0], velocity[1]),
-        home.altitude_m + height,
-        velocity[2],
-        0 if heading == 0xFFFF else heading // 100,
-        uint16(min(1.0, max(0.0, throttle)) * 100.0),
-    )
+    """VFR_HUD."""
+    return _VFR_HUD, vfr_hud_values(velocity, quat_wxyz, height, throttle, home)
 
 
 def home_position_message(now_us: int, launch: Vec3, home: Home) -> Fields:
@@ -226,11 +258,12 @@ def gps_global_origin_message(now_us: int, home: Home) -> Fields:
     return _GPS_GLOBAL_ORIGIN, (*geodetic_from_enu(ZERO, home), now_us)
 
 
-def position_target_local_ned_message(
+@register_jitable
+def position_target_local_ned_values(
     now_us: int, position: Vec3, velocity: Vec3, acceleration: Vec3
-) -> Fields:
-    """POSITION_TARGET_LOCAL_NED: the setpoint in force."""
-    return _POSITION_TARGET_LOCAL_NED, (
+) -> tuple[float, ...]:
+    """POSITION_TARGET_LOCAL_NED: the numbers in the order of the wire."""
+    return (
         boot_ms(now_us),
         *ned_from_enu(position),
         *ned_from_enu(velocity),
@@ -242,15 +275,32 @@ def position_target_local_ned_message(
     )
 
 
-def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float) -> Fields:
-    """ATTITUDE_TARGET: what the inner loop is asked for."""
-    return _ATTITUDE_TARGET, (
+def position_target_local_ned_message(
+    now_us: int, position: Vec3, velocity: Vec3, acceleration: Vec3
+) -> Fields:
+    """POSITION_TARGET_LOCAL_NED: the setpoint in force."""
+    return _POSITION_TARGET_LOCAL_NED, position_target_local_ned_values(
+        now_us, position, velocity, acceleration
+    )
+
+
+@register_jitable
+def attitude_target_values(
+    now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float
+) -> tuple[float, ...]:
+    """ATTITUDE_TARGET: the numbers in the order of the wire."""
+    return (
         boot_ms(now_us),
         *quat_ned_frd_from_enu_flu(quat_wxyz),
         *frd_from_flu(omega_body),
         thrust_fraction,
         0,
     )
+
+
+def attitude_target_message(now_us: int, quat_wxyz: Quat, omega_body: Vec3, thrust_fraction: float) -> Fields:
+    """ATTITUDE_TARGET: what the inner loop is asked for."""
+    return _ATTITUDE_TARGET, attitude_target_values(now_us, quat_wxyz, omega_body, thrust_fraction)
 
 
 def winch_status_message(now_us: int, cable_length: float, tension: float, rate: float = 0.0) -> Fields:
