@@ -182,6 +182,7 @@ def run_lockstep(
     watch = Watch(say)
     period_ns = round(simulator.tick_us * 1000 / speed) if speed else 0
     due = time.perf_counter_ns()
+    link.timeout(_RESEND_FIRST_S)
     while True:
         stop.check()
         if period_ns:
@@ -190,25 +191,31 @@ def run_lockstep(
             _sleep_until(due)
         link.gather_truth(simulator)
         link.send(simulator)
-        began = sent = time.monotonic()
-        silence_s = _RESEND_FIRST_S
-        link.timeout(silence_s)
-        while not simulator.answered:
-            stop.check()
-            arrived = link.receive()
-            greeted = arrived is not None and link.take(*arrived, simulator)
-            if simulator.answered:
-                break
-            # not for every stray datagram: the answer to one doubled tick would double all that follow
-            now = time.monotonic()
-            if arrived is None or greeted or now - sent >= silence_s:
-                link.send(simulator)
-                sent = now
-                silence_s = min(2.0 * silence_s, _RESEND_LAST_S)
-                link.timeout(silence_s)
-            watch.silence(began, link, simulator)
-        watch.heard(link)
+        arrived = link.receive()
+        greeted = arrived is not None and link.take(*arrived, simulator)
+        if not simulator.answered:
+            _insist(link, simulator, stop, watch, arrived is None or greeted)
         simulator.advance()
+
+
+def _insist(link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool) -> None:
+    """Until the present tick is answered, send it again; `again`: at once, for nothing came, or a greeting."""
+    began = sent = time.monotonic()
+    silence_s = _RESEND_FIRST_S
+    while not simulator.answered:
+        stop.check()
+        # not for every stray datagram: the answer to one doubled tick would double all that follow
+        now = time.monotonic()
+        if again or now - sent >= silence_s:
+            link.send(simulator)
+            sent = now
+            silence_s = min(2.0 * silence_s, _RESEND_LAST_S)
+            link.timeout(silence_s)
+        watch.silence(began, link, simulator)
+        arrived = link.receive()
+        again = arrived is None or link.take(*arrived, simulator)
+    link.timeout(_RESEND_FIRST_S)
+    watch.heard(link)
 
 
 def run_real_time(

@@ -21,7 +21,7 @@ from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
-from autopilot.wire.simulator_frames import answer_in
+from autopilot.wire.simulator_frames import Answer, answer_in
 from sitl.messages import (
     CAMERA,
     ENCODER,
@@ -93,7 +93,10 @@ class HilSimulator:
         self._home = home
         self._lockstep = lockstep
         self._truth_every = truth_every
-        self._put_sensors: Callable[..., tuple[int, int]] | None = None  # its machine code, once it was run
+        # machine code, once it was asked for
+        self._put_sensors: Callable[..., tuple[int, int]] | None = None
+        self._put_truth: Callable[..., int] | None = None
+        self._answer_in: Callable[..., Answer] | None = None
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
@@ -118,6 +121,7 @@ class HilSimulator:
         sensors, waiting, _ = core.rows.queue.shape
         # a frame of each reading that can be on its way, and HIL_SENSOR
         self._buffer = np.zeros((sensors * waiting + 1) * FRAME_ROOM, np.uint8)
+        self._written = self._buffer.data
         self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
         self._truth_made = False
@@ -188,9 +192,11 @@ class HilSimulator:
         ignored: other messages, systems and ticks, rubbish.
         In real time a late command is still the newest one, and is used.
         """
-        answer = answer_in(datagram, VEHICLE_SYSTEM, self._payload)
-        if answer[0]:
-            self._take(*answer[1:])
+        if self._answer_in is None:
+            self._answer_in = entry_of(answer_in, datagram, VEHICLE_SYSTEM, self._payload)
+        plain, *answer = self._answer_in(datagram, VEHICLE_SYSTEM, self._payload)
+        if plain:
+            self._take(*answer)
             return self.answered
         was_answered = self.answered
         aside = []
@@ -219,7 +225,7 @@ class HilSimulator:
             self.answered = True
         elif self._lockstep or not self._command_us < time_us < now_us:
             return
-        if not all(map(isfinite, forces)):
+        if not isfinite(forces[0] + forces[1] + forces[2] + forces[3]):
             self.rejected += 1
         else:
             self._command = forces if armed else STOPPED
@@ -274,7 +280,8 @@ class HilSimulator:
         if self._put_sensors is None:
             self._put_sensors = entry_of(put_sensors, *arguments)
         length, writer.sequence = self._put_sensors(*arguments)
-        return first + self._buffer[:length].tobytes()
+        frames = self._written[:length].tobytes()
+        return first + frames if first else frames
 
     def _truth_frames(self) -> bytes | None:
         core = self.core
@@ -287,9 +294,12 @@ class HilSimulator:
         writer, datagram = self._truth_writer, b""
         if due:
             room = (self._buffer, self._payload)
-            length = put_truth(core.rows.world, core.rows.model, self._statement, *room, writer.sequence)
+            rows = (core.rows.world, core.rows.model, self._statement)
+            if self._put_truth is None:
+                self._put_truth = entry_of(put_truth, *rows, *room, writer.sequence)
+            length = self._put_truth(*rows, *room, writer.sequence)
             writer.sequence = (writer.sequence + TRUTH_FRAMES) & 0xFF
-            datagram = self._buffer[:length].tobytes()
+            datagram = self._written[:length].tobytes()
         if wind_due or snapped:
             datagram += b"".join(map(writer.frame, self._events(wind_due, snapped, status_due)))
         return datagram

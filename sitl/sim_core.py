@@ -79,7 +79,7 @@ class SimCore:
     @property
     def snap_speed(self) -> float:
         """Speed (m/s) at which the cable came taut in the last tick; 0: it did not."""
-        return float(self.rows.world[_SNAP_SPEED])
+        return float(self.rows.world.item(_SNAP_SPEED))
 
     @property
     def cable_length(self) -> float:
