@@ -199,7 +199,7 @@ def run_lockstep(
 
 
 def _insist(link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool) -> None:
-    """Until the present tick is answered, send it again; `again`: at once, for nothing came, or a greeting."""
+    """Until the present tick is answered, send it again; `again`: at once, as nothing came or a greeting."""
     began = sent = time.monotonic()
     silence_s = _RESEND_FIRST_S
     while not simulator.answered:

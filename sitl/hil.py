@@ -194,9 +194,9 @@ class HilSimulator:
         """
         if self._answer_in is None:
             self._answer_in = entry_of(answer_in, datagram, VEHICLE_SYSTEM, self._payload)
-        plain, *answer = self._answer_in(datagram, VEHICLE_SYSTEM, self._payload)
-        if plain:
-            self._take(*answer)
+        answer = self._answer_in(datagram, VEHICLE_SYSTEM, self._payload)
+        if answer[0]:
+            self._take(*answer[1:])
             return self.answered
         was_answered = self.answered
         aside = []

@@ -20,7 +20,6 @@ from autopilot.estimation.inbox import (
     POSE,
     READING,
     SHOWS,
-    is_sane,
     new_inbox,
 )
 from autopilot.estimation.records import (
@@ -197,29 +196,17 @@ class SensorInbox:
         than `since_us` the sample and the fix are kept.
         """
         aside: tuple[Any, ...] = ()
-        found = self._read(datagram, since_us)
-        if found[0] == _NOT_PLAIN:
+        kept = (self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+        if self._entry is None:
+            self._entry = entry_of(_read, datagram, *kept)
+        count, now_us, fields, fixed = self._entry(datagram, *kept)
+        if count == _NOT_PLAIN:
             messages = [one.message for one in decode(datagram)[0]]
             aside = tuple(message for message in messages if message.get_msgId() not in _SENSORS)
             sensors = (message for message in messages if message.get_msgId() in _SENSORS)
-            found = self._read(b"".join(map(self._writer.frame, sensors)), since_us)
-        count, now_us, fields, fixed = found
-        if count < 0:
-            return None
-        return Tick(now_us, count, fields, fixed, aside)
-
-    def _read(self, datagram: bytes, since_us: int) -> tuple[int, int, int, bool]:
-        kept = (self.imu, self.fix, self._payload)
-        if self._entry is None:
-            self._entry = entry_of(_read, datagram, self._home, since_us, self.rows, *kept)
-        found = self._entry(datagram, self._home, since_us, self.rows, *kept)
-        if found[0] > len(self.rows):
-            self.rows = new_inbox(2 * found[0])
-            found = self._entry(datagram, self._home, since_us, self.rows, *kept)
-        return found
-
-    @property
-    def sample(self) -> ImuReading | None:
-        """The inertial sample of the last tick; None where it was no number or beyond any sensor's range."""
-        imu = unpack(ImuReading, self.imu, 0)
-        return imu if is_sane(imu) else None
+            datagram = b"".join(map(self._writer.frame, sensors))
+            count, now_us, fields, fixed = self._entry(datagram, *kept)
+        if count > len(self.rows):
+            self.rows = new_inbox(2 * count)
+            self._entry(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+        return Tick(now_us, count, fields, fixed, aside) if count >= 0 else None

@@ -20,7 +20,7 @@ from autopilot.control.believed import (
 )
 from autopilot.control.laws import build_law, chosen_law
 from autopilot.core.flight_core import FlightCore, Setup, commanded_rate
-from autopilot.core.health import Condition, battery_constants, follow
+from autopilot.core.health import Condition, battery_constants
 from autopilot.core.scheduler import RateError, divider
 from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse
@@ -33,7 +33,8 @@ from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import Moment, Moments, Options
-from autopilot.onboard.warmup import rehearse_telemetry
+from autopilot.onboard.tick_answer import answer_tick
+from autopilot.onboard.warmup import rehearse_answer, rehearse_telemetry
 from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.heartbeat import heartbeat_message
@@ -63,7 +64,6 @@ from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
-from autopilot.wire.simulator_frames import put_answer
 from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
@@ -139,14 +139,14 @@ class Onboard:
         self._options = options
         self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
         self._answer = b""
+        self._sensed = False  # the inertial sample of this tick is sane
         self._health = packed(Condition())
         self._battery_row = packed(battery_constants(parameters))
         self._frame = np.zeros(FRAME_ROOM, np.uint8)
         self._written = self._frame.data
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         # machine code, once it was asked for
-        self._put: Callable[..., int] | None = None
-        self._follow: Callable[..., None] | None = None
+        self._put: Callable[..., tuple[int, bool]] | None = None
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
@@ -160,6 +160,7 @@ class Onboard:
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
+        self.logged = False  # since the log was taken last
         self._log: FlightLog | None = None
         if options.log:
             release = ".".join(map(str, identity.version))
@@ -184,29 +185,30 @@ class Onboard:
         self.out_of_time = 0
         if now_us == before_us and begun:
             return self._answer
-        self._run(tick)
-        answer = self._put_answer(now_us)
-        writer = self._writer
-        writer.sequence = (writer.sequence + 1) & 0xFF
-        aside = self._world.messages(now_us)
+        answer = self._run(tick)
+        aside = self._world.messages(now_us) if self._world.speaks else []
         if self._reboot:
             aside.append(_REBOOT)
         if aside:
-            answer += b"".join(map(writer.frame, aside))
+            answer += b"".join(map(self._writer.frame, aside))
         self._answer = answer
         return answer
 
-    def _put_answer(self, now_us: int) -> bytes:
-        """HIL_ACTUATOR_CONTROLS of this tick."""
-        core, writer = self.core, self._writer
+    def _put_answer(self, tick: Tick, dt: float) -> bytes:
+        """HIL_ACTUATOR_CONTROLS of this tick, to which the vehicle's condition is brought."""
+        core, writer, now_us = self.core, self._writer, tick.now_us
+        flight = core.flight
         arguments = (
-            *(self._frame, self._payload, writer.sequence, writer.system, writer.component, now_us),
-            *(core.force_row, self.armed, self._options.lockstep, core.flight.cable.released),
-            commanded_rate(core.flight, now_us, self._shortest_us * 1e-6) if core.reels else 0.0,
+            *(self._health, self._sensors.imu, core.force_row, self._battery_row),
+            *(tick.fields_updated, tick.fixed, now_us, dt, self._frame, self._payload),
+            *(writer.sequence, writer.system, writer.component, flight.phase not in _UNARMED),
+            *(self._options.lockstep, flight.cable.released),
+            commanded_rate(flight, now_us, self._shortest_us * 1e-6) if core.reels else 0.0,
         )
         if self._put is None:
-            self._put = entry_of(put_answer, *arguments)
-        end = self._put(*arguments)
+            self._put = entry_of(answer_tick, *arguments)
+        end, self._sensed = self._put(*arguments)
+        writer.sequence = (writer.sequence + 1) & 0xFF
         return self._written[:end].tobytes()
 
     @property
@@ -219,10 +221,12 @@ class Onboard:
         """Whether rotors may turn."""
         return self.core.flight.phase not in _UNARMED
 
-    def _run(self, tick: Tick) -> None:
-        period_us = tick.now_us - self.now_us if self.tick >= 0 else 0
+    def _run(self, tick: Tick) -> bytes:
+        """One tick of the flight software; the answer to it."""
+        now_us = tick.now_us
+        period_us = now_us - self.now_us if self.tick >= 0 else 0
         self.tick += 1
-        self.now_us = tick.now_us
+        self.now_us = now_us
         if tick.fixed:
             self._moments.fixed = True
         for message in tick.aside:
@@ -233,29 +237,25 @@ class Onboard:
             self._follow_parameters()
         elif self.parameters.version != self._version:
             self._follow_parameters()
-        if self.fault:
-            return
         dt = period_us * 1e-6
+        if self.fault:
+            return self._put_answer(tick, dt)
         core, sensors = self.core, self._sensors
         if sensors.rows is not core.rows.inbox:
             core.take_inbox(sensors.rows)
-        report = core.step(tick.readings, tick.now_us, self.tick, dt)
-        self._follow_health(tick.fields_updated, tick.fixed, dt)
+        report = core.step(tick.readings, now_us, self.tick, dt)
+        answer = self._put_answer(tick, dt)
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
         for seq in report.reached:
             last = self.core.flight.mission.done and seq == report.reached[-1]
             self.endpoint.item_reached(seq, last)
         log = self._log
-        if log is not None and log.due(tick.now_us, self.armed):
-            log.step(self.now_us, self.armed, self._log_names, self.log_sample)
+        if log is not None and log.due(now_us, self.armed):
+            log.step(now_us, self.armed, self._log_names, self.log_sample)
+            self.logged = True
             self.endpoint.files.protected = log.path
-
-    def _follow_health(self, fields: int, fixed: bool, dt: float) -> None:
-        rows = (self._health, self._sensors.imu, self.core.force_row, self._battery_row)
-        if self._follow is None:
-            self._follow = entry_of(follow, *rows, fields, fixed, self.now_us, dt)
-        self._follow(*rows, fields, fixed, self.now_us, dt)
+        return answer
 
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -269,6 +269,7 @@ class Onboard:
 
     def take_log(self, least_bytes: int = 1) -> LogChunk | None:
         """What is to be stored of the flight log, once it is so much or the log has ended."""
+        self.logged = False
         return None if self._log is None else self._log.take(least_bytes)
 
     def end_log(self) -> None:
@@ -292,8 +293,7 @@ class Onboard:
     def log_sample(self) -> Sample:
         """What the flight log records at this tick."""
         moment = self._snapshot()
-        sane = self._sensors.sample is not None
-        return Sample(moment, moment.instant, self._sensors.imu, sane, lambda: moment.estimator)
+        return Sample(moment, moment.instant, self._sensors.imu, self._sensed, lambda: moment.estimator)
 
     def _log_text(self, severity: int, text: str) -> None:
         if self._log is not None:
@@ -386,9 +386,7 @@ class Onboard:
     def rehearse_messages(self) -> None:
         """Of these the ones of the simulator link, of telemetry and of the flight log."""
         self._sensors.read(b"", -1)
-        self._put_answer(0)
-        health = packed(Condition())
-        follow(health, self._sensors.imu, self.core.force_row, self._battery_row, 0, False, 0, 0.0)
+        rehearse_answer()
         rehearse_telemetry(self.core.setup, self.parameters)
 
     def _decide(self, request: object) -> Verdict:

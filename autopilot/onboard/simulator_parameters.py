@@ -26,7 +26,7 @@ class WorldParameters:
     def __init__(self, table: ParameterTable) -> None:
         self._table = table
         self._heard: set[str] = set()
-        self._expected: int | None = None  # how many there are
+        self._complete = False  # the simulator has told all that it has
         self._asks = 0
         self._ask_us = 0
         self._restored: Mapping[str, float] = {}
@@ -51,8 +51,8 @@ class WorldParameters:
             return None
         name: str = message.param_id
         value = decimal_from_float32(message.param_value)
-        self._expected = message.param_count
         self._heard.add(name)
+        self._complete = len(self._heard) >= message.param_count
         self._wanted.pop(name, None)
         if name in self._table.learned:
             if self._table[name] == value:
@@ -68,11 +68,15 @@ class WorldParameters:
             self._wanted[name] = (saved, 0)
         return None
 
+    @property
+    def speaks(self) -> bool:
+        """Whether there is, or may soon be, anything to say to the simulator."""
+        return bool(self._wanted) or not (self._complete or self._asks >= LIST_ASKS)
+
     def messages(self, now_us: int) -> list[Any]:
         """What goes to the simulator beside the answer to this tick."""
         messages: list[Any] = []
-        complete = self._expected is not None and len(self._heard) >= self._expected
-        if not complete and self._asks < LIST_ASKS and now_us >= self._ask_us:
+        if not self._complete and self._asks < LIST_ASKS and now_us >= self._ask_us:
             self._asks += 1
             self._ask_us = now_us + RETRY_US
             messages.append(mavlink.MAVLink_param_request_list_message(1, SIMULATOR_COMPONENT))

@@ -337,12 +337,14 @@ class Program:
             self.onboard.endpoint.tell_time(time.time_ns() // 1000)
             self._keep_beating()
             self._ground.exchange(self.onboard, self._keep, stop)
-        events = self.onboard.endpoint.take_events()
+        onboard = self.onboard
+        events = onboard.endpoint.take_events()
         if events:
             self._keep(events)
-        self._keep_log(_LOG_BYTES)
-        if new and self.onboard.fault and self.onboard.tick == 1:
-            raise AutopilotError(self.onboard.fault)
+        if onboard.logged:
+            self._keep_log(_LOG_BYTES)
+        if new and onboard.fault and onboard.tick == 1:
+            raise AutopilotError(onboard.fault)
 
     def _keep_beating(self) -> None:
         """A heartbeat each second of the wall clock where the vehicle's is slower: clients wait by theirs."""

@@ -1,0 +1,50 @@
+"""What comes behind the flight software's tick, in machine code: the vehicle's condition, and the answer."""
+
+from __future__ import annotations
+
+from autopilot.core.health import follow
+from autopilot.estimation.inbox import is_sane
+from autopilot.estimation.records import ImuReading
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.packed import Row, unpack
+from autopilot.wire.compiled import Bytes
+from autopilot.wire.simulator_frames import put_answer
+
+
+@kernel
+def answer_tick(
+    condition: Row,
+    imu: Row,
+    forces: Row,
+    battery: Row,
+    fields: int,
+    fixed: bool,
+    now_us: int,
+    dt: float,
+    buffer: Bytes,
+    payload: Bytes,
+    sequence: int,
+    system: int,
+    component: int,
+    armed: bool,
+    lockstep: bool,
+    released: bool,
+    reel_rate: float,
+) -> tuple[int, bool]:
+    """Bring the `Condition` to this tick (`follow`) and write HIL_ACTUATOR_CONTROLS at the begin of a buffer
+    (`put_answer`); how many bytes it has, and whether the inertial sample is sane."""
+    follow(condition, imu, forces, battery, fields, fixed, now_us, dt)
+    end = put_answer(
+        buffer,
+        payload,
+        sequence,
+        system,
+        component,
+        now_us,
+        forces,
+        armed,
+        lockstep,
+        released,
+        reel_rate,
+    )
+    return end, is_sane(unpack(ImuReading, imu, 0))
