@@ -13,7 +13,7 @@ from pathlib import Path
 import click
 from platformdirs import user_state_path
 
-from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.onboard import GROUND_WINDOW_US, Onboard
 from autopilot.onboard.snapshot import Options
 from autopilot.services.identity import AUTOPILOT_COMPONENT, identity_of
 from autopilot.services.mission_store import StoredMission
@@ -65,11 +65,12 @@ _GROUND_RESEND_S = 0.5
 _TS1 = Field(mavlink.MAVLink_timesync_message, "ts1")
 _LONGEST_SILENCE_US = 1_000_000  # that a ground station which shares our clock can promise
 _MOST_SAID = 32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
+_TOGETHER = 4  # windows that are sent at once to a ground station that says nothing meanwhile
 _MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
-_LOG_BYTES = 8192  # of the flight log that are stored at once
+_LOG_BYTES = 32_768  # of the flight log that are stored at once
 
 
 class AutopilotError(Exception):
@@ -164,7 +165,8 @@ class GroundInStep:
     """One ground station that shares our clock: every 20 ms we wait until it has caught up.
 
     It does nothing with what it hears until it is asked: what is said in a window goes with the question.
-    Where it has promised to say nothing for a while, we ask and go on.
+    Where it has promised to say nothing for a while, we ask and go on; and as to wake it takes as long as all
+    else that is done for it, it then hears of several windows at once.
     """
 
     def __init__(self, address: Address) -> None:
@@ -173,6 +175,7 @@ class GroundInStep:
         self._silent_until_us = 0  # it says nothing before
         self._said: list[bytes] = []  # in this window
         self._size = 0
+        self._windows: list[bytes] = []  # datagrams that are to be sent
 
     def join(self, onboard: Onboard) -> None:
         """Serve the link from now on."""
@@ -188,8 +191,13 @@ class GroundInStep:
         if ask is None:
             return
         self._say(ask)
-        self._flush()
-        if onboard.now_us < self._silent_until_us:
+        self._close_window()
+        silent_us = self._silent_until_us - onboard.now_us
+        if len(self._windows) >= _TOGETHER or silent_us <= _TOGETHER * GROUND_WINDOW_US:
+            for datagram in self._windows:
+                self._send(datagram)
+            self._windows.clear()
+        if silent_us > 0:
             return
         stamp = onboard.now_us * 1000
         asked = time.monotonic()
@@ -214,12 +222,12 @@ class GroundInStep:
 
     def _say(self, datagram: bytes) -> None:
         if self._size + len(datagram) > _MOST_SAID:
-            self._flush()
+            self._close_window()
         self._said.append(datagram)
         self._size += len(datagram)
 
-    def _flush(self) -> None:
-        self._send(b"".join(self._said))
+    def _close_window(self) -> None:
+        self._windows.append(b"".join(self._said))
         self._said.clear()
         self._size = 0
 

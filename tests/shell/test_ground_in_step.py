@@ -131,6 +131,31 @@ def test_who_promises_silence_is_not_waited_for_until_it_is_over(rig: Rig) -> No
     rig.waits(80_000)
 
 
+def test_who_is_silent_for_long_hears_of_several_windows_at_once(rig: Rig) -> None:
+    rig.answer(0, 400_000_000)
+    rig.ticks_to(80_000)
+    assert [m.get_type() for m in rig.told()] == ["SYSTEM_TIME", "TIMESYNC"]
+    rig.ground.settimeout(0.0)
+    with pytest.raises(BlockingIOError):
+        rig.told()
+    rig.tick()
+    windows = [rig.told() for _ in range(4)]
+    assert [window[-1].ts1 // 1000 for window in windows] == [20_000, 40_000, 60_000, 80_000]
+    said = [m.time_unix_usec for window in windows for m in window[:-1]]
+    assert said == list(range(TICK_US, 80_000 + TICK_US, TICK_US))
+
+
+def test_it_hears_of_each_window_at_once_before_it_is_waited_for(rig: Rig) -> None:
+    rig.answer(0, 400_000_000)
+    rig.ticks_to(320_000 + TICK_US)
+    for _ in range(17):
+        rig.told()
+    for time_us in (340_000, 360_000, 380_000):
+        rig.ticks_to(time_us + TICK_US)
+        assert rig.told()[-1].ts1 == time_us * 1000
+    rig.waits(400_000)
+
+
 @pytest.mark.parametrize("tc1", [1, 1_767_225_600_000_000_000, 2**63 - 1, -5])
 def test_a_clock_of_its_own_is_no_promise(rig: Rig, tc1: int) -> None:
     rig.answer(0, tc1)
