@@ -15,6 +15,7 @@ import click
 
 from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
+    LARGEST_DATAGRAM,
     Address,
     Stop,
     StopRequest,
@@ -23,7 +24,6 @@ from autopilot.shell.options import (
     datagram_socket,
     home_option,
     reason,
-    receive,
     send,
     set_timeout,
     setting_option,
@@ -89,7 +89,10 @@ class Link:
 
     def receive(self, flags: int = 0) -> tuple[bytes, Address] | None:
         """The next datagram and its sender, None after the timeout."""
-        return receive(self._socket, flags)
+        try:
+            return self._socket.recvfrom(LARGEST_DATAGRAM, flags)
+        except OSError:
+            return None
 
     def send(self, simulator: HilSimulator) -> None:
         """The sensors of the present tick to the autopilot. What cannot be sent counts as lost on the way."""
