@@ -44,6 +44,7 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    ServiceFailed,
     SigningChanged,
     TimesyncAnswered,
     Verdict,
@@ -337,8 +338,8 @@ class Onboard:
                     self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered() | SigningChanged() | WorldSaved():
-                    pass  # the shell waits for the one and stores the other
+                case TimesyncAnswered() | SigningChanged() | WorldSaved() | ServiceFailed():
+                    pass  # the shell waits for the one, stores the other, and shows the last
         return [event for event in events if not self._world.owns(event)]
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:

@@ -352,6 +352,11 @@ def _listing(entries: list[Entry]) -> bytes:
     return listing
 
 
+def refusal_of(message: Any, peer: Peer) -> Any:
+    """The reply to a request that could not be done, for no fault of its own."""
+    return _message(_refusal(packet_of(bytes(message.payload)), FileError(Trouble.FAIL)), peer).message
+
+
 def _ack(asked: Packet, data: bytes = b"", offset: int = 0) -> Packet:
     return Packet(asked.seq + 1, asked.session, Op.ACK, len(data), asked.opcode, 0, offset, data)
 

@@ -23,6 +23,7 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    ServiceFailed,
     SigningChanged,
     TimesyncAnswered,
     WorldSaved,
@@ -380,6 +381,8 @@ class Program:
                         self._storage.keep_world(values)
                     case SigningChanged(key, timestamp):
                         self._storage.keep_signing(key, timestamp)
+                    case ServiceFailed(what, trace):
+                        print(f"autopilot: internal error in {what}:\n{trace}", file=sys.stderr, flush=True)
             except OSError as error:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
