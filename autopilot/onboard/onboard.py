@@ -129,7 +129,14 @@ class Onboard:
     ) -> None:
         self.parameters = parameters
         self.endpoint = VehicleEndpoint(
-            identity, options.home, parameters, mission, card, signing, options.boot_unix_us
+            identity,
+            options.home,
+            parameters,
+            mission,
+            card,
+            signing,
+            options.boot_unix_us,
+            options.setup_signing,
         )
         self.now_us = 0
         self.tick = -1

@@ -107,9 +107,11 @@ class VehicleEndpoint:
         card: Card | None = None,
         signing: Signing | None = None,
         boot_unix_us: int = 0,
+        setup_signing: bool = False,
     ) -> None:
+        """`setup_signing`: a first signing key is taken from whoever sends one."""
         self.identity = identity
-        self._signing = SigningService(signing, boot_unix_us)
+        self._signing = SigningService(signing, boot_unix_us, setup_signing)
         self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
         self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
         self._reached_us: int | None = None
