@@ -44,11 +44,7 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
-    ServiceFailed,
-    SigningChanged,
-    TimesyncAnswered,
     Verdict,
-    WorldSaved,
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome, StartMission
 from autopilot.supervisor.mission import with_plan
@@ -345,8 +341,8 @@ class Onboard:
                     self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered() | SigningChanged() | WorldSaved() | ServiceFailed():
-                    pass  # the shell waits for the one, stores the other, and shows the last
+                case _:
+                    pass  # the shell waits for it, stores it, or shows it
         return [event for event in events if not self._world.owns(event)]
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
@@ -457,6 +453,10 @@ class Onboard:
         else:
             area = replace(flight.area, rally=read_rally(items, self._options.home))
         self.core.change(replace(flight, area=area))
+
+    def take_losses(self, lost: tuple[str, ...]) -> None:
+        """What of the storage cannot be read: the vehicle is not armed until that is made good."""
+        self.core.change(replace(self.core.flight, lost=lost))
 
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None, self.core.flight.area.home)

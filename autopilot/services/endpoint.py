@@ -39,6 +39,7 @@ from autopilot.services.records import (
     Handler,
     Link,
     Output,
+    ParametersSaved,
     Peer,
     Say,
     Send,
@@ -428,6 +429,8 @@ class VehicleEndpoint:
         def decided(request: Any) -> Verdict:
             match request:
                 case StoreParameters(save):
+                    if save:
+                        self._consequences.append(ParametersSaved())
                     if save and self._parameters.table.learned:
                         self._consequences.append(self._parameters.world())
                     return _ACCEPTED
@@ -443,7 +446,7 @@ class VehicleEndpoint:
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and isinstance(request, ResetParameters):
-                self._consequences += [*self._parameters.reset(), WorldSaved({})]
+                self._consequences += [*self._parameters.reset(), ParametersSaved(), WorldSaved({})]
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 if isinstance(request, SetMode):
                     self._asked_mode = request.number

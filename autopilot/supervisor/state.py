@@ -161,6 +161,7 @@ class Flight:
     cable: CableState = CableState()
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
+    lost: tuple[str, ...] = ()  # what was stored and cannot be read: reasons not to arm
 
 
 class View(NamedTuple):

@@ -9,7 +9,7 @@ import pytest
 
 from autopilot.services.commands import CANCELLED, FORCE_ARM, LONGEST_US, PARSERS, REPEAT_US
 from autopilot.services.identity import AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
-from autopilot.services.records import ParameterChanged, Verdict, WorldSaved
+from autopilot.services.records import ParameterChanged, ParametersSaved, Verdict, WorldSaved
 from autopilot.services.requests import (
     Arm,
     ChangeAltitude,
@@ -472,7 +472,7 @@ def test_the_simulators_parameters_are_saved_on_request_alone(rig):
     rig.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_E", 3.0, mavlink.MAV_PARAM_TYPE_REAL32))
     assert not any(isinstance(event, WorldSaved) for event in rig.events)
     rig.send(long(245, (1,)))
-    assert rig.events[-1] == WorldSaved({"SIM_WIND_E": 3.0})
+    assert rig.events[-2:] == [ParametersSaved(), WorldSaved({"SIM_WIND_E": 3.0})]
     rig.send(long(245, (2,)))
     assert rig.events[-1] == WorldSaved({})
     assert rig.table["SIM_WIND_E"] == 0.0
