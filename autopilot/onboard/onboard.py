@@ -29,7 +29,7 @@ from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.log_topics import Sample
-from autopilot.onboard.packet_loss import Loss
+from autopilot.onboard.packet_loss import LOSS_PARAMETER, Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import Moment, Moments, Options
 from autopilot.onboard.warmup import rehearse_telemetry
@@ -330,7 +330,7 @@ class Onboard:
 
     def receive_ground(self, datagram: bytes, link: Link) -> list[Event]:
         """Handle a datagram from a ground station; what must be stored comes back as events."""
-        if self._received_loss.drops(datagram, self.parameters["SIM_LOSS_PCT"]):
+        if self._received_loss.drops(datagram, self.parameters[LOSS_PARAMETER]):
             return []
         events = self.endpoint.receive(datagram, link, self.now_us, self._decide)
         for event in events:
@@ -343,11 +343,17 @@ class Onboard:
                     self._world.changed(name, value)
                 case _:
                     pass  # the shell waits for it, stores it, or shows it
-        return [event for event in events if not self._world.owns(event)]
+        return [event for event in events if self._outlives(event)]
+
+    def _outlives(self, event: Event) -> bool:
+        """Whether the shell is to store it: not the parameters of the world, nor the loss of the link."""
+        return not isinstance(event, ParameterChanged) or (
+            event.name not in self.parameters.learned and self.parameters.describe(event.name).stored
+        )
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
         """What is due on the ground links at this tick."""
-        percent = self.parameters["SIM_LOSS_PCT"]
+        percent = self.parameters[LOSS_PARAMETER]
         sent = self.endpoint.poll(self._snapshot, self.now_us)
         if percent > 0.0:
             sent = [
