@@ -49,7 +49,7 @@ from autopilot.services.records import (
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
+from autopilot.supervisor.state import MissionPlan, Phase, off_mission
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
@@ -67,9 +67,6 @@ _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MOST_NAMED = 8  # items in one text
-AT_ONCE_STEPS = (
-    30  # of a mission that begins as soon as it is asked for; some 0.4 s if nobody has prepared it
-)
 LEAP_US = 5_000_000  # larger jumps are rejected
 
 
@@ -420,19 +417,10 @@ class Onboard:
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         home = self.core.flight.area.home
-        if isinstance(request, StartMission):
-            self._have_ready()
         verdict = self.core.ask(request, self.now_us)
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
             self._follow_home()
         return verdict
-
-    def _have_ready(self) -> None:
-        """Prepare a short mission that is to begin on the ground at once, if nobody has yet: clients that are
-        told to wait (MAVSDK) do not always know how to."""
-        work = self.work
-        if work is not None and self.core.flight.phase in ON_GROUND and len(work.steps) <= AT_ONCE_STEPS:
-            self.finish(work, work.done())
 
     def _follow_home(self) -> None:
         """Read and prepare the mission anew where it returns to another home; one under way keeps its paths,
@@ -490,6 +478,16 @@ class Onboard:
         for note in prepared.notes:
             self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
         self._have_prepared(prepared)
+        if self.core.flight.mission.waiting:
+            self._begin_mission()
+
+    def _begin_mission(self) -> None:
+        """Begin the mission that waited for its paths, or say why not."""
+        verdict = self.core.ask(StartMission(None), self.now_us)
+        self.endpoint.state_changed()
+        if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
+            self.core.change(off_mission(self.core.flight))
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, verdict.text or "Mission denied")
 
     def _have_prepared(self, prepared: Prepared) -> None:
         flight = self.core.flight

@@ -125,7 +125,6 @@ class VehicleEndpoint:
         self._logs = LogService(self.files)
         self._timed = (
             self._signing,
-            self._commands,
             self._missions,
             self._parameters,
             self._ftp,
@@ -513,7 +512,6 @@ class VehicleEndpoint:
         return {
             m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
-            m.MAVLINK_MSG_ID_COMMAND_CANCEL: commands.receive_cancel,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,

@@ -103,6 +103,7 @@ class MissionProgress:
     plan: MissionPlan = MissionPlan()
     step: int = 0  # of the plan: the present one, or the one to begin with
     active: bool = False
+    waiting: bool = False  # begins when its paths are prepared
     done: bool = False
     step_anchor: Vec3 | None = None  # where the present step began
     takeoff_altitude_m: float = 0.0
@@ -161,6 +162,7 @@ class Flight:
     cable: CableState = CableState()
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
+    returning: bool = False  # home, or landing there
     lost: tuple[str, ...] = ()  # what was stored and cannot be read: reasons not to arm
 
 
@@ -187,8 +189,8 @@ class Report(NamedTuple):
 
 
 def off_mission(flight: Flight) -> Flight:
-    """The flight with its mission interrupted; the step is kept."""
-    return replace(flight, mission=replace(flight.mission, active=False))
+    """The flight with its mission interrupted, or not begun after all; the step is kept."""
+    return replace(flight, mission=replace(flight.mission, active=False, waiting=False))
 
 
 def takeoff_event(flight: Flight) -> Event:

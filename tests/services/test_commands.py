@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.services.commands import CANCELLED, FORCE_ARM, LONGEST_US, PARSERS, REPEAT_US
+from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
 from autopilot.services.identity import AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
 from autopilot.services.records import ParameterChanged, ParametersSaved, Verdict, WorldSaved
 from autopilot.services.requests import (
@@ -43,7 +43,6 @@ OK, DENIED, UNSUPPORTED = (
     mavlink.MAV_RESULT_DENIED,
     mavlink.MAV_RESULT_UNSUPPORTED,
 )
-IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
 PACKED_LAND = float(AUTO_LAND << 24 | AUTO << 16)
 
 # what is sent as COMMAND_LONG, what the supervisor is asked (None: nothing), the result
@@ -380,77 +379,6 @@ def test_every_parser_is_in_the_case_table():
 
 def test_takeoff_in_the_px4_flavour_is_above_the_sea():
     assert not Identity().flavour.takeoff_above_home
-
-
-# ---- commands in progress
-
-LATER = Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "not yet")
-
-
-def progress(received) -> list[tuple[int, int, int]]:
-    """(command, result, progress) of the COMMAND_ACKs."""
-    found = [getattr(r, "message", r) for r in received]
-    return [(x.command, x.result, x.progress) for x in found if x.get_type() == "COMMAND_ACK"]
-
-
-def begin(rig, command: int = 300) -> None:
-    rig.verdict = lambda request: LATER
-    assert progress(rig.replies(long(command))) == [(command, IN_PROGRESS, 255)]
-
-
-def test_a_command_in_progress_is_told_and_ends(rig):
-    begin(rig)
-    told = progress(rig.run(1_200_000))
-    assert told == [(300, IN_PROGRESS, 255)] * 2
-    rig.verdict = lambda request: Verdict(OK)
-    assert progress(rig.run(200_000)) == [(300, OK, 0)]
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_a_command_in_progress_is_not_begun_twice(rig):
-    begin(rig)
-    asked = len(rig.asked)
-    assert progress(rig.replies(long(300))) == [(300, IN_PROGRESS, 255)]
-    assert len(rig.asked) == asked
-
-
-@pytest.mark.parametrize("command", [21, 20, 176, 193])
-def test_another_command_takes_its_place(rig, command):
-    begin(rig)
-    rig.verdict = lambda request: Verdict(OK)
-    p = (1, AUTO, AUTO_LAND) if command == 176 else ()
-    assert progress(rig.replies(long(command, p))) == [(300, CANCELLED, 0), (command, OK, 0)]
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_what_does_not_move_the_vehicle_leaves_it(rig):
-    begin(rig)
-    rig.verdict = lambda request: LATER if isinstance(request, StartMission) else Verdict(OK)
-    for command, p in ((400, (1,)), (401, ()), (512, (148,)), (178, (1, 2))):
-        assert progress(rig.replies(long(command, p))) == [(command, OK, 0)]
-    rig.verdict = lambda request: Verdict(OK)
-    assert progress(rig.run(200_000)) == [(300, OK, 0)]
-
-
-def test_a_command_in_progress_is_cancelled(rig):
-    begin(rig)
-    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 22))) == []
-    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 300))) == [(300, CANCELLED, 0)]
-    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 300))) == []
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_a_command_in_progress_for_ever_fails(rig):
-    begin(rig)
-    told = progress(rig.run(LONGEST_US + 200_000))
-    assert told[-1] == (300, mavlink.MAV_RESULT_FAILED, 0)
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_the_asker_alone_is_told(rig):
-    rig.send(mavlink.MAVLink_ping_message(0, 0, 0, 0), link="other")
-    begin(rig)
-    assert progress(rig.run(1_000_000, "other")) == []
 
 
 # ---- storage

@@ -32,16 +32,19 @@ LEVEL_HOME_M = 1.0
 def hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Stop and hold; on the ground, select nothing."""
     if flight.phase in ON_GROUND:
-        return replace(flight, selected=Selected.NOTHING), ACCEPTED
+        return replace(off_mission(flight), selected=Selected.NOTHING), ACCEPTED
     after = happen(off_mission(flight), Event.HOLD, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Hold"))
 
 
 def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Set the load down where it is, and the vehicle beside it."""
-    if flight.phase in ON_GROUND or flight.phase in (Phase.LOWER, Phase.SET_DOWN):
+    if flight.phase in ON_GROUND:
         return flight, ACCEPTED
-    after = happen(off_mission(flight), Event.LAND, view, settings)
+    here = replace(flight, returning=False)
+    if flight.phase in (Phase.LOWER, Phase.SET_DOWN):
+        return here, ACCEPTED
+    after = happen(off_mission(here), Event.LAND, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Landing"))
 
 
