@@ -56,7 +56,7 @@ from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.items import WireItem, located_steps, unflown
+from autopilot.wire.items import WireItem, endless_from, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 from autopilot.wire.simulator_frames import put_answer
@@ -105,7 +105,8 @@ def plan_of(mission: StoredMission, home: Home, limits: Limits | None, return_to
     steps = located_steps(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
     prepared = PENDING if limits is None else prepare(flown, sequence, limits, return_to)
-    return MissionPlan(flown, sequence, len(mission.items), prepared)
+    again_from = endless_from(mission.items, steps)
+    return MissionPlan(flown, sequence, len(mission.items), prepared, again_from)
 
 
 class Onboard:

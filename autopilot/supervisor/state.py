@@ -94,6 +94,11 @@ class MissionPlan:
     sequence: tuple[int, ...] = ()
     items: int = 0
     prepared: Prepared = UNPREPARED
+    again_from: int | None = None  # the step that follows the last one, if the mission has no end
+
+    def after(self, step: int) -> int | None:
+        """The step that follows; None after the last one."""
+        return step + 1 if step + 1 < len(self.steps) else self.again_from
 
 
 @dataclass(frozen=True, slots=True)
