@@ -166,6 +166,7 @@ class Told(NamedTuple):
     """What a flight record says to telemetry, whatever the estimate: fields of `Snapshot`."""
 
     launch: Vec3
+    guarded: bool
     breach: str
     breaches: int
     breach_us: int
@@ -187,6 +188,7 @@ def told(flight: Flight, items: int) -> Told:
     seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
     return Told(
         area.home,
+        area.guarded,
         area.breach,
         area.breaches,
         area.breach_us,

@@ -21,6 +21,8 @@ from autopilot.services.requests import (
     ChangeAltitude,
     ChangeSpeed,
     Continue,
+    EnableFence,
+    FailRotors,
     GetMessageInterval,
     Grab,
     Land,
@@ -340,8 +342,34 @@ def _winch(call: Call, context: Context) -> Request | Verdict:
     return Verdict(UNSUPPORTED, f"Winch: action {call.p[1]:g} is not offered; 1, 2, 5 and 6 are")
 
 
+def _enable_fence(call: Call, context: Context) -> Request | Verdict:
+    if call.p[0] not in (0.0, 1.0):
+        return _refused(f"Fence: param1 = {call.p[0]:g}; must be 0 (off) or 1 (on)")
+    return EnableFence(call.p[0] == 1.0)
+
+
+def _inject_failure(call: Call, context: Context) -> Request | Verdict:
+    unit, kind, rotor = _whole(call.p[0]), _whole(call.p[1]), _whole(call.p[2])
+    if unit != mavlink.FAILURE_UNIT_SYSTEM_MOTOR:
+        return Verdict(UNSUPPORTED, "Failure: rotors can fail (unit 101); for the rest see SIM_ parameters")
+    if kind not in (mavlink.FAILURE_TYPE_OK, mavlink.FAILURE_TYPE_OFF):
+        return Verdict(UNSUPPORTED, "Failure: a rotor can be ok (0) or off (1)")
+    if rotor is None or rotor not in range(5):
+        return _refused(f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... 4, or 0 for all")
+    return FailRotors(rotor, kind == mavlink.FAILURE_TYPE_OFF)
+
+
 def _plain(request: Request) -> Parser:
     return lambda call, context: request
+
+
+def _never(text: str) -> Parser:
+    return lambda call, context: Verdict(UNSUPPORTED, text)
+
+
+_NO_YAW = _never("Yaw: the nose is held east; headings are not flown")
+_NO_ROI = _never("ROI: there is no camera, and the nose is held east")
+_NO_ACTUATOR = _never("Actuators: there are rotors, gripper and winch; DO_GRIPPER and DO_WINCH move these")
 
 
 PARSERS: dict[int, Parser] = {
@@ -374,6 +402,17 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_message_interval,
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_message_interval,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_capabilities,
+    mavlink.MAV_CMD_GET_HOME_POSITION: _plain(RequestMessage(mavlink.MAVLINK_MSG_ID_HOME_POSITION, 0.0)),
+    mavlink.MAV_CMD_DO_FENCE_ENABLE: _enable_fence,
+    mavlink.MAV_CMD_INJECT_FAILURE: _inject_failure,
+    mavlink.MAV_CMD_CONDITION_YAW: _NO_YAW,
+    mavlink.MAV_CMD_DO_SET_ROI: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ROI_NONE: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ACTUATOR: _NO_ACTUATOR,
+    mavlink.MAV_CMD_DO_SET_SERVO: _NO_ACTUATOR,
+    mavlink.MAV_CMD_DO_SET_RELAY: _NO_ACTUATOR,
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _plain(
         RequestMessage(mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION, 0.0)
     ),

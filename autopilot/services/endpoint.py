@@ -47,6 +47,7 @@ from autopilot.services.records import (
     WorldSaved,
 )
 from autopilot.services.requests import (
+    FailRotors,
     FollowAttitude,
     FollowSetpoint,
     FollowStick,
@@ -433,6 +434,14 @@ class VehicleEndpoint:
                     if save and self._parameters.table.learned:
                         self._consequences.append(self._parameters.world())
                     return _ACCEPTED
+                case FailRotors(rotor, fail):
+                    outputs = self._parameters.fail_rotors(rotor, fail)
+                    if outputs is None:
+                        return Verdict(
+                            mavlink.MAV_RESULT_DENIED, "Failure: the simulator has told of no rotors"
+                        )
+                    self._consequences += outputs
+                    return _ACCEPTED
                 case RequestCapabilities():
                     return self._request_message(
                         state, peer, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0.0, now_us
@@ -495,6 +504,14 @@ class VehicleEndpoint:
         state.streams.set_interval(message_id, interval_us, now_us)
         return _ACCEPTED
 
+    def _set_origin(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """SET_GPS_GLOBAL_ORIGIN: the world stays where it is, and says where that is."""
+        if message.target_system not in (0, self.identity.system):
+            return []
+        text = "Origin not moved: sitl --home and autopilot --home say where the world is"
+        where = Announce(peer.link, (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,))
+        return [Say(mavlink.MAV_SEVERITY_WARNING, text), where]
+
     def _request_data_stream(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """REQUEST_DATA_STREAM: the rate of a group on the link of the asker; stop: the default rates."""
         state = self._links[peer.link]
@@ -514,6 +531,7 @@ class VehicleEndpoint:
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
+            m.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: guided.receive_local,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,

@@ -146,6 +146,7 @@ class Area:
     home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
     rally: tuple[Vec3, ...] = ()  # where it leads as well, if that is nearer
     fence: Fence = NO_FENCE
+    guarded: bool = True  # nobody has switched the fence off
     breach: str = ""  # why load or vehicle may not be where it is, or is about to be
     breaches: int = 0
     breach_us: int = 0  # when the last one began
@@ -218,6 +219,11 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     if settings.fence.height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence.height_m:
         return f"higher than GF_MAX_VER_DIST {settings.fence.height_m:g} m"
     return fence.complaint(x_load[0], x_load[1])
+
+
+def fenced(flight: Flight, settings: Settings) -> bool:
+    """Whether the fence is heeded: GF_ACTION names what a breach leads to, and it is not switched off."""
+    return settings.fence.action != 0 and flight.area.guarded
 
 
 def carries(flight: Flight) -> bool:

@@ -15,6 +15,7 @@ from autopilot.services.requests import (
     ChangeAltitude,
     ChangeSpeed,
     Continue,
+    EnableFence,
     Grab,
     Land,
     Orbit,
@@ -105,6 +106,22 @@ LONG = [
     (185, (1,), Terminate(), OK),
     (185, (0,), None, DENIED),
     (401, (), RunPrearmChecks(), OK),
+    (207, (0,), EnableFence(False), OK),
+    (207, (1,), EnableFence(True), OK),
+    (207, (2,), None, DENIED),
+    (420, (101, 1, 5), None, DENIED),
+    (420, (101, 1, 1), None, DENIED),  # of a simulator that has told of no parameters
+    (420, (101, 5, 1), None, UNSUPPORTED),
+    (420, (0, 1, 0), None, UNSUPPORTED),
+    (115, (90,), None, UNSUPPORTED),
+    (201, (), None, UNSUPPORTED),
+    (195, (), None, UNSUPPORTED),
+    (196, (), None, UNSUPPORTED),
+    (197, (), None, UNSUPPORTED),
+    (187, (), None, UNSUPPORTED),
+    (183, (), None, UNSUPPORTED),
+    (181, (), None, UNSUPPORTED),
+    (410, (), None, OK),
     (246, (1,), Reboot(False), OK),
     (246, (2,), Reboot(True), OK),
     (246, (NAN,), None, UNSUPPORTED),
@@ -393,6 +410,29 @@ def test_parameters_go_back_to_their_defaults(rig):
     assert rig.table["LOAD_MASS"] == rig.table.describe("LOAD_MASS").default
     assert rig.table["CTRL_RATE_HZ"] == 500.0
     assert ParameterChanged("LOAD_MASS", rig.table["LOAD_MASS"]) in rig.events
+
+
+def test_the_home_position_and_the_origin_are_told(rig):
+    (home,) = [x for x in rig.replies(long(410)) if x.get_type() == "COMMAND_ACK"]
+    assert home.result == OK
+    rig.send(long(410))
+    assert "HOME_POSITION" in [r.message.get_type() for r in rig.poll()["gcs"]]
+    origin = mavlink.MAVLink_set_gps_global_origin_message(1, 0, 0, 0)
+    told = {x.get_type() for x in rig.replies(origin)}
+    assert told == {"STATUSTEXT", "GPS_GLOBAL_ORIGIN"}
+    assert "GPS_GLOBAL_ORIGIN" not in {
+        x.get_type() for x in rig.replies(mavlink.MAVLink_set_gps_global_origin_message(9, 0, 0, 0))
+    }
+
+
+def test_rotors_fail_and_work_again_by_the_simulators_parameter(rig):
+    rig.table.learn(Parameter("SIM_ENGINE_FAIL", 0.0, 0.0, 15.0, "", ""))
+    for p, failed in (((101, 1, 2), 0b0010), ((101, 1, 4), 0b1010), ((101, 0, 2), 0b1000), ((101, 1, 0), 15)):
+        rig.send(long(420, p))
+        assert rig.table["SIM_ENGINE_FAIL"] == failed
+        assert rig.events[-1] == ParameterChanged("SIM_ENGINE_FAIL", failed)
+    rig.send(long(420, (101, 0, 0)))
+    assert rig.table["SIM_ENGINE_FAIL"] == 0
 
 
 def test_the_simulators_parameters_are_saved_on_request_alone(rig):

@@ -48,6 +48,8 @@ REQUESTS: list[Any] = [
     R.Arm(True, True),
     R.Arm(False, False),
     R.Arm(False, True),
+    R.EnableFence(False),
+    R.FailRotors(1, True),
     R.Takeoff(None),
     R.Takeoff(3.0),
     R.Takeoff(0.1),

@@ -20,6 +20,7 @@ from autopilot.supervisor.state import (
     Selected,
     View,
     below,
+    fenced,
     forbidden,
     off_mission,
 )
@@ -38,7 +39,7 @@ def arming_complaints(flight: Flight, view: View, settings: Settings) -> tuple[s
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         found.append(f"moving at {norm(view.v_quad):.1f} m/s")
     place = below(view.x_quad, settings) if flight.cable.released else view.x_load
-    where = forbidden(flight.area.fence, place, settings) if settings.fence.action else ""
+    where = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
     if where:
         found.append(where)
     return tuple(found)
