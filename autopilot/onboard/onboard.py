@@ -148,6 +148,8 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
+        self._world_told = False  # what parameters it has
+        self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
@@ -226,6 +228,9 @@ class Onboard:
             self._moments.fixed = True
         for message in tick.aside:
             self._hear_simulator(message)
+        if not self._world_told and self._world.settled(tick.now_us):
+            self._world_told = True
+            self.endpoint.parameters_complete(tick.now_us)
         if period_us > 0 and not 0 < self._shortest_us <= period_us:
             # ticks may be lost in real time: the shortest step is that of the sensors' rate
             self._shortest_us = period_us

@@ -235,6 +235,15 @@ class VehicleEndpoint:
         """Mode or arming changed: tell everybody with the next `poll`, whatever is due."""
         self._do([Announce(None, (_HEARTBEAT,))], [])
 
+    def expect_parameters(self) -> None:
+        """More parameters will be learned soon: lists of them wait until `parameters_complete`."""
+        self._parameters.expect_more()
+
+    def parameters_complete(self, now_us: int) -> None:
+        """The parameter table is complete."""
+        self._parameters.complete(now_us)
+        self._stirred = True
+
     def parameter_changed(self, name: str) -> None:
         """The vehicle itself changed a parameter: show it to all links."""
         self._do([Send(None, self._parameters.value_message(name))], [])

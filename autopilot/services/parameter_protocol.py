@@ -45,6 +45,7 @@ class ParameterService:
         self.table = table
         self._encoding = encoding
         self._lists: dict[Link, tuple[int, int]] = {}  # next index, and when
+        self._complete = True  # the table: no more parameters will be learned
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Begin the list for this link, from the start if one is under way."""
@@ -126,13 +127,26 @@ class ParameterService:
         whole = self._encoding.integers and self.table.describe(name).integer
         return on_the_wire(self.table[name], whole, self._encoding.bytewise)
 
+    def expect_more(self) -> None:
+        """More parameters will be learned soon: lists wait."""
+        self._complete = False
+
+    def complete(self, now_us: int) -> None:
+        """The table is complete: lists that were asked for begin."""
+        self._complete = True
+        self._lists = dict.fromkeys(self._lists, (0, now_us))
+
     def next_timer(self) -> int:
         """When `poll` has something to send, in us."""
+        if not self._complete:
+            return NEVER_US
         return min((at_us for _, at_us in self._lists.values()), default=NEVER_US)
 
     def poll(self, now_us: int) -> list[Output]:
         """The values of the lists under way whose time has come."""
         outputs: list[Output] = []
+        if not self._complete:
+            return outputs
         names = self.table.names
         for link, (index, at_us) in list(self._lists.items()):
             if at_us > now_us:
