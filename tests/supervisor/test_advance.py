@@ -210,6 +210,24 @@ def test_landing_and_returning_end_on_the_ground_from_any_step(request_: object,
     assert not sky.flight.mission.done
 
 
+@pytest.mark.parametrize(("far", "highest"), [(3.0, 4.0), (0.5, 2.0)])
+def test_a_return_climbs_first_where_home_is_not_near(far: float, highest: float) -> None:
+    settings = replace(SETTINGS, motion=replace(SETTINGS.motion, return_altitude_m=4.0))
+    sky = Sky(Takeoff(2.0), Waypoint(far, 0.0, 2.0), settings=settings)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.HOLD)
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    heights, away = [], []
+    while sky.flight.phase == Phase.RETURN:
+        sky.tick()
+        heights.append(sky.view.x_load[2])
+        away.append(sky.view.x_load[0] if heights[-1] < highest - 0.01 else far)
+    assert max(heights) == pytest.approx(highest, abs=1e-6)
+    # a waypoint is known to 1e-7 degrees
+    assert away[:-1] == pytest.approx([far] * len(away[:-1]), abs=6e-3), "straight up, then home"
+
+
 def test_holding_low_over_the_ground_rises_clear_of_it() -> None:
     sky = Sky().airborne()
     sky.ask(Land())
