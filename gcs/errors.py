@@ -17,6 +17,12 @@ class GcsError(Exception):
     exit_code = EXIT_ERROR
 
 
+class InputError(GcsError):
+    """The command line names something that there is not, or a value that cannot be."""
+
+    exit_code = EXIT_USAGE
+
+
 class NoVehicleError(GcsError):
     """Nobody answered, or somebody stopped answering."""
 

@@ -437,7 +437,7 @@ def _address_or_none(text: str) -> Address | None:
     return None if text == "none" else address_option(text)
 
 
-@click.command()
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--sim",
     type=address_option,
