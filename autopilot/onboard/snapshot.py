@@ -83,12 +83,15 @@ class Options:
     lockstep: bool = True
     clock_waits: bool = True  # for the autopilot, however long it works
     log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` gives
+    setup_signing: bool = False  # a first signing key is taken from whoever sends one
 
 
 def sub_mode(flight: Flight) -> int:
     """Sub-mode of AUTO: what was asked for, of which the phase is a part."""
-    if flight.mission.active:
+    if flight.mission.active or flight.mission.waiting:
         return identity.AUTO_MISSION
+    if flight.returning:
+        return identity.AUTO_RTL
     if flight.phase in ON_GROUND:
         return _SELECTED_MODES[flight.selected]
     return _PHASE_MODES[flight.phase]
@@ -162,6 +165,7 @@ class Told(NamedTuple):
     """What a flight record says to telemetry, whatever the estimate: fields of `Snapshot`."""
 
     launch: Vec3
+    guarded: bool
     breach: str
     breaches: int
     breach_us: int
@@ -183,6 +187,7 @@ def told(flight: Flight, items: int) -> Told:
     seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
     return Told(
         area.home,
+        area.guarded,
         area.breach,
         area.breaches,
         area.breach_us,
@@ -340,7 +345,9 @@ class Moment(Snapshot):
 
     @cached_property
     def ready(self) -> bool:
-        """Whether the vehicle may be armed."""
+        """Whether the vehicle may be armed, or is: in flight it does not count what keeps one from that."""
+        if self.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE):
+            return True
         return not arming_complaints(self.flight, self.view, self.core.settings)
 
     @property

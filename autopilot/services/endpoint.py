@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from autopilot.services.commands import CommandService
+from autopilot.services.faults import Faults
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
 from autopilot.services.ftp import FtpService
@@ -38,6 +39,7 @@ from autopilot.services.records import (
     Handler,
     Link,
     Output,
+    ParametersSaved,
     Peer,
     Say,
     Send,
@@ -45,6 +47,7 @@ from autopilot.services.records import (
     WorldSaved,
 )
 from autopilot.services.requests import (
+    FailRotors,
     FollowAttitude,
     FollowSetpoint,
     FollowStick,
@@ -106,10 +109,12 @@ class VehicleEndpoint:
         card: Card | None = None,
         signing: Signing | None = None,
         boot_unix_us: int = 0,
+        setup_signing: bool = False,
     ) -> None:
+        """`setup_signing`: a first signing key is taken from whoever sends one."""
         self.identity = identity
         self._home = home
-        self._signing = SigningService(signing, boot_unix_us)
+        self._signing = SigningService(signing, boot_unix_us, setup_signing)
         self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
         self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
         self._reached_us: int | None = None
@@ -122,12 +127,12 @@ class VehicleEndpoint:
         self._logs = LogService(self.files)
         self._timed = (
             self._signing,
-            self._commands,
             self._missions,
             self._parameters,
             self._ftp,
             self._logs,
         )
+        self._faults = Faults()
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._learned: dict[Link, LinkState] = {}  # of these the ones that were not configured
@@ -194,7 +199,11 @@ class VehicleEndpoint:
             if handler and self._is_for_us(message_id, received.message):
                 peer = Peer(link, received.system, received.component)
                 wrapped = self._decider(state, peer, now_us, decide)
-                self._do(handler(received.message, peer, now_us, wrapped), events)
+                try:
+                    outputs = handler(received.message, peer, now_us, wrapped)
+                except Exception:  # a fault of ours must not bring the vehicle down
+                    outputs = self._faults.answered(received.message, peer, now_us)
+                self._do(outputs, events)
                 self._follow_up(events)
         return events
 
@@ -229,6 +238,15 @@ class VehicleEndpoint:
         """Mode or arming changed: tell everybody with the next `poll`, whatever is due."""
         self._do([Announce(None, (_HEARTBEAT,))], [])
 
+    def expect_parameters(self) -> None:
+        """More parameters will be learned soon: lists of them wait until `parameters_complete`."""
+        self._parameters.expect_more()
+
+    def parameters_complete(self, now_us: int) -> None:
+        """The parameter table is complete."""
+        self._parameters.complete(now_us)
+        self._stirred = True
+
     def parameter_changed(self, name: str) -> None:
         """The vehicle itself changed a parameter: show it to all links."""
         self._do([Send(None, self._parameters.value_message(name))], [])
@@ -261,7 +279,11 @@ class VehicleEndpoint:
             self._forget_silent(now_us)
         if self._work or now_us >= self._timer_us or self._signing.signing is not None:
             for service in self._timed:
-                self._do(service.poll(now_us), self._events)
+                try:
+                    outputs = service.poll(now_us)
+                except Exception:  # as in `receive`
+                    outputs = self._faults.told(type(service).__name__, now_us)
+                self._do(outputs, self._events)
             self._follow_up(self._events)
             self._say_reached_again(now_us)
             self._work, self._stirred = False, True
@@ -433,8 +455,18 @@ class VehicleEndpoint:
         def decided(request: Any) -> Verdict:
             match request:
                 case StoreParameters(save):
+                    if save:
+                        self._consequences.append(ParametersSaved())
                     if save and self._parameters.table.learned:
                         self._consequences.append(self._parameters.world())
+                    return _ACCEPTED
+                case FailRotors(rotor, fail):
+                    outputs = self._parameters.fail_rotors(rotor, fail)
+                    if outputs is None:
+                        return Verdict(
+                            mavlink.MAV_RESULT_DENIED, "Failure: the simulator has told of no rotors"
+                        )
+                    self._consequences += outputs
                     return _ACCEPTED
                 case RequestCapabilities():
                     return self._request_message(
@@ -448,7 +480,7 @@ class VehicleEndpoint:
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and isinstance(request, ResetParameters):
-                self._consequences += [*self._parameters.reset(), WorldSaved({})]
+                self._consequences += [*self._parameters.reset(), ParametersSaved(), WorldSaved({})]
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 if isinstance(request, SetMode):
                     self._asked_mode = request.number
@@ -498,6 +530,14 @@ class VehicleEndpoint:
         state.streams.set_interval(message_id, interval_us, now_us)
         return _ACCEPTED
 
+    def _set_origin(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """SET_GPS_GLOBAL_ORIGIN: the world stays where it is, and says where that is."""
+        if message.target_system not in (0, self.identity.system):
+            return []
+        text = "Origin not moved: sitl --home and autopilot --home say where the world is"
+        where = Announce(peer.link, (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,))
+        return [Say(mavlink.MAV_SEVERITY_WARNING, text), where]
+
     def _request_data_stream(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """REQUEST_DATA_STREAM: the rate of a group on the link of the asker; stop: the default rates."""
         state = self._links[peer.link]
@@ -515,9 +555,9 @@ class VehicleEndpoint:
         return {
             m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
-            m.MAVLINK_MSG_ID_COMMAND_CANCEL: commands.receive_cancel,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
+            m.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: guided.receive_local,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,

@@ -90,13 +90,35 @@ class SigningChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class ParametersSaved:
+    """The parameters are meant to be as they are now, whatever was stored before."""
+
+
+@dataclass(frozen=True, slots=True)
 class WorldSaved:
     """The simulator's parameters are to be as they are now after a restart as well (none: as it likes)."""
 
     values: Mapping[str, float]
 
 
-Event = ParameterChanged | MissionChanged | AreasChanged | TimesyncAnswered | SigningChanged | WorldSaved
+@dataclass(frozen=True, slots=True)
+class ServiceFailed:
+    """A fault of ours in the service of a message: where, and the trace of it for a developer."""
+
+    what: str
+    trace: str
+
+
+Event = (
+    ParameterChanged
+    | MissionChanged
+    | AreasChanged
+    | TimesyncAnswered
+    | SigningChanged
+    | ParametersSaved
+    | WorldSaved
+    | ServiceFailed
+)
 Output = Send | Say | Announce | Event
 
 

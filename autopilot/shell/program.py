@@ -23,6 +23,8 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    ParametersSaved,
+    ServiceFailed,
     SigningChanged,
     TimesyncAnswered,
     WorldSaved,
@@ -271,6 +273,7 @@ class Program:
             system_status=mavlink.MAV_STATE_BOOT,
             mavlink_version=3,
         )
+        self._lost = storage.lost
         self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
@@ -282,6 +285,13 @@ class Program:
         """Fence and rally points that are already there."""
         for kind, items in areas.items():
             self.onboard.take_areas(kind, items)
+        self.onboard.take_losses(self._storage.lost)
+
+    def tell(self, troubles: list[str]) -> None:
+        """What is wrong with the storage: on the terminal, and to the operators."""
+        for trouble in troubles:
+            print(f"autopilot: {trouble}", file=sys.stderr)
+            self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, f"Storage: {trouble}")
 
     def run(self, stop: StopRequest) -> None:
         """Tick for ever."""
@@ -386,13 +396,20 @@ class Program:
                         self._storage.keep_areas(kind, items)
                     case ParameterChanged(name, value):
                         self._storage.keep_parameter(name, value)
+                    case ParametersSaved():
+                        self._storage.keep_parameters()
                     case WorldSaved(values):
                         self._storage.keep_world(values)
                     case SigningChanged(key, timestamp):
                         self._storage.keep_signing(key, timestamp)
+                    case ServiceFailed(what, trace):
+                        print(f"autopilot: internal error in {what}:\n{trace}", file=sys.stderr, flush=True)
             except OSError as error:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
+        if self._lost != self._storage.lost:
+            self._lost = self._storage.lost
+            self.onboard.take_losses(self._lost)
 
     def _keep_log(self, least_bytes: int) -> None:
         chunk = self.onboard.take_log(least_bytes)
@@ -430,7 +447,7 @@ def _address_or_none(text: str) -> Address | None:
     return None if text == "none" else address_option(text)
 
 
-@click.command()
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--sim",
     type=address_option,
@@ -497,6 +514,11 @@ def _address_or_none(text: str) -> Address | None:
     metavar="FILE",
     help="Hear only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
 )
+@click.option(
+    "--allow-setup-signing",
+    is_flag=True,
+    help="Take a first signing key from whoever sends SETUP_SIGNING.",
+)
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 @click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
 def main(
@@ -510,6 +532,7 @@ def main(
     home: Home | None,
     storage: Path | None,
     signing_key: bytes | None,
+    allow_setup_signing: bool,
     quiet: bool,
 ) -> None:
     """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
@@ -526,8 +549,7 @@ def main(
         table = autopilot_parameters(load_vehicle(vehicle))
         kept = Storage(storage or user_state_path("plumbline"))
         kept.lock()
-        for trouble in kept.load_parameters(table):
-            print(f"autopilot: {trouble}", file=sys.stderr)
+        troubles = kept.load_parameters(table)
         apply_settings(table, settings)
         table.freeze()
         parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
@@ -535,19 +557,17 @@ def main(
         if not compiled:
             say(ONCE)
         mission, trouble = kept.load_mission(place)
-        if trouble:
-            print(f"autopilot: {trouble}", file=sys.stderr)
+        troubles += [trouble] if trouble else []
         if signing_key is not None:
             _begin_signing(kept, signing_key)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
-        options = Options(place, boot, clock_waits=in_step, log=True)
+        options = Options(place, boot, clock_waits=in_step, log=True, setup_signing=allow_setup_signing)
+
+        troubles += kept.load_world()[1]
 
         def build(stored: StoredMission | None) -> Onboard:
             onboard = Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())
-            world, troubles = kept.load_world()
-            for trouble in troubles:
-                print(f"autopilot: {trouble}", file=sys.stderr)
-            onboard.restore_world(world)
+            onboard.restore_world(kept.load_world()[0])
             return onboard
 
         stations = [address for address in (*gcs, *api) if address is not None]
@@ -557,10 +577,9 @@ def main(
         else:
             ground = GroundStations(tuple(stations), _listen(tcp) if tcp else None)
         program = Program(build, mission, kept, sim, ground, say)
-        areas, troubles = kept.load_areas(place)
-        for trouble in troubles:
-            print(f"autopilot: {trouble}", file=sys.stderr)
+        areas, unread = kept.load_areas(place)
         program.take_areas(areas)
+        program.tell(troubles + unread)
         program.onboard.rehearse()
         if not compiled:
             for part in parts:
