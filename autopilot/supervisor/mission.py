@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from autopilot.geometry.linear import norm
 from autopilot.guidance.legs import Calm, Hold, Leg, Pass, Swing
 from autopilot.supervisor.guide import lost
 from autopilot.supervisor.machine import begin_legs, happen, must_happen
-from autopilot.supervisor.motion import as_flown, calm, length_at, stop, swings
+from autopilot.supervisor.motion import AT_REST, as_flown, calm, length_at, stop, swings
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     INFO,
@@ -132,7 +133,17 @@ def _next_step(flight: Flight, leg: Leg | None, step: Step, view: View, settings
         legs = step_legs(step, here, flight, settings)
         flight = replace(flight, mission=replace(flight.mission, step_anchor=here))
         return _flying(flight, legs, view)
-    return begin_step(flight, step_event(flight), view, settings)
+    return _on_time(begin_step(flight, step_event(flight), view, settings), flight, leg)
+
+
+def _on_time(begun: Flight, before: Flight, leg: Leg | None) -> Flight:
+    """The flight on a step that began when the one before it was over, which may have been between two ticks:
+    the clock of the mission loses nothing from step to step."""
+    if leg is None or not begun.legs or isinstance(begun.legs[0], Calm):
+        return begun
+    if norm(leg.jet(leg.duration_s)[1]) > AT_REST:  # what is left of its motion is stopped from now on
+        return begun
+    return replace(begun, leg_start_us=before.leg_start_us + round(leg.duration_s * 1e6))
 
 
 def _flying(flight: Flight, legs: tuple[Leg, ...], view: View) -> Flight:

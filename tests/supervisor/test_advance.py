@@ -146,7 +146,7 @@ def test_signals_begin_again_from_their_anchor_after_a_pause() -> None:
     sky.run(lambda s: bool(s.flight.legs) and isinstance(s.flight.legs[0], Run))
     run = sky.flight.legs[0]
     assert isinstance(run, Run)
-    sky.wait(1.3)
+    sky.wait(1.2)
     sky.ask(Pause())
     sky.run(lambda s: isinstance(s.flight.legs[0], Hold))
     assert norm(sub(sky.view.x_load, run.anchor)) > 0.01, "paused somewhere else"

@@ -72,6 +72,21 @@ def test_getting_ready_is_taken_from_the_delay_before() -> None:
     assert norm(asked[1]) == 0.0
 
 
+def test_the_clock_of_a_mission_loses_nothing_from_step_to_step() -> None:
+    """A hold from which the signals after it borrow ends between two ticks, and they begin then."""
+    sky = started(Takeoff(2.0), Delay(3.0), EDGE, Delay(1.2345), EDGE, model.Land())
+    sky.run(lambda s: s.flight.phase == Phase.MISSION)
+    asked_us, expected_us = [], sky.flight.leg_start_us
+    for seconds in (3.0, 1.2345):
+        expected_us += round(seconds * 1e6)
+        leg = sky.flight.legs[0]
+        sky.run(lambda s, leg=leg: s.flight.legs[0] is not leg and isinstance(s.flight.legs[0], Run))
+        path = sky.flight.legs[0].path
+        asked_us.append(sky.flight.leg_start_us + round(path.lead_s * 1e6) - expected_us)
+        expected_us += round(path.duration_s * 1e6)
+    assert asked_us == pytest.approx([0, 0], abs=2)
+
+
 def test_the_setpoint_looks_ahead_into_the_step_that_follows() -> None:
     sky = started(Takeoff(2.0), Delay(3.0), EDGE, model.Land())
     sky.run(lambda s: s.flight.phase == Phase.MISSION)
