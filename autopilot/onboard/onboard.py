@@ -44,6 +44,7 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    ServiceFailed,
     SigningChanged,
     TimesyncAnswered,
     Verdict,
@@ -128,7 +129,14 @@ class Onboard:
     ) -> None:
         self.parameters = parameters
         self.endpoint = VehicleEndpoint(
-            identity, options.home, parameters, mission, card, signing, options.boot_unix_us
+            identity,
+            options.home,
+            parameters,
+            mission,
+            card,
+            signing,
+            options.boot_unix_us,
+            options.setup_signing,
         )
         self.now_us = 0
         self.tick = -1
@@ -337,8 +345,8 @@ class Onboard:
                     self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered() | SigningChanged() | WorldSaved():
-                    pass  # the shell waits for the one and stores the other
+                case TimesyncAnswered() | SigningChanged() | WorldSaved() | ServiceFailed():
+                    pass  # the shell waits for the one, stores the other, and shows the last
         return [event for event in events if not self._world.owns(event)]
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:

@@ -84,6 +84,7 @@ class Options:
     lockstep: bool = True
     clock_waits: bool = True  # for the autopilot, however long it works
     log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` gives
+    setup_signing: bool = False  # a first signing key is taken from whoever sends one
 
 
 def sub_mode(flight: Flight) -> int:

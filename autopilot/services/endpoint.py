@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from autopilot.services.commands import CommandService
+from autopilot.services.faults import Faults
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
 from autopilot.services.ftp import FtpService
@@ -106,9 +107,11 @@ class VehicleEndpoint:
         card: Card | None = None,
         signing: Signing | None = None,
         boot_unix_us: int = 0,
+        setup_signing: bool = False,
     ) -> None:
+        """`setup_signing`: a first signing key is taken from whoever sends one."""
         self.identity = identity
-        self._signing = SigningService(signing, boot_unix_us)
+        self._signing = SigningService(signing, boot_unix_us, setup_signing)
         self._missions = MissionService(home, mission or StoredMission(), identity.flavour.home_is_item)
         self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
         self._reached_us: int | None = None
@@ -127,6 +130,7 @@ class VehicleEndpoint:
             self._ftp,
             self._logs,
         )
+        self._faults = Faults()
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         table: dict[int, Stream] = STREAMS | (LOAD_STREAMS if identity.load_system else {})
@@ -191,7 +195,11 @@ class VehicleEndpoint:
             if handler and self._is_for_us(message_id, received.message):
                 peer = Peer(link, received.system, received.component)
                 wrapped = self._decider(state, peer, now_us, decide)
-                self._do(handler(received.message, peer, now_us, wrapped), events)
+                try:
+                    outputs = handler(received.message, peer, now_us, wrapped)
+                except Exception:  # a fault of ours must not bring the vehicle down
+                    outputs = self._faults.answered(received.message, peer, now_us)
+                self._do(outputs, events)
                 self._follow_up(events)
         return events
 
@@ -257,7 +265,11 @@ class VehicleEndpoint:
         self._forget_silent(now_us)
         if self._work or now_us >= self._timer_us or self._signing.signing is not None:
             for service in self._timed:
-                self._do(service.poll(now_us), self._events)
+                try:
+                    outputs = service.poll(now_us)
+                except Exception:  # as in `receive`
+                    outputs = self._faults.told(type(service).__name__, now_us)
+                self._do(outputs, self._events)
             self._follow_up(self._events)
             self._say_reached_again(now_us)
             self._work, self._stirred = False, True

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from autopilot.services.files import Card, Entry, FileError, Path, Trouble, path_of
 
 CARD: Path = ("fs", "microsd")
-_CHUNK = 2**20
 _NO_INVERSION = 0xFFFFFFFF
 
 # the bytes of a made file, given what stood behind '?' in its name
@@ -49,19 +48,19 @@ class FileTree:
                 self._folders.setdefault(path[:depth], set()).add(path[depth])
         self.protected: Path | None = None  # on the card, being written by the vehicle itself
 
-    def entries(self, text: bytes) -> list[Entry]:
-        """What is in a folder, by name."""
+    def entries(self, text: bytes, first: int = 0, most: int | None = None) -> list[Entry]:
+        """What is in a folder, by name: at most so many entries from the first one on."""
         path = path_of(text)
         on_card = _on_card(path)
         if on_card is not None:
-            return self.card.entries(on_card)
+            return self.card.entries(on_card, first, most)
         folders = self._folders.get(path, set())
         files = [p for p in self._made if p[:-1] == path]
         if not folders and not files:
             raise FileError(Trouble.NOT_FOUND)
         found = [Entry(name, 0, True) for name in folders]
         found += [Entry(file[-1], len(self._made[file]({})), False) for file in files]
-        return sorted(found)
+        return sorted(found)[first : None if most is None else first + most]
 
     def open(self, text: bytes) -> OpenFile:
         """An existing file, to be read."""
@@ -100,14 +99,6 @@ class FileTree:
         if not file.writable or file.path == self.protected:
             raise FileError(Trouble.PROTECTED)
         self.card.write(file.path, offset, data)
-
-    def checksum(self, text: bytes) -> int:
-        """The checksum of a file."""
-        file = self.open(text)
-        total, offset = 0, 0
-        for offset in range(0, self.size(file), _CHUNK):
-            total = checksum(self.read(file, offset, _CHUNK), total)
-        return total
 
     def truncate(self, text: bytes, size: int) -> None:
         """Cut a file of the card, or fill it up with zeros."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from errno import ENAMETOOLONG
 from typing import NamedTuple, Protocol
 
 Path = tuple[str, ...]  # names from the root downwards; () is the root itself
@@ -53,8 +54,8 @@ class Entry(NamedTuple):
 class Card(Protocol):
     """A tree of files. Every method raises FileError where it cannot do what it says."""
 
-    def entries(self, path: Path) -> list[Entry]:
-        """What is in a folder, by name."""
+    def entries(self, path: Path, first: int = 0, most: int | None = None) -> list[Entry]:
+        """What is in a folder, by name: at most so many entries from the first one on."""
 
     def size(self, path: Path) -> int:
         """Bytes in a file."""
@@ -102,11 +103,18 @@ def path_of(text: bytes) -> Path:
 
 @dataclass(slots=True)
 class Limits:
-    """What a card takes from outside: bytes in one file, bytes in all, files and folders."""
+    """What a card takes from outside: bytes in one file, bytes in all, files and folders, and how many names
+    a path may have."""
 
     file_bytes: int = 64 * 2**20
     total_bytes: int = 1024 * 2**20
-    files: int = 4096
+    files: int = 1024  # to list them all takes a millisecond
+    depth: int = 32
+
+    def check_depth(self, names: int) -> None:
+        """Raise FileError for a path of more names."""
+        if names > self.depth:
+            raise FileError(Trouble.FAIL_ERRNO, ENAMETOOLONG)
 
 
 class MemoryCard:
@@ -117,12 +125,12 @@ class MemoryCard:
         self._files: dict[Path, bytearray] = {}
         self._folders: set[Path] = {()}
 
-    def entries(self, path: Path) -> list[Entry]:
+    def entries(self, path: Path, first: int = 0, most: int | None = None) -> list[Entry]:
         if path not in self._folders:
             raise FileError(Trouble.NOT_FOUND)
         found = [Entry(file[-1], len(data), False) for file, data in self._files.items() if file[:-1] == path]
         found += [Entry(folder[-1], 0, True) for folder in self._folders if folder and folder[:-1] == path]
-        return sorted(found)
+        return sorted(found)[first : None if most is None else first + most]
 
     def size(self, path: Path) -> int:
         return len(self._file(path))
@@ -134,7 +142,7 @@ class MemoryCard:
         if path in self._folders:
             raise FileError(Trouble.FAIL)
         self._parent(path)
-        self._one_more()
+        self._one_more(path)
         self._files[path] = bytearray()
 
     def write(self, path: Path, offset: int, data: bytes) -> None:
@@ -159,6 +167,7 @@ class MemoryCard:
             raise FileError(Trouble.EXISTS)
         self._parent(new)
         if old in self._files:
+            self._limits.check_depth(len(new))
             self._files[new] = self._files.pop(old)
             return
         if not old or old not in self._folders:
@@ -166,6 +175,8 @@ class MemoryCard:
         if new[: len(old)] == old:
             raise FileError(Trouble.FAIL)
         length = len(old)
+        inside = [len(path) for path in (*self._files, *self._folders) if path[:length] == old]
+        self._limits.check_depth(len(new) + max(inside) - length)
         self._files = {_moved(path, old, new, length): data for path, data in self._files.items()}
         self._folders = {_moved(path, old, new, length) for path in self._folders}
 
@@ -173,7 +184,7 @@ class MemoryCard:
         if path in self._folders or path in self._files:
             raise FileError(Trouble.EXISTS)
         self._parent(path)
-        self._one_more()
+        self._one_more(path)
         self._folders.add(path)
 
     def remove_folder(self, path: Path) -> None:
@@ -192,7 +203,8 @@ class MemoryCard:
         if path[:-1] not in self._folders:
             raise FileError(Trouble.NOT_FOUND)
 
-    def _one_more(self) -> None:
+    def _one_more(self, path: Path) -> None:
+        self._limits.check_depth(len(path))
         if len(self._files) + len(self._folders) > self._limits.files:
             raise FileError(Trouble.FAIL)
 

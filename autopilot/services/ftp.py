@@ -5,7 +5,8 @@ MAVSDK and QGroundControl say 0); opening with a number that is open puts the ne
 Sessions that are not used for `IDLE_US` are closed.
 
 A request that comes twice (same client, same sequence number, same bytes) is not done twice: its reply is
-sent again. Bursts go out at a steady pace, `BURST_PACKETS` at a time, the last of them marked.
+sent again. Bursts go out at a steady pace, `BURST_PACKETS` at a time, the last of them marked. The checksum
+of a file is counted a part at each tick; a client has one under way at most.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
-from autopilot.services.file_tree import FileTree, OpenFile
+from autopilot.services.file_tree import FileTree, OpenFile, checksum
 from autopilot.services.files import Entry, FileError, Trouble
 from autopilot.services.records import Decide, Link, Output, Peer, Send
 from autopilot.services.streams import NEVER_US
@@ -30,10 +31,12 @@ MOST_CLIENTS = 32  # whose replies are kept
 BURST_PACKETS = 128
 BURST_PACE_US = 500  # between two packets of a burst: 478 kB/s
 BURST_AT_ONCE = 16  # of them in one tick
+SUMMED_AT_ONCE = 2**17  # bytes of a file whose checksum is asked for, in one tick
 
 LENGTH = 251  # FILE_TRANSFER_PROTOCOL.payload
 _HEADER = struct.Struct("<HBBBBBxI")  # seq, session, opcode, size, asked, burst complete, offset
 DATA_BYTES = LENGTH - _HEADER.size  # 239
+_MOST_LISTED = DATA_BYTES // 3  # entries that go into one reply: a letter, a name, and its end
 _UINT32 = struct.Struct("<I")
 
 
@@ -112,6 +115,16 @@ class _Burst:
     due_us: int
 
 
+@dataclass(slots=True)
+class _Sum:
+    """A checksum that is being counted."""
+
+    asked: Packet
+    file: OpenFile
+    offset: int = 0
+    total: int = 0
+
+
 _Key = tuple[Peer, int]  # a client and one of its sessions
 # what is done afresh whenever it is asked: nothing changes by it
 _REPEATABLE = frozenset((Op.NONE, Op.LIST, Op.READ, Op.BURST, Op.CHECKSUM))
@@ -124,6 +137,7 @@ class FtpService:
         self._tree = tree
         self._sessions: dict[_Key, _Session] = {}
         self._bursts: dict[_Key, _Burst] = {}
+        self._sums: dict[Peer, _Sum] = {}
         # the last replies by client: request to reply and when it was made
         self._replies: OrderedDict[Peer, OrderedDict[bytes, tuple[Packet, int]]] = OrderedDict()
 
@@ -150,6 +164,8 @@ class FtpService:
 
     def next_timer(self) -> int:
         """When `poll` has something to do, in us."""
+        if self._sums:
+            return 0
         if not self._sessions:
             return NEVER_US
         bursts = min((burst.due_us for burst in self._bursts.values()), default=NEVER_US)
@@ -157,8 +173,10 @@ class FtpService:
         return min(bursts, idle + IDLE_US)
 
     def poll(self, now_us: int) -> list[Output]:
-        """The packets of bursts whose time has come; forgets idle sessions."""
+        """The packets of bursts whose time has come, and checksums; forgets idle sessions."""
         outputs: list[Output] = []
+        for peer, one in list(self._sums.items()):
+            outputs += self._count(peer, one)
         for key, burst in list(self._bursts.items()):
             outputs += self._go_on(key, burst, now_us)
         for key, session in list(self._sessions.items()):
@@ -172,11 +190,14 @@ class FtpService:
             self._close(key)
         for peer in [peer for peer in self._replies if peer.link == link]:
             del self._replies[peer]
+        for peer in [peer for peer in self._sums if peer.link == link]:
+            del self._sums[peer]
 
     # ---- requests
 
     def _do(self, asked: Packet, peer: Peer, now_us: int) -> Packet | None:
-        """The reply; None for a burst, whose packets are replies of their own."""
+        """The reply; None for a burst, whose packets are replies of their own, and a checksum, whose reply
+        comes when it is counted."""
         tree, data = self._tree, asked.data
         if asked.size > DATA_BYTES:
             raise FileError(Trouble.INVALID_DATA_SIZE)
@@ -190,10 +211,12 @@ class FtpService:
             case Op.RESET:
                 for key in [key for key in self._sessions if key[0] == peer]:
                     self._close(key)
+                self._sums.pop(peer, None)
                 self._replies.pop(peer, None)
                 return _ack(asked)
             case Op.LIST:
-                return _ack(asked, _listing(tree.entries(data), asked.offset), asked.offset)
+                entries = tree.entries(data, asked.offset, _MOST_LISTED)
+                return _ack(asked, _listing(entries), asked.offset)
             case Op.OPEN_RO:
                 file = tree.open(data)
                 return self._open(file, asked, peer, now_us)
@@ -227,7 +250,11 @@ class FtpService:
                 old, _, new = data.partition(b"\0")
                 tree.rename(old, new)
             case Op.CHECKSUM:
-                return _ack(asked, _UINT32.pack(tree.checksum(data)))
+                if len(self._sums) >= MOST_CLIENTS and peer not in self._sums:
+                    raise FileError(Trouble.NO_SESSIONS)
+                if peer not in self._sums or self._sums[peer].asked != asked:
+                    self._sums[peer] = _Sum(asked, tree.open(data))
+                return None
             case _:
                 raise FileError(Trouble.UNKNOWN_COMMAND)
         return _ack(asked)
@@ -264,7 +291,20 @@ class FtpService:
         if len(self._replies) > MOST_CLIENTS:
             self._replies.popitem(last=False)
 
-    # ---- bursts
+    # ---- checksums and bursts
+
+    def _count(self, peer: Peer, one: _Sum) -> list[Output]:
+        """The next part of a checksum; its reply where it was the last."""
+        try:
+            data = self._tree.read(one.file, one.offset, SUMMED_AT_ONCE)
+        except FileError as error:
+            del self._sums[peer]
+            if error.trouble is not Trouble.END_OF_FILE:
+                return [_message(_refusal(one.asked, error), peer)]
+            return [_message(_ack(one.asked, _UINT32.pack(one.total)), peer)]
+        one.total = checksum(data, one.total)
+        one.offset += len(data)
+        return []
 
     def _go_on(self, key: _Key, burst: _Burst, now_us: int) -> list[Output]:
         peer, number = key
@@ -296,10 +336,10 @@ class FtpService:
         return outputs
 
 
-def _listing(entries: list[Entry], first: int) -> bytes:
+def _listing(entries: list[Entry]) -> bytes:
     """As many entries as go in, each ended by NUL; FileError END_OF_FILE behind the last."""
     listing = b""
-    for entry in entries[first:]:
+    for entry in entries:
         text = f"D{entry.name}" if entry.is_folder else f"F{entry.name}\t{entry.size}"
         one = text.encode() + b"\0"
         if len(one) > DATA_BYTES:
@@ -310,6 +350,11 @@ def _listing(entries: list[Entry], first: int) -> bytes:
     if not listing:
         raise FileError(Trouble.END_OF_FILE)
     return listing
+
+
+def refusal_of(message: Any, peer: Peer) -> Any:
+    """The reply to a request that could not be done, for no fault of its own."""
+    return _message(_refusal(packet_of(bytes(message.payload)), FileError(Trouble.FAIL)), peer).message
 
 
 def _ack(asked: Packet, data: bytes = b"", offset: int = 0) -> Packet:

@@ -96,7 +96,23 @@ class WorldSaved:
     values: Mapping[str, float]
 
 
-Event = ParameterChanged | MissionChanged | AreasChanged | TimesyncAnswered | SigningChanged | WorldSaved
+@dataclass(frozen=True, slots=True)
+class ServiceFailed:
+    """A fault of ours in the service of a message: where, and the trace of it for a developer."""
+
+    what: str
+    trace: str
+
+
+Event = (
+    ParameterChanged
+    | MissionChanged
+    | AreasChanged
+    | TimesyncAnswered
+    | SigningChanged
+    | WorldSaved
+    | ServiceFailed
+)
 Output = Send | Say | Announce | Event
 
 

@@ -14,13 +14,16 @@ from autopilot.wire.signing import NEWEST, UNITS_PER_S, Sign, Signing, timestamp
 AHEAD = 10 * UNITS_PER_S  # by so much the stored time is ahead of the one in use
 _COMPLAIN_US = 10_000_000
 _NO_KEY = bytes(32)
+_NOT_TAKEN = "Signing key not changed: start the autopilot with --signing-key or --allow-setup-signing"
 
 
 class SigningService:
     """The key in force, if there is one."""
 
-    def __init__(self, signing: Signing | None, boot_unix_us: int) -> None:
+    def __init__(self, signing: Signing | None, boot_unix_us: int, setup: bool = False) -> None:
+        """`setup`: whoever is heard may set the first key."""
         self.signing = signing
+        self._setup = setup
         self._boot_unix_us = boot_unix_us
         self._stored = 0 if signing is None else signing.timestamp
         self._refused = False
@@ -51,7 +54,10 @@ class SigningService:
         return heard
 
     def receive_setup(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """SETUP_SIGNING: a new key, or none (all zeros). Once there is a key, only by who knows it."""
+        """SETUP_SIGNING: a new key, or none (all zeros). Once there is a key, only by who knows it; before,
+        by nobody, for it would lock out all others, unless the vehicle was started to take one."""
+        if self.signing is None and not self._setup:
+            return [Say(mavlink.MAV_SEVERITY_WARNING, _NOT_TAKEN)]
         verdict = decide(ChangeSigningKey())
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             why = verdict.text or "not allowed"

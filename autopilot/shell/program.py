@@ -23,6 +23,7 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    ServiceFailed,
     SigningChanged,
     TimesyncAnswered,
     WorldSaved,
@@ -380,6 +381,8 @@ class Program:
                         self._storage.keep_world(values)
                     case SigningChanged(key, timestamp):
                         self._storage.keep_signing(key, timestamp)
+                    case ServiceFailed(what, trace):
+                        print(f"autopilot: internal error in {what}:\n{trace}", file=sys.stderr, flush=True)
             except OSError as error:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
@@ -487,6 +490,11 @@ def _address_or_none(text: str) -> Address | None:
     metavar="FILE",
     help="Hear only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
 )
+@click.option(
+    "--allow-setup-signing",
+    is_flag=True,
+    help="Take a first signing key from whoever sends SETUP_SIGNING.",
+)
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 @click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
 def main(
@@ -500,6 +508,7 @@ def main(
     home: Home | None,
     storage: Path | None,
     signing_key: bytes | None,
+    allow_setup_signing: bool,
     quiet: bool,
 ) -> None:
     """Fly a quadrotor with a load on a cable: sensors in, rotor commands out, MAVLink to ground stations."""
@@ -530,7 +539,7 @@ def main(
         if signing_key is not None:
             _begin_signing(kept, signing_key)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
-        options = Options(place, boot, clock_waits=in_step, log=True)
+        options = Options(place, boot, clock_waits=in_step, log=True, setup_signing=allow_setup_signing)
 
         def build(stored: StoredMission | None) -> Onboard:
             onboard = Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())

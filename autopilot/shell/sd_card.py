@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from autopilot.services import files
@@ -38,18 +38,19 @@ class DirectoryCard:
         root.mkdir(parents=True, exist_ok=True)
         self._root = root.resolve()
         self._limits = limits or Limits()
-        self._used = self._count()[1]  # bytes, at least: what is taken away counts until a file is made
+        self._held, self._used = self._count()  # files and folders, and bytes in the files
 
-    def entries(self, path: files.Path) -> list[Entry]:
-        with _as_file_errors(), os.scandir(self._at(path)) as found:
-            entries = []
-            for one in found:
-                if one.is_symlink():
-                    continue
+    def entries(self, path: files.Path, first: int = 0, most: int | None = None) -> list[Entry]:
+        place = self._at(path)
+        with _as_file_errors(), os.scandir(place) as found:
+            named = sorted((one.name, one) for one in found if not one.is_symlink())
+        entries = []
+        for name, one in named[first : None if most is None else first + most]:
+            with suppress(OSError):  # gone meanwhile
                 status = one.stat(follow_symlinks=False)
                 size = 0 if one.is_dir() else status.st_size
-                entries.append(Entry(one.name, size, one.is_dir(), int(status.st_mtime)))
-        return sorted(entries)
+                entries.append(Entry(name, size, one.is_dir(), int(status.st_mtime)))
+        return entries
 
     def size(self, path: files.Path) -> int:
         with _as_file_errors():
@@ -62,40 +63,54 @@ class DirectoryCard:
 
     def create(self, path: files.Path) -> None:
         with _as_file_errors():
-            self._one_more()
-            self._at(path).open("wb").close()
+            place = self._at(path)
+            before = place.stat().st_size if place.is_file() else None
+            if before is None:
+                self._one_more(path)
+            place.open("wb").close()
+            self._held += before is None
+            self._used -= before or 0
 
     def write(self, path: files.Path, offset: int, data: bytes) -> None:
         with _as_file_errors():
-            self._room(path, offset + len(data))
+            grown = max(0, self._room(path, offset + len(data)))
             with self._file(path).open("r+b") as file:
                 file.seek(offset)
                 file.write(data)
+            self._used += grown
 
     def truncate(self, path: files.Path, size: int) -> None:
         with _as_file_errors():
-            self._room(path, size)
+            grown = self._room(path, size)
             os.truncate(self._file(path), size)
+            self._used += grown
 
     def remove(self, path: files.Path) -> None:
         with _as_file_errors():
-            self._file(path).unlink()
+            place = self._file(path)
+            size = place.stat().st_size
+            place.unlink()
+            self._gone(size)
 
     def rename(self, old: files.Path, new: files.Path) -> None:
         with _as_file_errors():
-            target = self._at(new)
+            source, target = self._at(old), self._at(new)
             if target.exists():
                 raise FileError(Trouble.EXISTS)
-            self._at(old).rename(target)
+            deeper = len(new) > len(old) and source.is_dir()
+            self._limits.check_depth(len(new) + (self._height(source) if deeper else 0))
+            source.rename(target)
 
     def make_folder(self, path: files.Path) -> None:
         with _as_file_errors():
-            self._one_more()
+            self._one_more(path)
             self._at(path).mkdir()
+            self._held += 1
 
     def remove_folder(self, path: files.Path) -> None:
         with _as_file_errors():
             self._at(path).rmdir()
+            self._gone(0)
 
     def append(self, path: files.Path, data: bytes) -> None:
         """Write behind the end of a file, which is made if there is none; OSError as the system says."""
@@ -105,7 +120,9 @@ class DirectoryCard:
             raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
         place.parent.mkdir(parents=True, exist_ok=True)
         with place.open("ab") as file:
+            self._held += file.tell() == 0
             file.write(data)
+            self._used += len(data)
 
     def make_room(self, folder: files.Path, ending: str, most_bytes: int) -> None:
         """Take away the first files of a folder, by name, until the rest is no more than that."""
@@ -118,8 +135,10 @@ class DirectoryCard:
         for file in found:
             if size <= most_bytes:
                 return
-            size -= file.stat().st_size
+            taken = file.stat().st_size
             file.unlink()
+            size -= taken
+            self._gone(taken)
 
     def _file(self, path: files.Path) -> Path:
         place = self._at(path)
@@ -136,20 +155,46 @@ class DirectoryCard:
                 raise FileError(Trouble.NOT_FOUND)
         return place
 
-    def _room(self, path: files.Path, size: int) -> None:
+    def _room(self, path: files.Path, size: int) -> int:
+        """By how many bytes a file of this size is larger than the present one, if there is room for them."""
         grown = size - self._file(path).stat().st_size
-        if grown <= 0:
-            return
-        if size > self._limits.file_bytes or self._used + grown > self._limits.total_bytes:
+        too_large = size > self._limits.file_bytes or self._used + grown > self._limits.total_bytes
+        if grown > 0 and too_large:
             raise FileError(Trouble.FAIL_ERRNO, errno.ENOSPC)
-        self._used += grown
+        return grown
 
-    def _one_more(self) -> None:
-        count, self._used = self._count()
-        if count >= self._limits.files:
+    def _one_more(self, path: files.Path) -> None:
+        self._limits.check_depth(len(path))
+        if self._held >= self._limits.files:
             raise FileError(Trouble.FAIL_ERRNO, errno.ENOSPC)
+
+    def _gone(self, size: int) -> None:
+        self._held -= 1
+        self._used -= size
 
     def _count(self) -> tuple[int, int]:
-        """Files and folders on the card, and bytes in them."""
-        found = [place.lstat() for place in self._root.rglob("*")]
-        return len(found), sum(status.st_size for status in found)
+        """Files and folders on the card, and bytes in the files."""
+        count = size = 0
+        for _, one in _below(self._root):
+            count += 1
+            size += 0 if one.is_dir(follow_symlinks=False) else one.stat(follow_symlinks=False).st_size
+        return count, size
+
+    def _height(self, folder: Path) -> int:
+        """How many levels lie in a folder."""
+        return max((depth for depth, _ in _below(folder)), default=0)
+
+
+def _below(folder: Path) -> Iterator[tuple[int, os.DirEntry[str]]]:
+    """Everything in a folder with its depth, 1 for what lies in it directly, however deep that goes.
+
+    What vanishes meanwhile, or can no longer be named, is passed over.
+    """
+    ahead = [(1, str(folder))]
+    while ahead:
+        depth, place = ahead.pop()
+        with suppress(OSError), os.scandir(place) as found:
+            for one in found:
+                yield depth, one
+                if one.is_dir(follow_symlinks=False):
+                    ahead.append((depth + 1, one.path))

@@ -139,10 +139,14 @@ STREAMED = [
 ]
 
 
-def make_rig(mission: tuple[WireItem, ...] = (), identity: Identity | None = None) -> Rig:
+def make_rig(
+    mission: tuple[WireItem, ...] = (), identity: Identity | None = None, setup_signing: bool = False
+) -> Rig:
     table = make_table()
     stored = StoredMission(mission)
-    rig = Rig(VehicleEndpoint(identity or Identity(), HOME, table, stored), table)
+    rig = Rig(
+        VehicleEndpoint(identity or Identity(), HOME, table, stored, setup_signing=setup_signing), table
+    )
     rig.endpoint.add_link("gcs")
     return rig
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import itertools
 import os
 import struct
+import subprocess
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pymavlink.mavftp import MAVFTP
 
-from autopilot.services.file_tree import FileTree
+from autopilot.services.file_tree import FileTree, checksum
 from autopilot.services.files import Card, FileError, Limits, MemoryCard, Trouble, path_of
 from autopilot.services.ftp import (
     BURST_PACKETS,
@@ -64,7 +65,10 @@ class Client:
     ) -> Packet:
         self.seq += 1
         length = len(data) if size is None else size
-        (reply,) = self.send(Packet(self.seq, session, op, length, offset=offset, data=data))
+        replies = self.send(Packet(self.seq, session, op, length, offset=offset, data=data))
+        if op == Op.CHECKSUM and not replies:
+            replies = next(filter(None, (self.poll() for _ in range(1000))))
+        (reply,) = replies
         assert reply.seq == self.seq + 1
         assert reply.asked == op
         return reply
@@ -372,6 +376,79 @@ def test_the_card_can_be_full(client: Client) -> None:
     refused = [client.ask(Op.CREATE, b"/fs/microsd/%d" % i).opcode == Op.NAK for i in range(100)]
     assert refused[0] is False
     assert refused[-1] is True
+
+
+def test_folders_do_not_nest_for_ever(client: Client) -> None:
+    """A folder within a folder, moved into the next one, is deeper than any path that can be written."""
+    top = b"/fs/microsd/"
+    client.good(Op.MAKE_FOLDER, top + b"0")
+    refused = 0
+    for i in range(1, 60):
+        client.good(Op.MAKE_FOLDER, top + b"%d" % i)
+        moved = client.ask(Op.RENAME, top + b"%d\0%b%d/a" % (i - 1, top, i))
+        refused += moved.opcode == Op.NAK
+    assert refused == 1, "the tower that is deep enough stays, and another begins"
+
+
+def test_a_path_has_so_many_names_at_most(client: Client) -> None:
+    deep = [b"/fs/microsd"]
+    for _ in range(Limits().depth):
+        deep.append(deep[-1] + b"/d")
+        client.good(Op.MAKE_FOLDER, deep[-1])
+    assert client.trouble(Op.MAKE_FOLDER, deep[-1] + b"/e") == Trouble.FAIL_ERRNO
+    assert client.trouble(Op.CREATE, deep[-1] + b"/e") == Trouble.FAIL_ERRNO
+    client.put(deep[-2] + b"/e", b"1")
+    assert client.trouble(Op.RENAME, deep[-2] + b"/e\0" + deep[-1] + b"/e") == Trouble.FAIL_ERRNO
+
+
+@pytest.fixture
+def deep_folder(tmp_path: Path) -> Iterator[Path]:
+    """A folder within a folder, deeper than calls of Python may be nested."""
+    top = tmp_path / "card"
+    top.mkdir()
+    inner = os.open(top, os.O_RDONLY)
+    for _ in range(1010):
+        os.mkdir("a", dir_fd=inner)
+        inner, outer = os.open("a", os.O_RDONLY, dir_fd=inner), inner
+        os.close(outer)
+    os.close(inner)
+    yield top
+    subprocess.run(["rm", "-r", top], check=True)  # pytest cannot
+
+
+def test_a_card_is_counted_however_deep_it_is(deep_folder: Path) -> None:
+    """Whoever fills the directory by other means: the vehicle starts, and serves it."""
+    client = Client(DirectoryCard(deep_folder))
+    assert client.names(b"/fs/microsd") == ["Da"]
+    client.put(b"/fs/microsd/b", b"1")
+    client.good(Op.MAKE_FOLDER, b"/fs/microsd/c")
+    assert client.ask(Op.RENAME, b"/fs/microsd/a\0/fs/microsd/c/a").opcode == Op.NAK
+
+
+def test_what_is_taken_away_makes_room(client: Client) -> None:
+    for _ in range(20):
+        client.put(b"/fs/microsd/a", b"x" * 90_000)
+        client.good(Op.TRUNCATE, b"/fs/microsd/a", offset=10_000)
+        client.put(b"/fs/microsd/b", b"x" * 90_000)
+        client.good(Op.REMOVE, b"/fs/microsd/b")
+        client.good(Op.MAKE_FOLDER, b"/fs/microsd/d")
+        client.good(Op.REMOVE_FOLDER, b"/fs/microsd/d")
+
+
+def test_a_checksum_is_counted_over_many_ticks(client: Client) -> None:
+    """A tick reads so much at most; who asks again meanwhile is not answered twice."""
+    client.put(b"/fs/microsd/a", b"")
+    client.good(Op.TRUNCATE, b"/fs/microsd/a", offset=100_000)
+    asked = Packet(1, 0, Op.CHECKSUM, 14, data=b"/fs/microsd/a\0")
+    assert client.send(asked) == client.send(asked) == []
+    replies = [client.poll() for _ in range(5)]
+    (reply,) = [reply for one in replies for reply in one]
+    assert struct.unpack("<I", reply.data) == (checksum(bytes(100_000)),)
+    assert client.service.next_timer() > 0
+    client.send(asked)
+    client.good(Op.REMOVE, b"/fs/microsd/a")
+    (reply,) = client.poll()
+    assert (reply.opcode, reply.data[0]) == (Op.NAK, Trouble.NOT_FOUND)
 
 
 def test_unknown_opcodes_and_replies(client: Client) -> None:

@@ -95,7 +95,7 @@ def replay(rig: Any) -> Any:
 @FEW
 @given(steps=st.lists(STEP, max_size=25), result=st.sampled_from([0, 1, 2, 3, 4, 5]))
 def test_any_messages_in_any_order(rig_with, items, steps, result):
-    rig = rig_with(items(3))
+    rig = rig_with(items(3), setup_signing=True)
     rig.verdict = lambda request: Verdict(result, "because")
     mission, parameters = state(rig)
     for link, pause_us, message in steps:
@@ -114,7 +114,7 @@ def test_any_messages_in_any_order(rig_with, items, steps, result):
     end=st.integers(0, 2000),
 )
 def test_mutated_datagrams_count_only_where_they_are_still_valid(rig_with, items, whole, cuts, end):
-    rig = rig_with(items(3))
+    rig = rig_with(items(3), setup_signing=True)
     writer = FrameWriter(255, 190)
     datagram = bytearray(b"".join(writer.frame(message) for message in whole))
     for place, flip in cuts:
@@ -131,7 +131,7 @@ def test_mutated_datagrams_count_only_where_they_are_still_valid(rig_with, items
 @FEW
 @given(st.binary(max_size=600))
 def test_any_bytes(rig_with, items, datagram):
-    rig = rig_with(items(3))
+    rig = rig_with(items(3), setup_signing=True)
     before = state(rig)
     rig.send_bytes(datagram, link="noise")
     rig.poll()
@@ -287,7 +287,7 @@ class Model:
 @settings(FEW, max_examples=250)
 @given(turns=st.lists(TURN, max_size=14), result=st.sampled_from([0, 0, 0, 1, 2, 5]))
 def test_what_changes_is_what_a_model_says(rig_with, items, turns, result):
-    rig = rig_with(items(3))
+    rig = rig_with(items(3), setup_signing=True)
     rig.verdict = lambda request: Verdict(result, "because")
     plans = {0: rig.endpoint.mission.items} | rig.endpoint.areas
     initial = rig.table.values()
@@ -323,7 +323,7 @@ def test_what_changes_is_what_a_model_says(rig_with, items, turns, result):
 )
 def test_with_a_key_no_service_hears_what_is_not_signed_with_it(rig_with, items, steps, key):
     """Unsigned or signed with another key: no answer, no request, no change, no link but by a HEARTBEAT."""
-    rig = rig_with(items(3))
+    rig = rig_with(items(3), setup_signing=True)
     rig.send(m.MAVLink_setup_signing_message(1, 1, bytes(range(32)), 0))
     rig.poll()
     rig.asked.clear()

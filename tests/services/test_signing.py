@@ -93,7 +93,31 @@ def changes(rig: Any) -> list[SigningChanged]:
     return [event for event in rig.events if isinstance(event, SigningChanged)]
 
 
-def test_a_key_is_set_changed_and_taken_away(rig: Any) -> None:
+@pytest.fixture
+def open_to_all(rig: Any) -> Any:
+    """The rig with a vehicle that takes a first key from whoever sends one."""
+    rig.endpoint = VehicleEndpoint(Identity(), Home(), rig.table, boot_unix_us=BOOT_US, setup_signing=True)
+    rig.endpoint.add_link("gcs")
+    return rig
+
+
+def test_a_stranger_cannot_lock_the_operator_out(rig: Any) -> None:
+    (first, *more) = [r.text for r in rig.replies(setup(KEY)) if r.get_type() == "STATUSTEXT"]
+    assert "--allow-setup-signing" in "".join([first, *more])
+    assert changes(rig) == rig.asked == []
+    send(rig, ARM, None)
+    assert len(rig.asked) == 1, "still heard without a signature"
+
+
+def test_a_key_that_was_taken_away_is_not_replaced_by_a_stranger(signed: Any) -> None:
+    send(signed, setup(bytes(32)), Signing(KEY, BOOT))
+    assert changes(signed)[-1].key is None
+    send(signed, setup(OTHER), None)
+    assert changes(signed)[-1].key is None
+
+
+def test_a_key_is_set_changed_and_taken_away(open_to_all: Any) -> None:
+    rig = open_to_all
     send(rig, setup(KEY, BOOT), None)
     assert rig.asked == [ChangeSigningKey()]
     assert changes(rig)[-1].key == KEY
@@ -108,7 +132,8 @@ def test_a_key_is_set_changed_and_taken_away(rig: Any) -> None:
     assert KEY.hex() not in repr(rig.events)
 
 
-def test_a_refused_change_changes_nothing(rig: Any) -> None:
+def test_a_refused_change_changes_nothing(open_to_all: Any) -> None:
+    rig = open_to_all
     rig.verdict = lambda request: Verdict(m.MAV_RESULT_DENIED, "disarm first")
     (text,) = [r for r in rig.replies(setup(KEY)) if r.get_type() == "STATUSTEXT"]
     assert "disarm first" in text.text

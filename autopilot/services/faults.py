@@ -1,0 +1,54 @@
+"""What is said where a service of ours fails: the vehicle flies on, and who asked is answered."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from typing import Any
+
+from autopilot.services.ftp import refusal_of
+from autopilot.services.records import Output, Peer, Say, Send, ServiceFailed
+from autopilot.wire.dialect import plumbline as mavlink
+
+AGAIN_US = 10_000_000  # between two words about one service
+
+
+class Faults:
+    """Tells of each service that fails, but not again and again."""
+
+    def __init__(self) -> None:
+        self._told_us: dict[str, int] = {}
+
+    def told(self, what: str, now_us: int) -> list[Output]:
+        """The words about the exception that is being handled; none where they were said just now."""
+        last = self._told_us.get(what)
+        if last is not None and now_us - last < AGAIN_US:
+            return []
+        self._told_us[what] = now_us
+        kind = sys.exc_info()[0]
+        name = kind.__name__ if kind is not None else "?"
+        text = f"Internal error in {what}: {name}; the flight goes on"
+        return [Say(mavlink.MAV_SEVERITY_ERROR, text), ServiceFailed(what, traceback.format_exc())]
+
+    def answered(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
+        """The words, and what the asker waits for: that nothing was done."""
+        return [*self.told(message.get_type(), now_us), *_refusals(message, peer)]
+
+
+def _refusals(message: Any, peer: Peer) -> list[Output]:
+    """The answer of a protocol that knows one."""
+    system, component = peer.system, peer.component
+    match message.get_msgId():
+        case mavlink.MAVLINK_MSG_ID_COMMAND_LONG | mavlink.MAVLINK_MSG_ID_COMMAND_INT:
+            failed = mavlink.MAV_RESULT_FAILED
+            answer: Any = mavlink.MAVLink_command_ack_message(
+                message.command, failed, 0, 0, system, component
+            )
+        case mavlink.MAVLINK_MSG_ID_MISSION_COUNT | mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT:
+            kind = message.mission_type
+            answer = mavlink.MAVLink_mission_ack_message(system, component, mavlink.MAV_MISSION_ERROR, kind)
+        case mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
+            answer = refusal_of(message, peer)
+        case _:
+            return []
+    return [Send(peer.link, answer)]
