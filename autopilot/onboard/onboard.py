@@ -50,7 +50,15 @@ from autopilot.services.records import (
     Verdict,
     WorldSaved,
 )
-from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome, StartMission
+from autopilot.services.requests import (
+    Arm,
+    ChangeSigningKey,
+    Reboot,
+    ResetParameters,
+    SetHome,
+    StartMission,
+    Takeoff,
+)
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
@@ -418,7 +426,7 @@ class Onboard:
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         home = self.core.flight.area.home
-        if isinstance(request, StartMission):
+        if isinstance(request, StartMission | Takeoff) or (isinstance(request, Arm) and request.arm):
             self._have_ready()
         verdict = self.core.ask(request, self.now_us)
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
@@ -426,8 +434,8 @@ class Onboard:
         return verdict
 
     def _have_ready(self) -> None:
-        """Prepare a short mission that is to begin on the ground at once, if nobody has yet: clients that are
-        told to wait (MAVSDK) do not always know how to."""
+        """Prepare a short mission before the ground is left, if nobody has yet, so that it begins when it is
+        asked to: clients that are told to wait (MAVSDK) do not always know how to."""
         work = self.work
         if work is not None and self.core.flight.phase in ON_GROUND and len(work.steps) <= AT_ONCE_STEPS:
             self.finish(work, work.done())

@@ -81,3 +81,16 @@ def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() ->
     assert not craft.flight.mission.plan.prepared.pending
     onboard.finish(work, PENDING)
     assert not craft.flight.mission.plan.prepared.pending, "an answer that nobody waits for"
+
+
+def test_a_vehicle_that_leaves_the_ground_has_the_paths_of_a_short_mission() -> None:
+    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+    craft.wait(1.0)
+    upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
+    work = craft.onboard.work
+    assert work is not None
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0) == ACCEPTED
+    assert craft.onboard.work is work
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    assert craft.onboard.work is None
+    assert not craft.flight.mission.plan.prepared.pending
