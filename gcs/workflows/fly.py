@@ -101,6 +101,10 @@ def _fly_own(
         from gcs.workflows.own_flight import fly_own  # while they load
 
         _check(mission, options)
+        if options.speed is None:
+            from gcs.report.warm import load as load_report
+
+            load_report(lambda: own.vehicle.waiting)  # there is a core to spare until the vehicle speaks
         return fly_own(mission, options, log, own, stop, watch)
 
 
