@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, EXIT_USAGE, GcsError
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE, GcsError, disk_trouble
 from gcs.shell.display import say
 
 # name: (module in gcs.commands, summary)
@@ -86,6 +86,11 @@ class Gcs(click.Group):
         except BrokenPipeError:  # `gcs ... | head`
             sys.stderr.close()
             code = EXIT_DONE
+        except OSError as error:
+            if not disk_trouble(error):
+                raise
+            say(f"{disk_trouble(error)}; nothing more can be written")
+            code = EXIT_ERROR
         sys.exit(code if isinstance(code, int) else EXIT_DONE)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+
 EXIT_DONE = 0
 EXIT_ERROR = 1  # a known error, told in one line
 EXIT_USAGE = 2  # the command line itself is wrong
@@ -13,6 +15,12 @@ class GcsError(Exception):
     """A known error. Its text is the one line that a person reads."""
 
     exit_code = EXIT_ERROR
+
+
+class InputError(GcsError):
+    """The command line names something that there is not, or a value that cannot be."""
+
+    exit_code = EXIT_USAGE
 
 
 class NoVehicleError(GcsError):
@@ -27,3 +35,14 @@ class StoppedError(GcsError):
 
 class RefusedError(GcsError):
     """The vehicle answered no."""
+
+
+_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+
+
+def disk_trouble(error: BaseException | None) -> str:
+    """What the disk did not take, and why, if that is what the error says; else nothing."""
+    if not isinstance(error, OSError) or error.errno not in _DISK or not error.strerror:
+        return ""
+    where = f"{error.filename}: " if error.filename else ""
+    return f"{where}{error.strerror.lower()}"

@@ -1,7 +1,7 @@
 """TOML files that a pydantic schema describes: which are shipped, how one is read, and what is wrong with it.
 
-Missions, vehicles and sensor profiles are such files. This module knows none of them: it imports nothing of
-Plumbline, so that every room may use it.
+Missions, vehicles and sensor profiles are such files. This module knows none of them, so that every room may
+use it.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
+
+from missions.text_files import TextFileError, text_of
 
 Spec = TypeVar("Spec", bound=BaseModel)
 
@@ -44,6 +46,8 @@ _UNITS = {
 
 class FileError(ValueError):
     """The file or the name given is at fault. `problems` has one line each; str() has them all."""
+
+    unknown = False  # there is no such name
 
     def __init__(self, problems: Sequence[str]) -> None:
         self.problems = tuple(problems)
@@ -89,15 +93,14 @@ class TomlFiles:
             near = get_close_matches(given, self.names(), n=1)
             hint = f"did you mean {near[0]}? " if near else ""
             names = ", ".join(self.names())
-            raise self.error(
-                [f"unknown {self.kind} {given!r}; {hint}shipped: {names}; or the path of a file"]
-            )
+            text = f"unknown {self.kind} {given!r}; {hint}shipped: {names}; or the path of a file"
+            error = self.error([text])
+            error.unknown = True
+            raise error
         try:
-            return TomlText(path.stem, given, path.read_text(encoding="utf-8"))
-        except UnicodeDecodeError as error:
-            raise self.error([f"{given}: not a text file in UTF-8 (byte {error.start})"]) from None
-        except OSError as error:
-            raise self.error([f"{given}: cannot be read: {error.strerror}"]) from None
+            return TomlText(path.stem, given, text_of(path))
+        except TextFileError as error:
+            raise self.error([f"{given}: {error}"]) from None
 
     def table(self, text: str, where: str) -> dict[str, Any]:
         """The keys and values of a TOML text. `where` begins each line of an error."""
@@ -105,6 +108,8 @@ class TomlFiles:
             return tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
             raise self.error([_toml_problem(error, text, where)]) from None
+        except RecursionError:
+            raise self.error([f"{where}: nested too deeply"]) from None
 
     def record(self, spec: type[Spec], table: Mapping[str, Any], where: str) -> Spec:
         """The table as `spec` describes it."""

@@ -278,7 +278,7 @@ def _run_on(cpu: int) -> None:
         raise ValueError(f"cannot run on core {cpu}; leave --cpu out, or name another core") from None
 
 
-@click.command()
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--sensors",
     default="lab",

@@ -59,6 +59,7 @@ class FlightLog:
         self._ended: LogChunk | None = None
         self._parameters: dict[str, float] = {}
         self._version = -1
+        self._lost = False  # that of this flight
         self._texts: deque[tuple[int, int, str]] = deque(maxlen=TEXTS_BEFORE)
 
     @property
@@ -89,7 +90,8 @@ class FlightLog:
         rate_hz = self._table["LOG_RATE_HZ"]
         self._next_us = NEVER_US
         if self._path is None:
-            if not armed or rate_hz <= 0.0:
+            self._lost = self._lost and armed
+            if not armed or rate_hz <= 0.0 or self._lost:
                 return
             self._begin(now_us, taken())
         if armed:
@@ -119,9 +121,10 @@ class FlightLog:
             self._waiting = 0
 
     def give_up(self) -> None:
-        """The shell could not store: forget the open log."""
+        """The shell could not store: forget the open log. There is none until the vehicle is armed again."""
         self._path = self._ended = None
-        self._next_us = 0
+        self._lost = True
+        self._next_us = NEVER_US
         self._chunks.clear()
         self._waiting = 0
 

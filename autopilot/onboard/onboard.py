@@ -29,7 +29,7 @@ from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.log_topics import Sample
-from autopilot.onboard.packet_loss import Loss
+from autopilot.onboard.packet_loss import LOSS_PARAMETER, Loss
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import Moment, Moments, Options
 from autopilot.onboard.warmup import rehearse_telemetry
@@ -44,31 +44,19 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
-    ServiceFailed,
-    SigningChanged,
-    TimesyncAnswered,
     Verdict,
-    WorldSaved,
 )
-from autopilot.services.requests import (
-    Arm,
-    ChangeSigningKey,
-    Reboot,
-    ResetParameters,
-    SetHome,
-    StartMission,
-    Takeoff,
-)
+from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import ON_GROUND, MissionPlan, Phase
+from autopilot.supervisor.state import MissionPlan, Phase, off_mission
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
-from autopilot.wire.items import WireItem, located_steps, unflown
+from autopilot.wire.items import WireItem, endless_from, located_steps, unflown
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 from autopilot.wire.simulator_frames import put_answer
@@ -79,9 +67,6 @@ _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MOST_NAMED = 8  # items in one text
-AT_ONCE_STEPS = (
-    30  # of a mission that begins as soon as it is asked for; some 0.4 s if nobody has prepared it
-)
 LEAP_US = 5_000_000  # larger jumps are rejected
 
 
@@ -120,7 +105,8 @@ def plan_of(mission: StoredMission, home: Home, limits: Limits | None, return_to
     steps = located_steps(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
     prepared = PENDING if limits is None else prepare(flown, sequence, limits, return_to)
-    return MissionPlan(flown, sequence, len(mission.items), prepared)
+    again_from = endless_from(mission.items, steps)
+    return MissionPlan(flown, sequence, len(mission.items), prepared, again_from)
 
 
 class Onboard:
@@ -162,6 +148,8 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
+        self._world_told = False  # what parameters it has
+        self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
@@ -240,6 +228,9 @@ class Onboard:
             self._moments.fixed = True
         for message in tick.aside:
             self._hear_simulator(message)
+        if not self._world_told and self._world.settled(tick.now_us):
+            self._world_told = True
+            self.endpoint.parameters_complete(tick.now_us)
         if period_us > 0 and not 0 < self._shortest_us <= period_us:
             # ticks may be lost in real time: the shortest step is that of the sensors' rate
             self._shortest_us = period_us
@@ -342,7 +333,7 @@ class Onboard:
 
     def receive_ground(self, datagram: bytes, link: Link) -> list[Event]:
         """Handle a datagram from a ground station; what must be stored comes back as events."""
-        if self._received_loss.drops(datagram, self.parameters["SIM_LOSS_PCT"]):
+        if self._received_loss.drops(datagram, self.parameters[LOSS_PARAMETER]):
             return []
         events = self.endpoint.receive(datagram, link, self.now_us, self._decide)
         for event in events:
@@ -353,13 +344,19 @@ class Onboard:
                     self.take_areas(kind, items)
                 case ParameterChanged(name, value):
                     self._world.changed(name, value)
-                case TimesyncAnswered() | SigningChanged() | WorldSaved() | ServiceFailed():
-                    pass  # the shell waits for the one, stores the other, and shows the last
-        return [event for event in events if not self._world.owns(event)]
+                case _:
+                    pass  # the shell waits for it, stores it, or shows it
+        return [event for event in events if self._outlives(event)]
+
+    def _outlives(self, event: Event) -> bool:
+        """Whether the shell is to store it: not the parameters of the world, nor the loss of the link."""
+        return not isinstance(event, ParameterChanged) or (
+            event.name not in self.parameters.learned and self.parameters.describe(event.name).stored
+        )
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
         """What is due on the ground links at this tick."""
-        percent = self.parameters["SIM_LOSS_PCT"]
+        percent = self.parameters[LOSS_PARAMETER]
         sent = self.endpoint.poll(self._snapshot, self.now_us)
         if percent > 0.0:
             sent = [
@@ -426,19 +423,10 @@ class Onboard:
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
         home = self.core.flight.area.home
-        if isinstance(request, StartMission | Takeoff) or (isinstance(request, Arm) and request.arm):
-            self._have_ready()
         verdict = self.core.ask(request, self.now_us)
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
             self._follow_home()
         return verdict
-
-    def _have_ready(self) -> None:
-        """Prepare a short mission before the ground is left, if nobody has yet, so that it begins when it is
-        asked to: clients that are told to wait (MAVSDK) do not always know how to."""
-        work = self.work
-        if work is not None and self.core.flight.phase in ON_GROUND and len(work.steps) <= AT_ONCE_STEPS:
-            self.finish(work, work.done())
 
     def _follow_home(self) -> None:
         """Read and prepare the mission anew where it returns to another home; one under way keeps its paths,
@@ -466,6 +454,10 @@ class Onboard:
             area = replace(flight.area, rally=read_rally(items, self._options.home))
         self.core.change(replace(flight, area=area))
 
+    def take_losses(self, lost: tuple[str, ...]) -> None:
+        """What of the storage cannot be read: the vehicle is not armed until that is made good."""
+        self.core.change(replace(self.core.flight, lost=lost))
+
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None, self.core.flight.area.home)
         self.core.change(with_plan(self.core.flight, plan))
@@ -492,6 +484,16 @@ class Onboard:
         for note in prepared.notes:
             self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
         self._have_prepared(prepared)
+        if self.core.flight.mission.waiting:
+            self._begin_mission()
+
+    def _begin_mission(self) -> None:
+        """Begin the mission that waited for its paths, or say why not."""
+        verdict = self.core.ask(StartMission(None), self.now_us)
+        self.endpoint.state_changed()
+        if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
+            self.core.change(off_mission(self.core.flight))
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, verdict.text or "Mission denied")
 
     def _have_prepared(self, prepared: Prepared) -> None:
         flight = self.core.flight

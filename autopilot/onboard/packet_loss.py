@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 _MASK = 2**64 - 1
+LOSS_PARAMETER = "SIM_LOSS_PCT"
+_NAME = LOSS_PARAMETER.encode()
 _TIMESYNC_ID = b"\x6f\x00\x00"  # message id 111 in a MAVLink 2 header
 
 
@@ -15,7 +17,8 @@ def _uniform(key: int) -> float:
 
 
 class Loss:
-    """Decides datagram by datagram. What keeps the ground in step with the clock is never lost."""
+    """Decides datagram by datagram. Never lost is what keeps the ground in step with the clock, and what sets
+    or tells the loss itself: a link that loses all could not be mended."""
 
     def __init__(self, direction: int) -> None:
         self._direction = direction
@@ -23,7 +26,7 @@ class Loss:
 
     def drops(self, datagram: bytes, percent: float) -> bool:
         """Whether this datagram is lost, at a loss of `percent`."""
-        if percent <= 0.0 or datagram[7:10] == _TIMESYNC_ID:
+        if percent <= 0.0 or datagram[7:10] == _TIMESYNC_ID or _NAME in datagram:
             return False
         self._count += 1
         return 100.0 * _uniform(2 * self._count + self._direction) < percent

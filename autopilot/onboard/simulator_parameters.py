@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from autopilot.services.records import Event, ParameterChanged
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import Parameter, ParameterTable, decimal_from_float32
 
@@ -31,10 +30,6 @@ class WorldParameters:
         self._ask_us = 0
         self._restored: Mapping[str, float] = {}
         self._wanted: dict[str, tuple[float, int]] = {}  # value, and when it is sent (again)
-
-    def owns(self, event: Event) -> bool:
-        """Whether an event concerns a parameter of the simulator, which it stores itself or not at all."""
-        return isinstance(event, ParameterChanged) and event.name in self._table.learned
 
     def changed(self, name: str, value: float) -> None:
         """A ground station set a parameter."""
@@ -68,11 +63,18 @@ class WorldParameters:
             self._wanted[name] = (saved, 0)
         return None
 
+    def settled(self, now_us: int) -> bool:
+        """Whether all are known, or the simulator has had time enough to tell them."""
+        return self._complete or (self._asks == LIST_ASKS and now_us >= self._ask_us)
+
+    @property
+    def _complete(self) -> bool:
+        return self._expected is not None and len(self._heard) >= self._expected
+
     def messages(self, now_us: int) -> list[Any]:
         """What goes to the simulator beside the answer to this tick."""
         messages: list[Any] = []
-        complete = self._expected is not None and len(self._heard) >= self._expected
-        if not complete and self._asks < LIST_ASKS and now_us >= self._ask_us:
+        if not self._complete and self._asks < LIST_ASKS and now_us >= self._ask_us:
             self._asks += 1
             self._ask_us = now_us + RETRY_US
             messages.append(mavlink.MAVLink_param_request_list_message(1, SIMULATOR_COMPONENT))

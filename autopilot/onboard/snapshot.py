@@ -89,8 +89,10 @@ class Options:
 
 def sub_mode(flight: Flight) -> int:
     """Sub-mode of AUTO: what was asked for, of which the phase is a part."""
-    if flight.mission.active:
+    if flight.mission.active or flight.mission.waiting:
         return identity.AUTO_MISSION
+    if flight.returning:
+        return identity.AUTO_RTL
     if flight.phase in ON_GROUND:
         return _SELECTED_MODES[flight.selected]
     return _PHASE_MODES[flight.phase]
@@ -164,6 +166,7 @@ class Told(NamedTuple):
     """What a flight record says to telemetry, whatever the estimate: fields of `Snapshot`."""
 
     launch: Vec3
+    guarded: bool
     breach: str
     breaches: int
     breach_us: int
@@ -185,6 +188,7 @@ def told(flight: Flight, items: int) -> Told:
     seq = sequence[min(flight.mission.step, len(sequence) - 1)] if sequence else 0
     return Told(
         area.home,
+        area.guarded,
         area.breach,
         area.breaches,
         area.breach_us,
@@ -307,7 +311,9 @@ class Moment(Snapshot):
 
     @cached_property
     def ready(self) -> bool:
-        """Whether the vehicle may be armed."""
+        """Whether the vehicle may be armed, or is: in flight it does not count what keeps one from that."""
+        if self.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE):
+            return True
         return not arming_complaints(self.flight, self.view, self.core.settings)
 
     @property

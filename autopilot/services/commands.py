@@ -1,8 +1,5 @@
 """COMMAND_LONG, COMMAND_INT and the mode and item messages that are commands in all but name.
 
-A command that cannot be decided yet (`IN_PROGRESS`) is asked about again until it can: its ACK comes then,
-and until then one that says so. Another that moves the vehicle, or COMMAND_CANCEL, takes its place.
-
 `PARSERS` says for each command how its parameters become a request, or why they are refused. Who decides
 about a request is an argument. Every command addressed to the vehicle gets one COMMAND_ACK, sent to the asker
 alone; a command for somebody else gets nothing.
@@ -12,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
@@ -24,6 +21,8 @@ from autopilot.services.requests import (
     ChangeAltitude,
     ChangeSpeed,
     Continue,
+    EnableFence,
+    FailRotors,
     GetMessageInterval,
     Grab,
     Land,
@@ -48,7 +47,6 @@ from autopilot.services.requests import (
     Terminate,
     Winch,
 )
-from autopilot.services.streams import NEVER_US
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import decimal_from_float32
@@ -56,31 +54,11 @@ from autopilot.wire.parameter_table import decimal_from_float32
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED
 UNSUPPORTED = mavlink.MAV_RESULT_UNSUPPORTED
-IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
-CANCELLED = 6  # MAV_RESULT, newer than the dialect's copy of the enum
 _REFUSED = (DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 
 FORCE_ARM = (2989.0, 21196.0)  # the magic numbers in use: ArduPilot and QGroundControl, PX4 and MAVSDK
 # A command repeated with `confirmation` within this time is the same command, whose ACK was lost
 REPEAT_US = 3_000_000
-ASK_US, TELL_US = 100_000, 500_000  # a command in progress is decided again, and its asker told
-LONGEST_US = 60_000_000  # that a command may be in progress
-_UNKNOWN_PROGRESS = 255
-# What is to be done in place of a command in progress
-_Moving = (
-    Takeoff
-    | Land
-    | ReturnHome
-    | SetMode
-    | StartMission
-    | Pause
-    | Continue
-    | Reposition
-    | ChangeAltitude
-    | Orbit
-    | Terminate
-    | Reboot
-)
 _MODE_BYTE = 0xFF  # a mode parameter above this is a packed custom mode
 GRIPPERS = WINCHES = (0.0, 1.0)  # by number; 0: all of them
 _NO_INT = 2**31 - 1  # "not a number" in an integer coordinate
@@ -364,8 +342,34 @@ def _winch(call: Call, context: Context) -> Request | Verdict:
     return Verdict(UNSUPPORTED, f"Winch: action {call.p[1]:g} is not offered; 1, 2, 5 and 6 are")
 
 
+def _enable_fence(call: Call, context: Context) -> Request | Verdict:
+    if call.p[0] not in (0.0, 1.0):
+        return _refused(f"Fence: param1 = {call.p[0]:g}; must be 0 (off) or 1 (on)")
+    return EnableFence(call.p[0] == 1.0)
+
+
+def _inject_failure(call: Call, context: Context) -> Request | Verdict:
+    unit, kind, rotor = _whole(call.p[0]), _whole(call.p[1]), _whole(call.p[2])
+    if unit != mavlink.FAILURE_UNIT_SYSTEM_MOTOR:
+        return Verdict(UNSUPPORTED, "Failure: rotors can fail (unit 101); for the rest see SIM_ parameters")
+    if kind not in (mavlink.FAILURE_TYPE_OK, mavlink.FAILURE_TYPE_OFF):
+        return Verdict(UNSUPPORTED, "Failure: a rotor can be ok (0) or off (1)")
+    if rotor is None or rotor not in range(5):
+        return _refused(f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... 4, or 0 for all")
+    return FailRotors(rotor, kind == mavlink.FAILURE_TYPE_OFF)
+
+
 def _plain(request: Request) -> Parser:
     return lambda call, context: request
+
+
+def _never(text: str) -> Parser:
+    return lambda call, context: Verdict(UNSUPPORTED, text)
+
+
+_NO_YAW = _never("Yaw: the nose is held east; headings are not flown")
+_NO_ROI = _never("ROI: there is no camera, and the nose is held east")
+_NO_ACTUATOR = _never("Actuators: there are rotors, gripper and winch; DO_GRIPPER and DO_WINCH move these")
 
 
 PARSERS: dict[int, Parser] = {
@@ -398,6 +402,17 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_message_interval,
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_message_interval,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_capabilities,
+    mavlink.MAV_CMD_GET_HOME_POSITION: _plain(RequestMessage(mavlink.MAVLINK_MSG_ID_HOME_POSITION, 0.0)),
+    mavlink.MAV_CMD_DO_FENCE_ENABLE: _enable_fence,
+    mavlink.MAV_CMD_INJECT_FAILURE: _inject_failure,
+    mavlink.MAV_CMD_CONDITION_YAW: _NO_YAW,
+    mavlink.MAV_CMD_DO_SET_ROI: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ROI_NONE: _NO_ROI,
+    mavlink.MAV_CMD_DO_SET_ACTUATOR: _NO_ACTUATOR,
+    mavlink.MAV_CMD_DO_SET_SERVO: _NO_ACTUATOR,
+    mavlink.MAV_CMD_DO_SET_RELAY: _NO_ACTUATOR,
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _plain(
         RequestMessage(mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION, 0.0)
     ),
@@ -423,81 +438,24 @@ class _Done(NamedTuple):
     at_us: int
 
 
-@dataclass(slots=True)
-class _Waiting:
-    """A command in progress."""
-
-    peer: Peer
-    call: str
-    command: int
-    request: Request
-    decide: Decide
-    since_us: int
-    ask_us: int
-    tell_us: int
-
-
 class CommandService:
     """Commands in, COMMAND_ACK out; what happens is decided by the `decide` given with each message."""
 
     def __init__(self, home: Home, flavour: Flavour) -> None:
         self.context = Context(home, flavour)
         self._done: dict[tuple[Peer, int], _Done] = {}
-        self._waiting: _Waiting | None = None
         self._last: tuple[Peer, int] | None = None
-
-    def next_timer(self) -> int:
-        """When `poll` has something to do, in us."""
-        return self._waiting.ask_us if self._waiting else NEVER_US
-
-    def poll(self, now_us: int) -> list[Output]:
-        """Ask again about a command in progress; its end, or that it still goes on."""
-        waiting = self._waiting
-        if waiting is None or now_us < waiting.ask_us:
-            return []
-        verdict = waiting.decide(waiting.request)
-        if verdict.result == IN_PROGRESS and now_us - waiting.since_us >= LONGEST_US:
-            verdict = Verdict(mavlink.MAV_RESULT_FAILED, verdict.text)
-        if verdict.result != IN_PROGRESS:
-            self._waiting = None
-            if verdict.result == ACCEPTED:
-                self._note_done(waiting.peer, waiting.command, waiting.call, verdict, now_us)
-            return _answer(waiting.command, verdict, waiting.peer)
-        waiting.ask_us = now_us + ASK_US
-        if now_us < waiting.tell_us:
-            return []
-        waiting.tell_us = now_us + TELL_US
-        return [_ack(waiting.command, IN_PROGRESS, waiting.peer)]
-
-    def receive_cancel(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """COMMAND_CANCEL; without such a command in progress there is nothing to be said."""
-        return self._give_up() if self._waiting and self._waiting.command == message.command else []
-
-    def _give_up(self) -> list[Output]:
-        waiting, self._waiting = self._waiting, None
-        return [_ack(waiting.command, CANCELLED, waiting.peer)] if waiting else []
 
     def _conclude(
         self, call: str, command: int, request: Request, peer: Peer, now_us: int, decide: Decide
     ) -> list[Output]:
         """Have a request decided; its answer."""
-        waiting = self._waiting
-        if waiting and (waiting.peer, waiting.command, waiting.call) == (peer, command, call):
-            return [_ack(command, IN_PROGRESS, peer)]
         verdict = decide(request)
         if verdict.result in _REFUSED and self._is_repeated(call, command, peer, now_us):
             return [_ack(command, ACCEPTED, peer)]
-        given_up: list[Output] = []
-        supersedes = isinstance(request, _Moving) or request == Arm(False, False)
-        if verdict.result == IN_PROGRESS or (supersedes and verdict.result == ACCEPTED):
-            given_up = self._give_up()
-        if verdict.result == IN_PROGRESS:
-            self._waiting = _Waiting(
-                peer, call, command, request, decide, now_us, now_us + ASK_US, now_us + TELL_US
-            )
         if verdict.result == ACCEPTED and not isinstance(request, Answered):
             self._note_done(peer, command, call, verdict, now_us)
-        return given_up + _answer(command, verdict, peer)
+        return _answer(command, verdict, peer)
 
     def _note_done(self, peer: Peer, command: int, call: str, verdict: Verdict, now_us: int) -> None:
         self._done = {k: d for k, d in self._done.items() if now_us - d.at_us <= REPEAT_US}
@@ -557,8 +515,7 @@ class CommandService:
 def _said(verdict: Verdict) -> list[Output]:
     if verdict.text is None:
         return []
-    accepted = verdict.result in (ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
-    severity = mavlink.MAV_SEVERITY_INFO if accepted else mavlink.MAV_SEVERITY_WARNING
+    severity = mavlink.MAV_SEVERITY_INFO if verdict.result == ACCEPTED else mavlink.MAV_SEVERITY_WARNING
     return [Say(severity, verdict.text)]
 
 
@@ -566,7 +523,6 @@ def _ack(command: int, result: int, peer: Peer) -> Output:
     message = mavlink.MAVLink_command_ack_message(
         command,
         result,
-        progress=_UNKNOWN_PROGRESS if result == IN_PROGRESS else 0,
         target_system=peer.system,
         target_component=peer.component,
     )

@@ -39,6 +39,7 @@ from autopilot.services.records import (
     Handler,
     Link,
     Output,
+    ParametersSaved,
     Peer,
     Say,
     Send,
@@ -46,6 +47,7 @@ from autopilot.services.records import (
     WorldSaved,
 )
 from autopilot.services.requests import (
+    FailRotors,
     FollowAttitude,
     FollowSetpoint,
     FollowStick,
@@ -124,7 +126,6 @@ class VehicleEndpoint:
         self._logs = LogService(self.files)
         self._timed = (
             self._signing,
-            self._commands,
             self._missions,
             self._parameters,
             self._ftp,
@@ -233,6 +234,15 @@ class VehicleEndpoint:
     def state_changed(self) -> None:
         """Mode or arming changed: tell everybody with the next `poll`, whatever is due."""
         self._do([Announce(None, (_HEARTBEAT,))], [])
+
+    def expect_parameters(self) -> None:
+        """More parameters will be learned soon: lists of them wait until `parameters_complete`."""
+        self._parameters.expect_more()
+
+    def parameters_complete(self, now_us: int) -> None:
+        """The parameter table is complete."""
+        self._parameters.complete(now_us)
+        self._stirred = True
 
     def parameter_changed(self, name: str) -> None:
         """The vehicle itself changed a parameter: show it to all links."""
@@ -428,8 +438,18 @@ class VehicleEndpoint:
         def decided(request: Any) -> Verdict:
             match request:
                 case StoreParameters(save):
+                    if save:
+                        self._consequences.append(ParametersSaved())
                     if save and self._parameters.table.learned:
                         self._consequences.append(self._parameters.world())
+                    return _ACCEPTED
+                case FailRotors(rotor, fail):
+                    outputs = self._parameters.fail_rotors(rotor, fail)
+                    if outputs is None:
+                        return Verdict(
+                            mavlink.MAV_RESULT_DENIED, "Failure: the simulator has told of no rotors"
+                        )
+                    self._consequences += outputs
                     return _ACCEPTED
                 case RequestCapabilities():
                     return self._request_message(
@@ -443,7 +463,7 @@ class VehicleEndpoint:
                     return self._set_interval(state, message_id, interval_us, now_us)
             verdict = decide(request)
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and isinstance(request, ResetParameters):
-                self._consequences += [*self._parameters.reset(), WorldSaved({})]
+                self._consequences += [*self._parameters.reset(), ParametersSaved(), WorldSaved({})]
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and not isinstance(request, _STREAMED):
                 if isinstance(request, SetMode):
                     self._asked_mode = request.number
@@ -493,6 +513,14 @@ class VehicleEndpoint:
         state.streams.set_interval(message_id, interval_us, now_us)
         return _ACCEPTED
 
+    def _set_origin(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
+        """SET_GPS_GLOBAL_ORIGIN: the world stays where it is, and says where that is."""
+        if message.target_system not in (0, self.identity.system):
+            return []
+        text = "Origin not moved: sitl --home and autopilot --home say where the world is"
+        where = Announce(peer.link, (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,))
+        return [Say(mavlink.MAV_SEVERITY_WARNING, text), where]
+
     def _request_data_stream(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """REQUEST_DATA_STREAM: the rate of a group on the link of the asker; stop: the default rates."""
         state = self._links[peer.link]
@@ -510,9 +538,9 @@ class VehicleEndpoint:
         return {
             m.MAVLINK_MSG_ID_COMMAND_LONG: commands.receive_long,
             m.MAVLINK_MSG_ID_COMMAND_INT: commands.receive_int,
-            m.MAVLINK_MSG_ID_COMMAND_CANCEL: commands.receive_cancel,
             m.MAVLINK_MSG_ID_SET_MODE: commands.receive_set_mode,
             m.MAVLINK_MSG_ID_MISSION_SET_CURRENT: commands.receive_set_current,
+            m.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin,
             m.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: guided.receive_local,
             m.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: guided.receive_global,

@@ -19,7 +19,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 COMPLAIN_US = 5_000_000
 STEEPEST_DEG = 60.0  # lean of an attitude setpoint
-_POSITION_BITS, _VELOCITY_BITS, _FORCE = 0x7, 0x38, 0x200
+_POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS, _FORCE = 0x7, 0x38, 0x1C0, 0x200
 _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_THRUST = mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _NO_STICK = 32767  # INT16_MAX: the axis is not there
@@ -54,7 +54,8 @@ def _from_body(v: Vec3) -> Vec3:
 def _problem(m: Any, place: tuple[float, float, float]) -> str:
     """Why a position setpoint cannot be used, or an empty string."""
     mask = m.type_mask
-    if mask & _FORCE:
+    # the bit says what an acceleration that is used means; MAVProxy sets it and uses none
+    if mask & _FORCE and mask & _ACCELERATION_BITS != _ACCELERATION_BITS:
         return "Setpoint refused: forces are not followed"
     if mask & _POSITION_BITS == _POSITION_BITS and mask & _VELOCITY_BITS == _VELOCITY_BITS:
         return "Setpoint refused: neither position nor velocity is asked for"

@@ -25,6 +25,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_encoding import from_the_wire, on_the_wire
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 
+_FAILED, _ALL_ROTORS = "SIM_ENGINE_FAIL", 0b1111
 _BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
 LIST_PACE_US = 2000  # between two values of a list: 500 a second
 LIST_BURST = 8  # of them at once, where ticks are longer than that
@@ -44,6 +45,7 @@ class ParameterService:
         self.table = table
         self._encoding = encoding
         self._lists: dict[Link, tuple[int, int]] = {}  # next index, and when
+        self._complete = True  # the table: no more parameters will be learned
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Begin the list for this link, from the start if one is under way."""
@@ -101,6 +103,15 @@ class ParameterService:
             text += f"; {kept} are fixed while running"
         return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
 
+    def fail_rotors(self, rotor: int, fail: bool) -> list[Output] | None:
+        """Let a rotor of the simulator fail or work (0: all of them); None where it has no rotors to fail."""
+        if _FAILED not in self.table.learned:
+            return None
+        before = int(self.table[_FAILED])
+        bits = _ALL_ROTORS if rotor == 0 else 1 << (rotor - 1)
+        after = self.table.set(_FAILED, before | bits if fail else before & ~bits)
+        return [Send(None, self.value_message(_FAILED)), ParameterChanged(_FAILED, after)]
+
     def world(self) -> WorldSaved:
         """What the simulator's parameters are now."""
         return WorldSaved({name: self.table[name] for name in sorted(self.table.learned)})
@@ -116,13 +127,26 @@ class ParameterService:
         whole = self._encoding.integers and self.table.describe(name).integer
         return on_the_wire(self.table[name], whole, self._encoding.bytewise)
 
+    def expect_more(self) -> None:
+        """More parameters will be learned soon: lists wait."""
+        self._complete = False
+
+    def complete(self, now_us: int) -> None:
+        """The table is complete: lists that were asked for begin."""
+        self._complete = True
+        self._lists = dict.fromkeys(self._lists, (0, now_us))
+
     def next_timer(self) -> int:
         """When `poll` has something to send, in us."""
+        if not self._complete:
+            return NEVER_US
         return min((at_us for _, at_us in self._lists.values()), default=NEVER_US)
 
     def poll(self, now_us: int) -> list[Output]:
         """The values of the lists under way whose time has come."""
         outputs: list[Output] = []
+        if not self._complete:
+            return outputs
         names = self.table.names
         for link, (index, at_us) in list(self._lists.items()):
             if at_us > now_us:

@@ -90,6 +90,11 @@ class SigningChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class ParametersSaved:
+    """The parameters are meant to be as they are now, whatever was stored before."""
+
+
+@dataclass(frozen=True, slots=True)
 class WorldSaved:
     """The simulator's parameters are to be as they are now after a restart as well (none: as it likes)."""
 
@@ -110,6 +115,7 @@ Event = (
     | AreasChanged
     | TimesyncAnswered
     | SigningChanged
+    | ParametersSaved
     | WorldSaved
     | ServiceFailed
 )

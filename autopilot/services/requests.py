@@ -32,6 +32,21 @@ class Land:
 
 
 @dataclass(frozen=True, slots=True)
+class EnableFence:
+    """Heed the fence, or do not, until it is said otherwise or the vehicle starts anew."""
+
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FailRotors:
+    """Let rotors of the simulated vehicle fail, or work again: `rotor` 1 ... 4, 0: all."""
+
+    rotor: int
+    fail: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ReturnHome:
     """Return to home."""
 
@@ -251,6 +266,7 @@ Decided = (
     | ChangeAltitude
     | ChangeSpeed
     | SetHome
+    | EnableFence
     | Release
     | Grab
     | Winch
@@ -260,5 +276,12 @@ Decided = (
     | ResetParameters
     | ChangeSigningKey
 )
-Answered = StoreParameters | RequestMessage | SetMessageInterval | GetMessageInterval | RequestCapabilities
+Answered = (
+    FailRotors
+    | StoreParameters
+    | RequestMessage
+    | SetMessageInterval
+    | GetMessageInterval
+    | RequestCapabilities
+)
 Request = Decided | Answered

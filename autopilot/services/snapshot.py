@@ -66,6 +66,7 @@ class Snapshot:
 
     launch: Vec3 = ZERO  # where a return leads: HOME_POSITION, ENU
 
+    guarded: bool = True  # the fence is not switched off
     breach: str = ""  # of the fence; empty: none
     breaches: int = 0
     breach_us: int = 0

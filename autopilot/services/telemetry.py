@@ -87,10 +87,11 @@ def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     # some tools read a missing health bit as a breach
     health = s.sensors_healthy | (0 if s.breach else mavlink.MAV_SYS_STATUS_GEOFENCE)
     present = s.sensors_present | PREARM
+    enabled = present if s.guarded else present & ~mavlink.MAV_SYS_STATUS_GEOFENCE
     return (
         mavlink.MAVLink_sys_status_message(
             onboard_control_sensors_present=present,
-            onboard_control_sensors_enabled=present,
+            onboard_control_sensors_enabled=enabled,
             onboard_control_sensors_health=health,
             load=0,
             voltage_battery=_battery_mv(s),

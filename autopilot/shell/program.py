@@ -23,6 +23,7 @@ from autopilot.services.records import (
     Link,
     MissionChanged,
     ParameterChanged,
+    ParametersSaved,
     ServiceFailed,
     SigningChanged,
     TimesyncAnswered,
@@ -275,6 +276,7 @@ class Program:
             system_status=mavlink.MAV_STATE_BOOT,
             mavlink_version=3,
         )
+        self._lost = storage.lost
         self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
@@ -286,6 +288,13 @@ class Program:
         """Fence and rally points that are already there."""
         for kind, items in areas.items():
             self.onboard.take_areas(kind, items)
+        self.onboard.take_losses(self._storage.lost)
+
+    def tell(self, troubles: list[str]) -> None:
+        """What is wrong with the storage: on the terminal, and to the operators."""
+        for trouble in troubles:
+            print(f"autopilot: {trouble}", file=sys.stderr)
+            self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, f"Storage: {trouble}")
 
     def run(self, stop: StopRequest) -> None:
         """Tick for ever."""
@@ -388,6 +397,8 @@ class Program:
                         self._storage.keep_areas(kind, items)
                     case ParameterChanged(name, value):
                         self._storage.keep_parameter(name, value)
+                    case ParametersSaved():
+                        self._storage.keep_parameters()
                     case WorldSaved(values):
                         self._storage.keep_world(values)
                     case SigningChanged(key, timestamp):
@@ -397,6 +408,9 @@ class Program:
             except OSError as error:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
+        if self._lost != self._storage.lost:
+            self._lost = self._storage.lost
+            self.onboard.take_losses(self._lost)
 
     def _keep_log(self, least_bytes: int) -> None:
         chunk = self.onboard.take_log(least_bytes)
@@ -434,7 +448,7 @@ def _address_or_none(text: str) -> Address | None:
     return None if text == "none" else address_option(text)
 
 
-@click.command()
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--sim",
     type=address_option,
@@ -536,8 +550,7 @@ def main(
         table = autopilot_parameters(load_vehicle(vehicle))
         kept = Storage(storage or user_state_path("plumbline"))
         kept.lock()
-        for trouble in kept.load_parameters(table):
-            print(f"autopilot: {trouble}", file=sys.stderr)
+        troubles = kept.load_parameters(table)
         apply_settings(table, settings)
         table.freeze()
         parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
@@ -545,19 +558,17 @@ def main(
         if not compiled:
             say(ONCE)
         mission, trouble = kept.load_mission(place)
-        if trouble:
-            print(f"autopilot: {trouble}", file=sys.stderr)
+        troubles += [trouble] if trouble else []
         if signing_key is not None:
             _begin_signing(kept, signing_key)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
         options = Options(place, boot, clock_waits=in_step, log=True, setup_signing=allow_setup_signing)
 
+        troubles += kept.load_world()[1]
+
         def build(stored: StoredMission | None) -> Onboard:
             onboard = Onboard(table, identity_of(table), options, stored, kept.card, kept.load_signing())
-            world, troubles = kept.load_world()
-            for trouble in troubles:
-                print(f"autopilot: {trouble}", file=sys.stderr)
-            onboard.restore_world(world)
+            onboard.restore_world(kept.load_world()[0])
             return onboard
 
         stations = [address for address in (*gcs, *api) if address is not None]
@@ -567,10 +578,9 @@ def main(
         else:
             ground = GroundStations(tuple(stations), _listen(tcp) if tcp else None)
         program = Program(build, mission, kept, sim, ground, say)
-        areas, troubles = kept.load_areas(place)
-        for trouble in troubles:
-            print(f"autopilot: {trouble}", file=sys.stderr)
+        areas, unread = kept.load_areas(place)
         program.take_areas(areas)
+        program.tell(troubles + unread)
         program.onboard.rehearse()
         if not compiled:
             for part in parts:

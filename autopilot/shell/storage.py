@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -19,6 +18,7 @@ from autopilot.services.mission_store import (
     serialise,
 )
 from autopilot.shell.sd_card import DirectoryCard
+from autopilot.shell.whole_file import DamagedError, keep_copy, remove, seal, unseal, write_whole
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
@@ -37,6 +37,11 @@ WORLD_FILE = "world.txt"  # parameters of the simulator
 SIGNING_FILE = "signing.key"  # key in hexadecimal digits, and the time up to which it may have been used
 CARD_DIRECTORY = "card"  # what clients reach by FILE_TRANSFER_PROTOCOL
 LOCK_FILE = "lock"
+# what a vehicle is not armed without, if it was stored: a fence, and parameters as they were set
+_MISSED: dict[int | str, str] = {
+    mavlink.MAV_MISSION_TYPE_FENCE: "the stored fence is damaged; upload it again, or clear it",
+    PARAMETER_FILE: "the stored parameters are damaged; set and save them again",
+}
 
 
 class StorageError(OSError):
@@ -44,12 +49,16 @@ class StorageError(OSError):
 
 
 class Storage:
-    """A directory; every write is a whole new file put in place at once."""
+    """A directory; every write is a whole new file put in place at once.
+
+    A file that is not what was written is never lost: a copy of it is made before another takes its place.
+    """
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
         self._parameters: dict[str, float] = {}
         self._logs: set[files.Path] = set()  # begun by this process
+        self._lost: dict[int | str, Path] = {}  # files that cannot be read: they stay until others come
         self._lock = FileLock(directory / LOCK_FILE)
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -75,20 +84,29 @@ class Storage:
         """The stored mission, and what is wrong with the file if it is none (empty: nothing)."""
         path = self._directory / MISSION_FILE
         try:
-            data = path.read_bytes()
+            mission = deserialise(path.read_bytes(), home)
         except FileNotFoundError:
             return None, ""
         except OSError as error:
             return None, f"{path}: {error.strerror}; starting without a mission"
-        mission = deserialise(data, home)
         if isinstance(mission, CorruptMission):
-            aside = path.with_suffix(".corrupt")
-            try:
-                path.replace(aside)
-            except OSError as error:
-                return None, f"{path}: {mission.reason}; {error.strerror}, starting without a mission"
-            return None, f"{path}: {mission.reason}; moved to {aside.name}, starting without a mission"
+            return None, f"{path}: {mission.reason}; {self._moved(path)}, starting without a mission"
         return mission, ""
+
+    def _moved(self, path: Path) -> str:
+        """Move a damaged file out of the way, and say so."""
+        try:
+            aside = keep_copy(path)
+            remove(path)
+        except OSError as error:
+            return _why(error)
+        return f"moved to {aside.name}"
+
+    def _give_up(self, what: int | str) -> None:
+        """Before another takes its place: a copy of the file that cannot be read."""
+        path = self._lost.get(what)
+        if path is not None:
+            keep_copy(path)
 
     def load_areas(self, home: Home) -> tuple[dict[int, tuple[WireItem, ...]], list[str]]:
         """The stored fence and rally points by MAV_MISSION_TYPE, and a line for each that is none."""
@@ -99,78 +117,90 @@ class Storage:
             try:
                 items = deserialise_items(path.read_bytes())
                 if isinstance(items, CorruptMission):
-                    troubles.append(f"{path}: {items.reason}; starting without it")
-                    continue
+                    raise DamagedError(items.reason)
                 _READERS[kind](items, home)
                 found[kind] = items
             except FileNotFoundError:
                 continue
-            except (OSError, MissionItemError) as error:
-                troubles.append(f"{path}: {error}; starting without it")
+            except (OSError, DamagedError, MissionItemError) as error:
+                self._lost[kind] = path
+                troubles.append(f"{path}: {_why(error)}; starting without it")
         return found, troubles
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """What was stored, cannot be read, and is not a thing to fly without: the reasons not to arm."""
+        return tuple(text for what, text in _MISSED.items() if what in self._lost)
 
     def keep_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Store fence or rally points; none are stored as none."""
         path = self._directory / AREA_FILES[kind]
+        self._give_up(kind)
         if items:
-            self._write(path, serialise(items))
+            write_whole(path, serialise(items))
         else:
-            path.unlink(missing_ok=True)
+            remove(path)
+        self._lost.pop(kind, None)
 
     def load_parameters(self, table: ParameterTable) -> list[str]:
         """Set what is stored; returns a line for each stored value that no longer fits."""
-        path = self._directory / PARAMETER_FILE
-        try:
-            stored = parse_text(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return []
-        except (OSError, UnicodeDecodeError, ParameterError) as error:
-            return [f"{path}: {error}; starting with the defaults"]
-        troubles = []
+        stored, troubles = self._load_text(PARAMETER_FILE, "starting with the defaults")
         for name, value in stored.items():
             try:
                 self._parameters[name] = table.set(name, value)
             except ParameterError as error:
-                troubles.append(f"{path}: {error}; left out")
+                troubles.append(f"{self._directory / PARAMETER_FILE}: {error}; left out")
         return troubles
+
+    def _load_text(self, name: str, then: str) -> tuple[dict[str, float], list[str]]:
+        """Names and numbers in a file, and what is wrong with it and what comes of that, if it is none."""
+        path = self._directory / name
+        try:
+            return parse_text(unseal(path.read_bytes())), []
+        except FileNotFoundError:
+            return {}, []
+        except (OSError, DamagedError, UnicodeDecodeError, ParameterError) as error:
+            self._lost[name] = path
+            return {}, [f"{path}: {_why(error)}; {then}"]
 
     def keep_mission(self, mission: StoredMission) -> None:
         """Store the mission; an empty one is stored as none."""
         path = self._directory / MISSION_FILE
         if mission.items:
-            self._write(path, serialise(mission.items))
+            write_whole(path, serialise(mission.items))
         else:
-            path.unlink(missing_ok=True)
+            remove(path)
 
     def keep_parameter(self, name: str, value: float) -> None:
         """Store one more parameter."""
         self._parameters[name] = value
-        lines = [f"{name} {value!r}\n" for name, value in sorted(self._parameters.items())]
-        self._write(self._directory / PARAMETER_FILE, "".join(lines).encode())
+        self.keep_parameters()
+
+    def keep_parameters(self) -> None:
+        """Store all that were set; so what could not be read is given up."""
+        self._give_up(PARAMETER_FILE)
+        write_whole(self._directory / PARAMETER_FILE, seal(_lines(sorted(self._parameters.items()))))
+        self._lost.pop(PARAMETER_FILE, None)
 
     def load_world(self) -> tuple[dict[str, float], list[str]]:
         """The simulator's parameters as they were saved, and a line if the file is none."""
-        path = self._directory / WORLD_FILE
-        try:
-            return parse_text(path.read_text(encoding="utf-8")), []
-        except FileNotFoundError:
-            return {}, []
-        except (OSError, UnicodeDecodeError, ParameterError) as error:
-            return {}, [f"{path}: {error}; left out"]
+        return self._load_text(WORLD_FILE, "left out")
 
     def keep_world(self, values: Mapping[str, float]) -> None:
         """Store the simulator's parameters; none are stored as none."""
         path = self._directory / WORLD_FILE
+        self._give_up(WORLD_FILE)
         if values:
-            self._write(path, "".join(f"{name} {value!r}\n" for name, value in values.items()).encode())
+            write_whole(path, seal(_lines(values.items())))
         else:
-            path.unlink(missing_ok=True)
+            remove(path)
+        self._lost.pop(WORLD_FILE, None)
 
     def load_signing(self) -> Signing | None:
         """The stored key with a time later than any that was used; StorageError if it is none."""
         path = self._directory / SIGNING_FILE
         try:
-            key, timestamp = path.read_text(encoding="ascii").split()
+            key, timestamp = unseal(path.read_bytes()).split()
             return Signing(bytes.fromhex(key), int(timestamp), floor=int(timestamp))
         except FileNotFoundError:
             return None
@@ -183,9 +213,9 @@ class Storage:
         """Store the key, for nobody else to read, or take it away."""
         path = self._directory / SIGNING_FILE
         if key is None:
-            path.unlink(missing_ok=True)
+            remove(path)
         else:
-            self._write(path, f"{key.hex()} {timestamp}\n".encode(), private=True)
+            write_whole(path, seal(f"{key.hex()} {timestamp}\n"), private=True)
 
     def keep_log(self, chunk: LogChunk, most_mb: float) -> None:
         """Store a part of a flight log; a new log takes the place of the oldest where they are too many."""
@@ -194,12 +224,10 @@ class Storage:
             self.card.make_room(LOG_FOLDER, LOG_ENDING, round(most_mb * 1e6))
         self.card.append(chunk.path, chunk.data)
 
-    def _write(self, path: Path, data: bytes, private: bool = False) -> None:
-        new = path.with_suffix(".new")
-        new.unlink(missing_ok=True)  # it may be readable by others
-        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666)
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
+
+def _lines(values: Iterable[tuple[str, float]]) -> str:
+    return "".join(f"{name} {value!r}\n" for name, value in values)
+
+
+def _why(error: Exception) -> str:
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)

@@ -50,6 +50,7 @@ def _enter(flight: Flight, phase: Phase, view: View, settings: Settings) -> Flig
         leg_start_us=view.now_us,
         still_since_us=-1,
         following=(),
+        returning=phase == Phase.RETURN or (flight.returning and phase in (Phase.LOWER, Phase.SET_DOWN)),
     )
     if phase == Phase.DISARMED:
         return _rewound(entered)
@@ -61,6 +62,6 @@ def _rewound(flight: Flight) -> Flight:
     return replace(
         flight,
         selected=Selected.NOTHING,
-        mission=replace(flight.mission, active=False, step=0, step_anchor=None),
+        mission=replace(flight.mission, active=False, waiting=False, step=0, step_anchor=None),
         cable=replace(flight.cable, reel_to_m=None),
     )

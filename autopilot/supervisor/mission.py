@@ -94,7 +94,8 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     step = plan.steps[number]
     if flight.phase == Phase.LIFT and not isinstance(step, Takeoff):  # lifted unasked
         return begin_step(flight, step_event(flight), view, settings), Report()
-    following = plan.steps[number + 1] if number + 1 < len(plan.steps) else None
+    after = plan.after(number)
+    following = None if after is None else plan.steps[after]
     leg = flight.legs[0] if flight.legs else None
     if isinstance(leg, Swing) and not isinstance(following, AttitudeRun):
         return _flying(flight, (calm(leg, view, settings, ends_step=True),), view), Report()
@@ -102,7 +103,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
         legs, here = stop(flight, view, settings)
         return _flying(flight, (*legs, Hold(here, SETTLE_S)), view), Report()
     reached = (plan.sequence[number],)
-    flight = at_step(flight, number + 1, done=flight.mission.done)
+    flight = at_step(flight, number + 1 if after is None else after, done=flight.mission.done)
     if following is None:
         event, text = Event.DONE, "Mission complete, holding"
         if isinstance(step, ReturnHome):  # nothing follows it: it ends on the ground, as ordered by mode

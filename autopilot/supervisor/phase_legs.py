@@ -6,6 +6,7 @@ Everything is a function of the flight, the view and the settings.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import hypot
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, transfer_leg
@@ -26,6 +27,7 @@ SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
 HEIGHT_SIGMAS = 3.0  # by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
+HOME_RADIUS = 1.0  # m about home, within which a return does not climb
 LEAST_HEIGHT = 0.3  # m over home, at which a load that was being lifted or lowered is held or carried
 
 
@@ -66,6 +68,10 @@ def _hold(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     legs, here = _raised(flight, view, settings)
     goal = return_place(here, flight.area.home, flight.area.rally)
+    least = settings.motion.return_altitude_m
+    if here[2] < least and hypot(goal[0] - here[0], goal[1] - here[1]) > HOME_RADIUS:
+        up = (here[0], here[1], least)
+        legs, here = (*legs, carry(here, up, settings.motion.lift_speed_m_s, settings)), up
     return (*legs, carry(here, (goal[0], goal[1], here[2]), flight.mission.speed_m_s, settings))
 
 

@@ -25,6 +25,7 @@ class MotionSettings:
     lift_speed_m_s: float
     taut_speed_m_s: float
     snap_speed_m_s: float  # greatest closing speed at which a slack cable is made taut
+    return_altitude_m: float  # of the load on the way home, at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +111,7 @@ def settings_from(table: ParameterTable, ramp_lag_s: float, reels: bool, follows
             lift_speed_m_s=table["MIS_LIFT_SPEED"],
             taut_speed_m_s=min(table["MIS_TAUT_SPEED"], table["MIS_SNAP_SPEED"]),
             snap_speed_m_s=table["MIS_SNAP_SPEED"],
+            return_altitude_m=table["RTL_RETURN_ALT"],
         ),
         failsafe=FailsafeSettings(
             load_error_limit_m=table["FS_LOAD_ERR"],

@@ -94,6 +94,11 @@ class MissionPlan:
     sequence: tuple[int, ...] = ()
     items: int = 0
     prepared: Prepared = UNPREPARED
+    again_from: int | None = None  # the step that follows the last one, if the mission has no end
+
+    def after(self, step: int) -> int | None:
+        """The step that follows; None after the last one."""
+        return step + 1 if step + 1 < len(self.steps) else self.again_from
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +108,7 @@ class MissionProgress:
     plan: MissionPlan = MissionPlan()
     step: int = 0  # of the plan: the present one, or the one to begin with
     active: bool = False
+    waiting: bool = False  # begins when its paths are prepared
     done: bool = False
     step_anchor: Vec3 | None = None  # where the present step began
     takeoff_altitude_m: float = 0.0
@@ -140,6 +146,7 @@ class Area:
     home: Vec3 = ZERO  # where a return leads, ENU; its height is that of the ground
     rally: tuple[Vec3, ...] = ()  # where it leads as well, if that is nearer
     fence: Fence = NO_FENCE
+    guarded: bool = True  # nobody has switched the fence off
     breach: str = ""  # why load or vehicle may not be where it is, or is about to be
     breaches: int = 0
     breach_us: int = 0  # when the last one began
@@ -161,6 +168,8 @@ class Flight:
     cable: CableState = CableState()
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
+    returning: bool = False  # home, or landing there
+    lost: tuple[str, ...] = ()  # what was stored and cannot be read: reasons not to arm
 
 
 class View(NamedTuple):
@@ -186,8 +195,8 @@ class Report(NamedTuple):
 
 
 def off_mission(flight: Flight) -> Flight:
-    """The flight with its mission interrupted; the step is kept."""
-    return replace(flight, mission=replace(flight.mission, active=False))
+    """The flight with its mission interrupted, or not begun after all; the step is kept."""
+    return replace(flight, mission=replace(flight.mission, active=False, waiting=False))
 
 
 def takeoff_event(flight: Flight) -> Event:
@@ -210,6 +219,11 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     if settings.fence.height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence.height_m:
         return f"higher than GF_MAX_VER_DIST {settings.fence.height_m:g} m"
     return fence.complaint(x_load[0], x_load[1])
+
+
+def fenced(flight: Flight, settings: Settings) -> bool:
+    """Whether the fence is heeded: GF_ACTION names what a breach leads to, and it is not switched off."""
+    return settings.fence.action != 0 and flight.area.guarded
 
 
 def carries(flight: Flight) -> bool:

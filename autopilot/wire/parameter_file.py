@@ -34,6 +34,7 @@ class ParameterSpec(BaseModel):
     values: Names | None = None
     bits: Names | None = None
     whole: bool = False
+    stored: bool = True
     reboot: bool = False
 
     @model_validator(mode="after")
@@ -53,7 +54,7 @@ class ParameterSpec(BaseModel):
         default = self._default(vehicle)
         low, high = self._limits(default)
         whole = self.whole or self.values is not None or self.bits is not None
-        return Parameter(name, default, low, high, self.unit, self.meaning, whole, self.reboot)
+        return Parameter(name, default, low, high, self.unit, self.meaning, whole, self.reboot, self.stored)
 
     @property
     def vehicle_keys(self) -> frozenset[str]:

@@ -35,6 +35,7 @@ class Parameter:
     text: str
     integer: bool = False
     fixed: bool = False  # takes effect at start only
+    stored: bool = True  # outlives the process
 
     def __post_init__(self) -> None:
         if len(self.name) > NAME_LENGTH or not _NAME.fullmatch(self.name):

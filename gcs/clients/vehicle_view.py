@@ -46,9 +46,14 @@ _AUTO_MODES = {
     8: "follow",
     9: "precision-land",
 }
-MODES: dict[str, tuple[int, int]] = {
-    **{name: (main, 0) for main, name in _MAIN_MODES.items() if main != _AUTO},
-    **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items()},
+FLOWN_MODES: dict[str, tuple[int, int]] = {  # by this vehicle: main mode and sub-mode
+    "position": (3, 0),
+    "offboard": (6, 0),
+    "takeoff": (_AUTO, 2),
+    "hold": (_AUTO, 3),
+    "mission": (_AUTO, 4),
+    "return": (_AUTO, 5),
+    "land": (_AUTO, 6),
 }
 
 _PHASES = {

@@ -8,7 +8,7 @@ import click
 
 from gcs.clients import command
 from gcs.clients.operation import Operation
-from gcs.clients.vehicle_view import MODES
+from gcs.clients.vehicle_view import FLOWN_MODES
 from gcs.commands.options import PositiveType, connect_option
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -73,19 +73,20 @@ def resume_command(address: Address) -> None:
 
 
 @click.command("takeoff")
-@click.option(
-    "--altitude",
-    "altitude_m",
-    type=PositiveType(),
-    help="Height of the load above home in m.  [default: the vehicle's MIS_TAKEOFF_ALT]",
-)
+@click.argument("height", type=PositiveType(), required=False)
+@click.option("--altitude", type=PositiveType(), help="The same as HEIGHT.")
 @connect_option
-def takeoff_command(altitude_m: float | None, address: Address) -> None:
+def takeoff_command(height: float | None, altitude: float | None, address: Address) -> None:
     """Lift the load and hold it.
 
-    The vehicle must be armed, or is armed next.
+    HEIGHT is that of the load above home in m; without it the vehicle's MIS_TAKEOFF_ALT counts. The vehicle
+    must be armed, or is armed next.
     """
     from gcs.workflows.running_flight import vehicle_home
+
+    if height is not None and altitude is not None:
+        raise click.UsageError("HEIGHT and --altitude are the same; give one")
+    altitude_m = height if altitude is None else altitude
 
     def make(session: Session) -> Operation:
         if altitude_m is None:
@@ -103,14 +104,14 @@ def land_command(address: Address) -> None:
 
 
 @click.command("mode")
-@click.argument("name", type=click.Choice(sorted(MODES)))
+@click.argument("name", type=click.Choice(sorted(FLOWN_MODES)))
 @connect_option
 def mode_command(name: str, address: Address) -> None:
     """Change the flight mode.
 
-    NAME is a PX4 mode in plain words; which of them the vehicle has is for it to say.
+    NAME is a PX4 mode that the vehicle has, in plain words.
     """
-    main, sub = MODES[name]
+    main, sub = FLOWN_MODES[name]
     _send(
         address,
         lambda session: command.set_mode(session.target, name, main, sub, armed=bool(session.view.armed)),

@@ -12,6 +12,7 @@ from autopilot.wire.items import Fate, MissionItemError, WireItem, fate, located
 from gcs.formats.items import FormatError, command_name
 from gcs.formats.plan import Plan, read_plan, write_plan
 from gcs.formats.waypoints import HEAD, read_waypoints, write_waypoints
+from missions.text_files import TextFileError, text_of
 
 PLAN_ENDING = ".plan"
 WAYPOINT_ENDINGS = (".waypoints", ".wpl", ".txt", ".mission")
@@ -34,11 +35,9 @@ def is_foreign(path: Path) -> bool:
 def read_foreign(path: Path) -> Plan:
     """What is in a .plan or .waypoints file; FormatError says what is wrong with it."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise FormatError(f"{path}: cannot be read: not a text file") from None
-    except OSError as error:
-        raise FormatError(f"{path}: cannot be read: {error.strerror}") from None
+        text = text_of(path)
+    except TextFileError as error:
+        raise FormatError(f"{path}: {error}") from None
     try:
         if path.suffix.lower() == PLAN_ENDING and not text.startswith(HEAD):
             return read_plan(text)

@@ -12,7 +12,8 @@ from difflib import get_close_matches
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
-from gcs.errors import GcsError
+from gcs.errors import GcsError, InputError
+from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
@@ -25,13 +26,13 @@ def check_flight_inputs(vehicle: str, sensors: str, settings: Iterable[tuple[str
     try:
         found = load_vehicle(vehicle)
         load_profile(sensors)
-    except ValueError as error:
-        raise GcsError(str(error)) from None
+    except FileError as error:
+        raise (InputError if error.unknown else GcsError)(str(error)) from None
     own, world = autopilot_parameters(found), sim_parameters(truth_of(found))
     for name, value in settings:
         table = world if name.startswith(_WORLD) and name not in own else own
         if name not in table:
-            raise GcsError(f"--set {name}: {_unknown(name, [*own.names, *world.names])}")
+            raise InputError(f"--set {name}: {_unknown(name, [*own.names, *world.names])}")
         _check(table, name, value)
 
 
@@ -39,7 +40,7 @@ def _check(table: ParameterTable, name: str, value: float) -> None:
     try:
         table.check(name, value)
     except ParameterError as error:
-        raise GcsError(f"--set {error}") from None
+        raise InputError(f"--set {error}") from None
 
 
 def _unknown(name: str, names: list[str]) -> str:

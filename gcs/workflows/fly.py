@@ -19,6 +19,7 @@ from gcs.errors import (
     EXIT_NOT_MET,
     GcsError,
     StoppedError,
+    disk_trouble,
 )
 from gcs.shell.display import say
 from gcs.shell.link import Address
@@ -209,7 +210,13 @@ class _Folder:
             raise GcsError(f"--out {self._path}: {error.strerror}") from None
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:
+        trouble, tlog = disk_trouble(error), self._path / TLOG_FILE
+        if trouble:
+            size = tlog.stat().st_size
+            raise GcsError(
+                f"--out {self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}"
+            ) from None
         if self._kept:
             return
         for name in self._OURS:

@@ -14,6 +14,7 @@ from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
 from gcs.shell.display import StepDisplay, say
 from gcs.shell.link import Address
 from gcs.shell.session import Session
+from missions.text_files import TextFileError, text_of
 
 
 def list_parameters(pattern: str, address: Address) -> dict[str, float]:
@@ -64,11 +65,8 @@ def save_parameters(file: Path, address: Address) -> int:
 def load_parameters(file: Path, address: Address) -> tuple[int, int]:
     """Set all parameters of a file; how many were set, and how many it holds. Each refusal is told."""
     try:
-        values = parse_text(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not a text file"
-        raise GcsError(f"{file}: cannot be read: {reason}") from None
-    except ParameterError as error:
+        values = parse_text(text_of(file))
+    except (TextFileError, ParameterError) as error:
         raise GcsError(f"{file}: {error}") from None
     refused = 0
     with Session(address) as session, StepDisplay("parameters") as display:

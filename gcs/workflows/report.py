@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from autopilot.wire.tlog import read_tlog
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
 
@@ -40,6 +41,8 @@ def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, P
     tlog = source / TLOG_FILE if source.is_dir() else source
     if not tlog.is_file():
         raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
+    if next(read_tlog(tlog), None) is None:
+        raise GcsError(f"{tlog}: holds no telemetry; must be a .tlog, or a directory that holds {TLOG_FILE}")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else tlog.with_suffix(""))
     return make_report(tlog, folder, None, quiet), folder
 

@@ -21,8 +21,9 @@ Every number that can be set by name, with the value it has for the vehicle `beb
 `--set NAME=VALUE` (of `sitl`, `autopilot` or `gcs fly`, which hands it to the right one), or in flight by the
 parameter protocol: `gcs param list`, `gcs param set NAME VALUE`, or any ground station. The autopilot shows
 the simulator's parameters beside its own. A change of its own is stored at once and is there again after a
-restart; a change of the world lasts as long as the world, unless PREFLIGHT_STORAGE saves it. Those
-marked *fixed* take effect at start only. Defaults marked *vehicle* are taken from the vehicle file.
+restart; a change of the world lasts as long as the world, unless PREFLIGHT_STORAGE saves it, and the loss of
+the ground link, `SIM_LOSS_PCT`, ends with the autopilot. Those marked *fixed* take effect at start only.
+Defaults marked *vehicle* are taken from the vehicle file.
 
 This page is made of `autopilot/vehicle/parameters.toml` and `sitl/sim_parameters.toml`.
 """

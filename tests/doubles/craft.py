@@ -124,6 +124,7 @@ class Craft:
 
 
 _HEARD = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
     mavlink.MAVLINK_MSG_ID_STATUSTEXT,
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
     mavlink.MAVLINK_MSG_ID_MISSION_ACK,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -145,14 +146,33 @@ def test_wrong_usage_is_one_line_and_code_2(arguments, part):
 
 
 @pytest.mark.parametrize("command", ["fly", "check", "upload"])
+def test_an_unknown_mission_is_wrong_usage_and_the_nearest_is_named(command):
+    line = one_line(run(command, "case-z"), EXIT_USAGE)
+    assert line.startswith("gcs: unknown mission 'case-z'; did you mean case-c? shipped: case-a, case-b,")
+
+
+def test_what_holds_no_telemetry_makes_no_report(tmp_path):
+    source = tmp_path / "flight.parquet"
+    source.write_bytes(b"PAR1" + bytes(range(256)) * 50)
+    assert "holds no telemetry" in one_line(run("report", str(source)), EXIT_ERROR)
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.parquet"]
+
+
+def test_a_height_is_given_either_way_and_once():
+    assert "give one" in one_line(run("takeoff", "5", "--altitude", "5"), EXIT_USAGE)
+
+
+@pytest.mark.parametrize("command", ["fly", "check", "upload"])
 @pytest.mark.parametrize(
     ("mission", "part"),
     [
-        ("case-z", "case-b"),
         ("nowhere/x.toml", "nowhere/x.toml"),
         ("bad.toml", "items[0].altitude_m"),
         ("torn.toml", "not TOML"),
         ("nan.toml", "finite"),
+        ("deep.toml", "nested too deeply"),
+        ("pipe.toml", "a device or a pipe"),
+        ("/dev/zero", "a device or a pipe"),
     ],
 )
 def test_a_bad_mission_is_one_line_and_code_1(tmp_path, monkeypatch, command, mission, part):
@@ -164,6 +184,8 @@ def test_a_bad_mission_is_one_line_and_code_1(tmp_path, monkeypatch, command, mi
     Path("bad.toml").write_text(text.format(-2.0))
     Path("nan.toml").write_text(text.format("nan"))
     Path("torn.toml").write_text("[[items")
+    Path("deep.toml").write_text("a = " + "[" * 5000 + "]" * 5000)
+    os.mkfifo("pipe.toml")
     before = sorted(tmp_path.iterdir())
     assert part in one_line(run(command, mission), EXIT_ERROR)
     assert sorted(tmp_path.iterdir()) == before, "nothing is left behind"
@@ -277,6 +299,9 @@ def test_single_commands(live):
         assert (result.exit_code, result.stderr) == (EXIT_DONE, ""), result.output
     by_command = {message.command: message for message in vehicle.commands}
     assert by_command[mavlink.MAV_CMD_NAV_TAKEOFF].param7 == 2.0
+    assert run("takeoff", "3", "--connect", port).exit_code == EXIT_DONE
+    by_command = {message.command: message for message in vehicle.commands}
+    assert by_command[mavlink.MAV_CMD_NAV_TAKEOFF].param7 == 3.0
     mode = by_command[mavlink.MAV_CMD_DO_SET_MODE]
     assert (mode.param1, mode.param2, mode.param3) == (129.0, 4.0, 3.0)
     assert run("disarm", "--connect", port).exit_code == EXIT_DONE

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from autopilot.vehicle.file import VEHICLES
 from gcs.cli import gcs
-from gcs.errors import EXIT_DONE, EXIT_ERROR
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
 from gcs.workflows.flight_inputs import check_flight_inputs
 from sitl.sensors.shipped import PROFILES
 
@@ -33,10 +33,10 @@ def no_process(monkeypatch):
     monkeypatch.setattr(subprocess, "Popen", refuse)
 
 
-def refused(*arguments):
+def refused(*arguments, code=EXIT_USAGE):
     """The one line on stderr."""
     result = CliRunner().invoke(gcs, list(arguments), prog_name="gcs")
-    assert result.exit_code == EXIT_ERROR, result.output
+    assert result.exit_code == code, result.output
     assert result.stdout == ""
     (line,) = result.stderr.splitlines()
     return line
@@ -49,7 +49,8 @@ def refused(*arguments):
 def test_a_vehicle_that_the_simulator_refuses_no_command_takes(command, change, part, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(BEBOP.replace(*change), encoding="utf-8")
-    assert refused(command, "hover", "--vehicle", str(path)).startswith(f"gcs: {path}: {part}")
+    line = refused(command, "hover", "--vehicle", str(path), code=EXIT_ERROR)
+    assert line.startswith(f"gcs: {path}: {part}")
 
 
 def test_a_vehicle_of_ones_own_can_be_checked(tmp_path):

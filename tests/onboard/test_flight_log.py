@@ -147,6 +147,18 @@ def test_a_second_flight_gets_a_name_of_its_own() -> None:
     assert log.path == ("log", "2026-01-01_00-00-00_002.ulg")
 
 
+def test_a_log_that_cannot_be_stored_is_not_begun_again_in_the_same_flight(flown: Flown) -> None:
+    log, begun_us = make_log(), []
+    for now_us in range(0, 20_000_000, 100_000):
+        armed = not 8_000_000 <= now_us < 12_000_000
+        if log.due(now_us, armed):
+            log.step(now_us, armed, set, flown.onboard.log_sample)
+        if log.path is not None:
+            begun_us.append(now_us)
+            log.give_up()
+    assert begun_us == [0, 12_000_000]
+
+
 def test_texts_before_arming_begin_the_log_and_a_changed_parameter_is_in_it(
     tmp_path: Path, flown: Flown
 ) -> None:

@@ -319,6 +319,22 @@ def test_the_saved_world_is_set_again_in_the_simulator() -> None:
     assert "SIM_NO_SUCH" not in craft.onboard.parameters
 
 
+def test_the_loss_of_the_link_is_set_and_taken_back_whatever_is_lost_and_not_stored() -> None:
+    craft = Craft()
+    craft.wait(0.1)
+    for percent in (100.0, 0.0):
+        message = mavlink.MAVLink_param_set_message(
+            1, 1, b"SIM_LOSS_PCT", percent, mavlink.MAV_PARAM_TYPE_REAL32
+        )
+        assert craft.onboard.receive_ground(FrameWriter(255, 190).frame(message), "gcs") == []
+        assert craft.onboard.parameters["SIM_LOSS_PCT"] == percent
+        if percent:
+            craft.wait(0.1)
+            ping = mavlink.MAVLink_ping_message(1, 2, 0, 0)
+            craft.onboard.receive_ground(FrameWriter(255, 190).frame(ping), "gcs")
+            assert craft.onboard.ground_datagrams() == []
+
+
 def test_reset_of_parameters_reaches_the_simulator_and_waits_for_the_ground() -> None:
     craft = Craft()
     craft.wait(1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -32,6 +33,19 @@ def test_all_or_nothing() -> None:
     assert not any(Loss(0).drops(HEARTBEAT, 0.0) for _ in range(100))
     loss = Loss(1)
     assert all(loss.drops(HEARTBEAT, 100.0) for _ in range(100))
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        mavlink.MAVLink_param_set_message(1, 1, b"SIM_LOSS_PCT", 0.0, mavlink.MAV_PARAM_TYPE_REAL32),
+        mavlink.MAVLink_param_value_message(b"SIM_LOSS_PCT", 0.0, mavlink.MAV_PARAM_TYPE_REAL32, 9, 3),
+    ],
+)
+def test_a_link_that_loses_all_can_be_mended(message: Any) -> None:
+    loss = Loss(0)
+    frame = FrameWriter(255, 190).frame(message)
+    assert not any(loss.drops(frame, 100.0) for _ in range(100))
 
 
 def test_the_clock_is_never_lost_and_takes_no_draw() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from autopilot.services import identity
 from autopilot.supervisor.state import Phase
-from autopilot.trajectory.prepare import PENDING
+from autopilot.trajectory.prepare import PENDING, Prepared
 from autopilot.trajectory.shaping import Shaped
 from autopilot.trajectory.waypoint_path import Passage
 from autopilot.wire.convert import Home
@@ -15,6 +16,9 @@ from missions.model import Delay, Land, Signals, Takeoff, Term
 from tests.doubles.craft import ACCEPTED, Craft, at_phase
 
 PLUMBLINE = 2.0  # CTL_LAW
+PX4_MISSION, PX4_RTL, PX4_LAND = (
+    (identity.AUTO, sub) for sub in (identity.AUTO_MISSION, identity.AUTO_RTL, identity.AUTO_LAND)
+)
 EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 
 
@@ -83,14 +87,65 @@ def test_in_the_air_where_the_clock_does_not_wait_paths_are_left_to_another() ->
     assert not craft.flight.mission.plan.prepared.pending, "an answer that nobody waits for"
 
 
-def test_a_vehicle_that_leaves_the_ground_has_the_paths_of_a_short_mission() -> None:
-    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+def flown_to_hold(**settings: float) -> Craft:
+    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE, **settings)
     craft.wait(1.0)
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    assert craft.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) == ACCEPTED
+    craft.run(at_phase(Phase.HOLD))
+    return craft
+
+
+def modes(craft: Craft) -> list[tuple[int, int]]:
+    """(main, sub) of the HEARTBEATs that were heard, without repetitions."""
+    packed = [x.custom_mode for x in craft.heard if x.get_type() == "HEARTBEAT" and x.get_srcComponent() == 1]
+    found = [(mode >> 16 & 0xFF, mode >> 24) for mode in packed]
+    return [mode for i, mode in enumerate(found) if i == 0 or mode != found[i - 1]]
+
+
+def test_a_mission_asked_for_right_after_its_upload_in_the_air_begins_by_itself() -> None:
+    """One answer, at once: MAVSDK calls its user back at the first, and crashes at a second."""
+    craft = flown_to_hold()
     upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
     work = craft.onboard.work
     assert work is not None
-    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0) == ACCEPTED
-    assert craft.onboard.work is work
-    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
-    assert craft.onboard.work is None
-    assert not craft.flight.mission.plan.prepared.pending
+    command = mavlink.MAV_CMD_DO_SET_MODE
+    assert craft.command(command, 1.0, *PX4_MISSION) == ACCEPTED
+    craft.wait(3.0)
+    assert (craft.flight.phase, craft.flight.mission.waiting) == (Phase.HOLD, True)
+    assert modes(craft)[-1] == PX4_MISSION
+    craft.onboard.finish(work, work.done())
+    assert craft.flight.mission.active
+    craft.run(at_phase(Phase.MISSION))
+    assert craft.results(command) == [ACCEPTED]
+
+
+def test_a_mission_that_turns_out_not_to_be_flyable_is_told() -> None:
+    craft = flown_to_hold()
+    upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
+    work = craft.onboard.work
+    assert work is not None
+    assert craft.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
+    craft.onboard.finish(work, Prepared(refusal="no way", notes=()))
+    assert not craft.flight.mission.waiting
+    craft.wait(0.1)
+    assert any("Mission denied: no way" in x.text for x in craft.heard if x.get_type() == "STATUSTEXT")
+    assert craft.flight.phase == Phase.HOLD
+
+
+def test_a_return_is_shown_until_the_vehicle_is_disarmed() -> None:
+    craft = flown_to_hold()
+    assert craft.command(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH) == ACCEPTED
+    begun = len(craft.heard)
+    craft.run(at_phase(Phase.DISARMED))
+    del craft.heard[:begun]
+    assert modes(craft) == [PX4_RTL]
+
+
+def test_a_landing_in_place_of_a_return_is_shown() -> None:
+    craft = flown_to_hold()
+    craft.command(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+    craft.run(at_phase(Phase.LOWER))
+    assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
+    craft.wait(1.1)
+    assert modes(craft)[-1] == PX4_LAND

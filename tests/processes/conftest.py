@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -73,7 +74,8 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
 def gcs(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
     """Run a gcs command to its end: gcs("fly", "hover")."""
 
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    def run(*arguments: str, file_bytes: int = resource.RLIM_INFINITY) -> subprocess.CompletedProcess[str]:
+        """`file_bytes`: no file may grow larger, as on a disk that is full."""
         return subprocess.run(
             [sys.executable, "-m", "gcs", *arguments],
             capture_output=True,
@@ -82,6 +84,7 @@ def gcs(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
             cwd=tmp_path,
             env={**os.environ, "COLUMNS": "200"},
             check=False,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes)),
         )
 
     return run

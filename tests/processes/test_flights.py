@@ -58,3 +58,12 @@ def test_rates_that_do_not_divide_are_refused_with_both_numbers(gcs: Gcs, tmp_pa
     assert flown.returncode == 1
     assert "400" in flown.stderr
     assert "250" in flown.stderr
+
+
+def test_a_disk_that_is_full_is_one_line_and_what_was_captured_is_kept(gcs: Gcs, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    flown = gcs("fly", "hover", "--sensors", "ideal", "--out", str(out), "--quiet", file_bytes=500_000)
+    assert flown.returncode == 1
+    kept = f"500000 bytes of telemetry are kept in {out / 'flight.tlog'}"
+    assert flown.stderr == f"gcs: --out {out}: file too large; {kept}\n"
+    assert (out / "flight.tlog").stat().st_size == 500_000

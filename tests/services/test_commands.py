@@ -7,14 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.services.commands import CANCELLED, FORCE_ARM, LONGEST_US, PARSERS, REPEAT_US
+from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
 from autopilot.services.identity import AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
-from autopilot.services.records import ParameterChanged, Verdict, WorldSaved
+from autopilot.services.records import ParameterChanged, ParametersSaved, Verdict, WorldSaved
 from autopilot.services.requests import (
     Arm,
     ChangeAltitude,
     ChangeSpeed,
     Continue,
+    EnableFence,
     Grab,
     Land,
     Orbit,
@@ -43,7 +44,6 @@ OK, DENIED, UNSUPPORTED = (
     mavlink.MAV_RESULT_DENIED,
     mavlink.MAV_RESULT_UNSUPPORTED,
 )
-IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS
 PACKED_LAND = float(AUTO_LAND << 24 | AUTO << 16)
 
 # what is sent as COMMAND_LONG, what the supervisor is asked (None: nothing), the result
@@ -106,6 +106,22 @@ LONG = [
     (185, (1,), Terminate(), OK),
     (185, (0,), None, DENIED),
     (401, (), RunPrearmChecks(), OK),
+    (207, (0,), EnableFence(False), OK),
+    (207, (1,), EnableFence(True), OK),
+    (207, (2,), None, DENIED),
+    (420, (101, 1, 5), None, DENIED),
+    (420, (101, 1, 1), None, DENIED),  # of a simulator that has told of no parameters
+    (420, (101, 5, 1), None, UNSUPPORTED),
+    (420, (0, 1, 0), None, UNSUPPORTED),
+    (115, (90,), None, UNSUPPORTED),
+    (201, (), None, UNSUPPORTED),
+    (195, (), None, UNSUPPORTED),
+    (196, (), None, UNSUPPORTED),
+    (197, (), None, UNSUPPORTED),
+    (187, (), None, UNSUPPORTED),
+    (183, (), None, UNSUPPORTED),
+    (181, (), None, UNSUPPORTED),
+    (410, (), None, OK),
     (246, (1,), Reboot(False), OK),
     (246, (2,), Reboot(True), OK),
     (246, (NAN,), None, UNSUPPORTED),
@@ -382,77 +398,6 @@ def test_takeoff_in_the_px4_flavour_is_above_the_sea():
     assert not Identity().flavour.takeoff_above_home
 
 
-# ---- commands in progress
-
-LATER = Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "not yet")
-
-
-def progress(received) -> list[tuple[int, int, int]]:
-    """(command, result, progress) of the COMMAND_ACKs."""
-    found = [getattr(r, "message", r) for r in received]
-    return [(x.command, x.result, x.progress) for x in found if x.get_type() == "COMMAND_ACK"]
-
-
-def begin(rig, command: int = 300) -> None:
-    rig.verdict = lambda request: LATER
-    assert progress(rig.replies(long(command))) == [(command, IN_PROGRESS, 255)]
-
-
-def test_a_command_in_progress_is_told_and_ends(rig):
-    begin(rig)
-    told = progress(rig.run(1_200_000))
-    assert told == [(300, IN_PROGRESS, 255)] * 2
-    rig.verdict = lambda request: Verdict(OK)
-    assert progress(rig.run(200_000)) == [(300, OK, 0)]
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_a_command_in_progress_is_not_begun_twice(rig):
-    begin(rig)
-    asked = len(rig.asked)
-    assert progress(rig.replies(long(300))) == [(300, IN_PROGRESS, 255)]
-    assert len(rig.asked) == asked
-
-
-@pytest.mark.parametrize("command", [21, 20, 176, 193])
-def test_another_command_takes_its_place(rig, command):
-    begin(rig)
-    rig.verdict = lambda request: Verdict(OK)
-    p = (1, AUTO, AUTO_LAND) if command == 176 else ()
-    assert progress(rig.replies(long(command, p))) == [(300, CANCELLED, 0), (command, OK, 0)]
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_what_does_not_move_the_vehicle_leaves_it(rig):
-    begin(rig)
-    rig.verdict = lambda request: LATER if isinstance(request, StartMission) else Verdict(OK)
-    for command, p in ((400, (1,)), (401, ()), (512, (148,)), (178, (1, 2))):
-        assert progress(rig.replies(long(command, p))) == [(command, OK, 0)]
-    rig.verdict = lambda request: Verdict(OK)
-    assert progress(rig.run(200_000)) == [(300, OK, 0)]
-
-
-def test_a_command_in_progress_is_cancelled(rig):
-    begin(rig)
-    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 22))) == []
-    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 300))) == [(300, CANCELLED, 0)]
-    assert progress(rig.replies(mavlink.MAVLink_command_cancel_message(1, 1, 300))) == []
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_a_command_in_progress_for_ever_fails(rig):
-    begin(rig)
-    told = progress(rig.run(LONGEST_US + 200_000))
-    assert told[-1] == (300, mavlink.MAV_RESULT_FAILED, 0)
-    assert progress(rig.run(2_000_000)) == []
-
-
-def test_the_asker_alone_is_told(rig):
-    rig.send(mavlink.MAVLink_ping_message(0, 0, 0, 0), link="other")
-    begin(rig)
-    assert progress(rig.run(1_000_000, "other")) == []
-
-
 # ---- storage
 
 
@@ -467,12 +412,35 @@ def test_parameters_go_back_to_their_defaults(rig):
     assert ParameterChanged("LOAD_MASS", rig.table["LOAD_MASS"]) in rig.events
 
 
+def test_the_home_position_and_the_origin_are_told(rig):
+    (home,) = [x for x in rig.replies(long(410)) if x.get_type() == "COMMAND_ACK"]
+    assert home.result == OK
+    rig.send(long(410))
+    assert "HOME_POSITION" in [r.message.get_type() for r in rig.poll()["gcs"]]
+    origin = mavlink.MAVLink_set_gps_global_origin_message(1, 0, 0, 0)
+    told = {x.get_type() for x in rig.replies(origin)}
+    assert told == {"STATUSTEXT", "GPS_GLOBAL_ORIGIN"}
+    assert "GPS_GLOBAL_ORIGIN" not in {
+        x.get_type() for x in rig.replies(mavlink.MAVLink_set_gps_global_origin_message(9, 0, 0, 0))
+    }
+
+
+def test_rotors_fail_and_work_again_by_the_simulators_parameter(rig):
+    rig.table.learn(Parameter("SIM_ENGINE_FAIL", 0.0, 0.0, 15.0, "", ""))
+    for p, failed in (((101, 1, 2), 0b0010), ((101, 1, 4), 0b1010), ((101, 0, 2), 0b1000), ((101, 1, 0), 15)):
+        rig.send(long(420, p))
+        assert rig.table["SIM_ENGINE_FAIL"] == failed
+        assert rig.events[-1] == ParameterChanged("SIM_ENGINE_FAIL", failed)
+    rig.send(long(420, (101, 0, 0)))
+    assert rig.table["SIM_ENGINE_FAIL"] == 0
+
+
 def test_the_simulators_parameters_are_saved_on_request_alone(rig):
     rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
     rig.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_E", 3.0, mavlink.MAV_PARAM_TYPE_REAL32))
     assert not any(isinstance(event, WorldSaved) for event in rig.events)
     rig.send(long(245, (1,)))
-    assert rig.events[-1] == WorldSaved({"SIM_WIND_E": 3.0})
+    assert rig.events[-2:] == [ParametersSaved(), WorldSaved({"SIM_WIND_E": 3.0})]
     rig.send(long(245, (2,)))
     assert rig.events[-1] == WorldSaved({})
     assert rig.table["SIM_WIND_E"] == 0.0

@@ -84,13 +84,21 @@ def test_global_setpoints_are_above_home_or_above_the_sea():
         local(1, 0xFFF),
         local(1, POSITION, math.nan),
         local(1, VELOCITY, vx=math.inf),
-        local(1, 0xFC0 | 0x200 & ~0, 1.0),
+        local(1, 0x200, 1.0),  # a force
     ],
 )
 def test_setpoints_that_ask_for_nothing_are_refused(message):
     verdict = read_local(message)
     assert isinstance(verdict, Verdict)
     assert verdict.result == m.MAV_RESULT_DENIED and verdict.text
+
+
+def test_a_velocity_as_mavproxy_asks_for_it_is_followed():
+    """Its mask 4039 says that an acceleration would be a force, and that there is none."""
+    asked = read_local(local(1, 4039, vx=1.0, vy=2.0, vz=-0.5))
+    assert isinstance(asked, FollowSetpoint)
+    assert same(asked.velocity, (2.0, 1.0, 0.5))
+    assert all(map(math.isnan, (*asked.position, *asked.accel)))
 
 
 def test_an_attitude_is_its_thrust_axis():
@@ -143,7 +151,8 @@ def test_setpoints_are_not_acknowledged_and_announce_nothing(rig):
 def test_a_refusal_is_said_once_in_a_while(rig):
     said = 0
     for _ in range(2 * COMPLAIN_US // 100_000):
-        said += sum(r.get_type() == "STATUSTEXT" for r in rig.replies(local(1, 0xFFF)))
+        replies = rig.replies(local(1, 0xFFF))
+        said += sum(r.get_type() == "STATUSTEXT" and r.chunk_seq == 0 for r in replies)
         rig.now_us += 100_000
     assert said == 3  # in 10.8 s
 

@@ -194,3 +194,15 @@ def test_a_real_number_for_a_whole_one_is_taken_if_it_is_whole(rig):
     service.receive_set(set_(b"WHOLE", 5.5), peer, 0, rig.decide)
     service.receive_set(set_(b"LOAD_MASS", bits(1), INT32), peer, 0, rig.decide)
     assert (service.table["WHOLE"], service.table["LOAD_MASS"]) == (5.0, 0.1)
+
+
+def test_a_list_waits_until_the_table_is_complete(rig):
+    """A client that fetches while parameters are learned would keep those of the first count."""
+    rig.endpoint.expect_parameters()
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    assert not [r for r in rig.run(500_000) if r.message.get_type() == "PARAM_VALUE"]
+    rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
+    rig.endpoint.parameters_complete(rig.now_us)
+    told = [r.message for r in rig.run(100_000) if r.message.get_type() == "PARAM_VALUE"]
+    assert [x.param_id for x in told] == list(rig.table.names)
+    assert {x.param_count for x in told} == {len(rig.table.names)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,9 +18,11 @@ from autopilot.shell.storage import (
     Storage,
     StorageError,
 )
+from autopilot.shell.whole_file import seal
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from autopilot.wire.parameter_table import ParameterTable
 from missions.fileformat import load_mission, shipped
@@ -73,13 +76,17 @@ def test_a_corrupt_mission_is_set_aside_and_said(tmp_path: Path, damage: str) ->
     assert storage.load_mission(HOME) == (None, ""), "it troubles but once"
 
 
-def test_a_corrupt_mission_that_cannot_be_set_aside_is_said_too(tmp_path: Path) -> None:
+def refused(path: Path) -> Path:
+    raise PermissionError(1, "not allowed", str(path))
+
+
+def test_a_corrupt_mission_that_cannot_be_set_aside_is_said_too(tmp_path: Path, monkeypatch: Any) -> None:
     storage = Storage(tmp_path)
     (tmp_path / MISSION_FILE).write_bytes(b"rubbish")
-    (tmp_path / "mission.corrupt").mkdir()
+    monkeypatch.setattr("autopilot.shell.storage.keep_copy", refused)
     mission, trouble = storage.load_mission(HOME)
     assert mission is None
-    assert "starting without a mission" in trouble
+    assert "not allowed, starting without a mission" in trouble
 
 
 def test_logs_are_stored_in_parts_and_the_oldest_make_room(tmp_path: Path) -> None:
@@ -118,9 +125,20 @@ def test_a_signing_key_is_kept_for_nobody_else_to_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["", "00", "zz" * 32 + " 5", "00" * 31 + " 5", "00" * 32 + " x", "\xff"])
 def test_a_key_that_cannot_be_read_is_no_reason_to_fly_without(tmp_path: Path, text: str) -> None:
-    (tmp_path / SIGNING_FILE).write_text(text, encoding="latin-1")
+    (tmp_path / SIGNING_FILE).write_bytes(seal(text))
     with pytest.raises(StorageError, match="remove it"):
         Storage(tmp_path).load_signing()
+
+
+def test_a_key_or_its_time_is_never_another_one(tmp_path: Path) -> None:
+    Storage(tmp_path).keep_signing(bytes(range(32)), 123456)
+    path = tmp_path / SIGNING_FILE
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(StorageError, match="remove it"):
+            Storage(tmp_path).load_signing()
+        assert path.exists(), "mended by hand, or removed"
 
 
 def test_parameters_come_back_and_only_those_that_were_set(tmp_path: Path) -> None:
@@ -145,7 +163,7 @@ def test_a_parameter_is_stored_beside_those_of_earlier_runs(tmp_path: Path) -> N
 
 
 def test_what_no_longer_fits_is_left_out_and_said(tmp_path: Path) -> None:
-    (tmp_path / PARAMETER_FILE).write_text("NGC_KX 5.0\nOLD_NAME 1.0\nMIS_SPEED 900\n")
+    (tmp_path / PARAMETER_FILE).write_bytes(seal("NGC_KX 5.0\nOLD_NAME 1.0\nMIS_SPEED 900\n"))
     again = table()
     troubles = Storage(tmp_path).load_parameters(again)
     assert again.changed() == {"NGC_KX": 5.0}
@@ -155,7 +173,9 @@ def test_what_no_longer_fits_is_left_out_and_said(tmp_path: Path) -> None:
     assert any("MIS_SPEED = 900" in trouble for trouble in troubles)
 
 
-@pytest.mark.parametrize("text", [b"\xff\xfe\x00", b"NGC_KX five\n"])
+@pytest.mark.parametrize(
+    "text", [b"\xff\xfe\x00", b"NGC_KX 5.0\n", seal("NGC_KX five\n"), seal("NGC_KX 5.0\n")[1:]]
+)
 def test_a_file_that_is_none_is_said_and_changes_nothing(tmp_path: Path, text: bytes) -> None:
     (tmp_path / PARAMETER_FILE).write_bytes(text)
     again = table()
@@ -163,6 +183,32 @@ def test_a_file_that_is_none_is_said_and_changes_nothing(tmp_path: Path, text: b
     assert len(troubles) == 1
     assert "starting with the defaults" in troubles[0]
     assert again.changed() == {}
+    storage = Storage(tmp_path)
+    assert storage.load_parameters(again) == troubles, "also the next time"
+    storage.keep_parameters()
+    assert (tmp_path / "parameters.corrupt").read_bytes() == text
+    assert Storage(tmp_path).load_parameters(again) == []
+
+
+def test_what_was_lost_is_a_reason_not_to_arm_until_it_is_stored_again(tmp_path: Path) -> None:
+    for name in ("fence.bin", "rally.bin", PARAMETER_FILE):
+        (tmp_path / name).write_bytes(b"rubbish")
+    storage = Storage(tmp_path)
+    assert storage.lost == ()
+    assert len(storage.load_parameters(table())) == 1
+    _, troubles = storage.load_areas(HOME)
+    assert len(troubles) == 2
+    assert [text.split(";")[0] for text in storage.lost] == [
+        "the stored fence is damaged",
+        "the stored parameters are damaged",
+    ]
+    storage.keep_areas(mavlink.MAV_MISSION_TYPE_FENCE, ())
+    storage.keep_parameters()
+    assert storage.lost == ()
+    again = Storage(tmp_path)
+    assert again.load_parameters(table()) == []
+    assert len(again.load_areas(HOME)[1]) == 1, "the rally points"
+    assert again.lost == ()
 
 
 def test_a_directory_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
@@ -199,6 +245,6 @@ def test_the_simulators_parameters_come_back_where_they_were_saved(tmp_path: Pat
     assert Storage(tmp_path).load_world() == ({"SIM_WIND_E": 3.0, "SIM_LOAD_MASS": 0.1}, [])
     Storage(tmp_path).keep_world({})
     assert Storage(tmp_path).load_world() == ({}, [])
-    (tmp_path / WORLD_FILE).write_text("SIM_WIND_E three")
+    (tmp_path / WORLD_FILE).write_bytes(seal("SIM_WIND_E three"))
     values, troubles = Storage(tmp_path).load_world()
     assert values == {} and len(troubles) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -14,6 +15,7 @@ from autopilot.guidance.setpoint_follower import PositionSetpoint, Stream
 from autopilot.services.requests import Arm, Continue, Land, Pause, ReturnHome, SetCurrent, StartMission
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.supervisor.advance import advance
+from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.state import (
     CARRYING,
     IN_AIR,
@@ -88,6 +90,19 @@ def test_a_mission_without_landing_holds_in_the_end() -> None:
     assert sky.flight.mission.done
     assert "Mission complete, holding" in sky.texts
     assert sky.reached == [0, 1]
+
+
+def test_a_mission_without_end_goes_on_until_it_is_told_otherwise() -> None:
+    sky = Sky(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), Waypoint(0.0, 0.0, 2.0))
+    sky.flight = with_plan(sky.flight, replace(sky.flight.mission.plan, again_from=1))
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: len(s.reached) == 8)
+    assert sky.reached == [0, 1, 2, 1, 2, 1, 2, 1]
+    assert sky.flight.mission.active
+    assert not sky.flight.mission.done
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.DISARMED)
 
 
 def test_a_mission_that_ends_with_a_return_lands() -> None:
@@ -193,6 +208,24 @@ def test_landing_and_returning_end_on_the_ground_from_any_step(request_: object,
     if isinstance(request_, ReturnHome):
         assert math.hypot(*sky.view.x_load[:2]) < 0.01
     assert not sky.flight.mission.done
+
+
+@pytest.mark.parametrize(("far", "highest"), [(3.0, 4.0), (0.5, 2.0)])
+def test_a_return_climbs_first_where_home_is_not_near(far: float, highest: float) -> None:
+    settings = replace(SETTINGS, motion=replace(SETTINGS.motion, return_altitude_m=4.0))
+    sky = Sky(Takeoff(2.0), Waypoint(far, 0.0, 2.0), settings=settings)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.HOLD)
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    heights, away = [], []
+    while sky.flight.phase == Phase.RETURN:
+        sky.tick()
+        heights.append(sky.view.x_load[2])
+        away.append(sky.view.x_load[0] if heights[-1] < highest - 0.01 else far)
+    assert max(heights) == pytest.approx(highest, abs=1e-6)
+    # a waypoint is known to 1e-7 degrees
+    assert away[:-1] == pytest.approx([far] * len(away[:-1]), abs=6e-3), "straight up, then home"
 
 
 def test_holding_low_over_the_ground_rises_clear_of_it() -> None:

@@ -10,6 +10,7 @@ import pytest
 from autopilot.geometry.linear import norm, sub
 from autopilot.services.requests import (
     Arm,
+    EnableFence,
     FollowSetpoint,
     Orbit,
     ReplaceMission,
@@ -90,6 +91,16 @@ def test_each_action(action: int, phase: Phase, told: bool) -> None:
     assert phase in seen
     assert seen <= {Phase.GUIDED, phase, Phase.DISARMED}
     assert any("ence" in text for text in sky.texts) == told
+
+
+def test_a_fence_that_is_switched_off_stops_nobody() -> None:
+    sky = fenced().airborne()
+    assert sky.ask(EnableFence(False)).result == ACCEPTED
+    assert eastward(sky, 12.0) > 6.0
+    assert sky.flight.area.breaches == 0
+    assert sky.ask(EnableFence(True)).result == ACCEPTED
+    sky.wait(0.1)
+    assert sky.texts[-1] == "Fence: outside the fence"
 
 
 def test_distance_and_height() -> None:

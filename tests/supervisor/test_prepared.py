@@ -11,16 +11,17 @@ import pytest
 
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold, Pass, Run, asked_jet
-from autopilot.services.requests import Arm, Pause, StartMission
+from autopilot.services.requests import Arm, Land, Pause, ReturnHome, StartMission
+from autopilot.services.requests import Takeoff as TakeOff
 from autopilot.supervisor.mission import with_plan
-from autopilot.supervisor.state import Phase, jet_ahead, leg_time_s
+from autopilot.supervisor.state import Flight, MissionPlan, Phase, jet_ahead, leg_time_s
 from autopilot.trajectory.prepare import PENDING, REFUSE, SLOW_DOWN, prepare
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 from missions.model import Delay, Signals, Step, Takeoff, Term, Waypoint
 from tests.doubles.sky import ACCEPTED, SETTINGS, STEP_US, Sky
 
-IN_PROGRESS, DENIED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_DENIED
+DENIED = mavlink.MAV_RESULT_DENIED
 EDGE = Signals(3.0, (Term("y", 0.25, 0.0, 0.8, None, 0.0),))
 ROUND = (
     Waypoint(3.0, 0.0, 2.0),
@@ -144,11 +145,50 @@ def test_what_cannot_be_flown_is_refused_with_the_item_and_the_reason() -> None:
     assert slow.ask(Arm(True, False)).result == ACCEPTED
 
 
-def test_a_start_before_the_paths_are_there_is_for_later() -> None:
+def pending(flight: Flight) -> Flight:
+    plan = replace(flight.mission.plan, prepared=PENDING)
+    return replace(flight, mission=replace(flight.mission, plan=plan))
+
+
+def prepared(flight: Flight, plan: MissionPlan) -> Flight:
+    return replace(flight, mission=replace(flight.mission, plan=plan))
+
+
+def test_a_start_before_the_paths_are_there_waits_on_the_ground() -> None:
     sky = prepared_sky(Takeoff(2.0), *ROUND, model.Land())
     plan = sky.flight.mission.plan
-    sky.flight = with_plan(sky.flight, replace(plan, prepared=PENDING))
-    assert sky.ask(StartMission(None)).result == IN_PROGRESS
-    sky.flight = replace(sky.flight, mission=replace(sky.flight.mission, plan=plan))
+    sky.flight = pending(sky.flight)
     assert sky.ask(StartMission(None)).result == ACCEPTED
     assert sky.ask(Arm(True, False)).result == ACCEPTED
+    assert (sky.flight.phase, sky.flight.mission.waiting) == (Phase.ARMED, True)
+    sky.flight = prepared(sky.flight, plan)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert (sky.flight.phase, sky.flight.mission.waiting) == (Phase.TAUTEN, False)
+
+
+def test_a_start_before_the_paths_are_there_holds_in_the_air() -> None:
+    sky = started(Takeoff(2.0), *ROUND, model.Land())
+    sky.run(lambda s: s.flight.mission.step == 2 and s.flight.phase == Phase.MISSION)
+    assert sky.ask(ReturnHome()).result == ACCEPTED
+    plan = sky.flight.mission.plan
+    sky.flight = pending(sky.flight)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    assert (sky.flight.phase, sky.flight.mission.waiting) == (Phase.HOLD, True)
+    sky.wait(5.0)
+    assert sky.flight.phase == Phase.HOLD
+    sky.flight = prepared(sky.flight, plan)
+    assert sky.ask(StartMission(None)).result == ACCEPTED
+    sky.run(lambda s: s.flight.phase == Phase.LOWER)
+    assert sky.reached[-1] == 3
+
+
+@pytest.mark.parametrize("wish", [Pause(), Land(), ReturnHome(), TakeOff(None)], ids=type)
+def test_another_wish_takes_the_place_of_a_mission_that_waits(wish: object) -> None:
+    sky = prepared_sky(Takeoff(2.0), *ROUND, model.Land())
+    sky.flight = pending(sky.flight)
+    sky.ask(StartMission(None))
+    sky.ask(Arm(True, False))
+    if not isinstance(wish, TakeOff | Pause):
+        sky.flight = replace(sky.flight, phase=Phase.HOLD)
+    assert sky.ask(wish).result == ACCEPTED
+    assert not sky.flight.mission.waiting

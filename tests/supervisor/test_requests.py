@@ -48,6 +48,8 @@ REQUESTS: list[Any] = [
     R.Arm(True, True),
     R.Arm(False, False),
     R.Arm(False, True),
+    R.EnableFence(False),
+    R.FailRotors(1, True),
     R.Takeoff(None),
     R.Takeoff(3.0),
     R.Takeoff(0.1),
@@ -176,6 +178,12 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
     assert (told.result, told.text) == (ACCEPTED, why)
     forced, verdict = decide(Flight(), R.Arm(True, True), seen, SETTINGS)
     assert (forced.phase, verdict) == (Phase.ARMED, YES)
+
+
+def test_what_the_storage_lost_keeps_the_vehicle_from_being_armed() -> None:
+    flight = Flight(lost=("the stored fence is damaged",))
+    after, verdict = decide(flight, R.Arm(True, False), view(), SETTINGS)
+    assert (after.phase, verdict.text) == (Phase.DISARMED, "Arming denied: the stored fence is damaged")
 
 
 def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:

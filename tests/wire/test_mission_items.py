@@ -23,6 +23,7 @@ from autopilot.wire.items import (
     decode_items,
     encode_mission,
     encode_steps,
+    endless_from,
     located_steps,
     unflown,
 )
@@ -202,7 +203,15 @@ REFUSALS = [
     ([UP, item(42600, 1.0, 1.0, 4.8)], 1, "INVALID_PARAM3", "leave the load at 0.20 m; least 0.3 m"),
     ([UP, item(211, 1.0, 0.0), item(42600, 1.0, 1.0, 0.5)], 2, "INVALID", "needs the load"),
     ([item(177, 3.0, 1.0)], 0, "INVALID_PARAM1", "item to jump to = 3; must be 0 ... 0"),
-    ([item(93, 1.0), item(177, 0.0, -1.0)], 1, "INVALID_PARAM2", "repetitions = -1; must be 0 ... 1000"),
+    (
+        [item(93, 1.0), item(177, 0.0, -2.0)],
+        1,
+        "INVALID_PARAM2",
+        "repetitions = -2; must be 0 ... 1000, or -1",
+    ),
+    ([item(201), item(177, 0.0, -1.0), item(93, 1.0)], 1, "INVALID", "must lead back to something"),
+    ([item(93, 1.0), item(31998)], 1, "UNSUPPORTED", "command 31998"),
+    ([item(93, 1.0), item(60000)], 1, "UNSUPPORTED", "command 60000"),
     ([item(186, 3.0, 3.0)], 0, "INVALID", "nothing before it says"),
     ([item(18, math.nan, frame=6, z=2.0)], 0, "INVALID_PARAM1", "turns = nan"),
     ([item(16, frame=10, z=5.0)], 0, "UNSUPPORTED_FRAME", "frame 10"),
@@ -374,6 +383,14 @@ def test_commands_for_other_things_are_kept_and_not_flown() -> None:
 
 def test_what_is_not_flown_is_known() -> None:
     assert unflown([item(93, 1.0), item(201), item(177, 0.0, 1.0), item(206), TERM, RUN]) == (1, 3)
+
+
+def test_a_jump_without_end_says_which_step_comes_after_the_last() -> None:
+    items = [item(93, 1.0), item(201), item(93, 2.0), TERM, RUN, item(177, 1.0, -1.0), item(93, 9.0)]
+    located = located_steps(items, HOME)
+    assert [one.last for one in located] == [0, 2, 4], "what stands behind it is never flown"
+    assert endless_from(items, located) == 1
+    assert endless_from(items[:-2], located) is None
 
 
 def test_jumps_fly_their_items_again() -> None:

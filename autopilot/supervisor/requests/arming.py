@@ -20,6 +20,7 @@ from autopilot.supervisor.state import (
     Selected,
     View,
     below,
+    fenced,
     forbidden,
     off_mission,
 )
@@ -31,13 +32,14 @@ TILT_TO_ARM_RAD = math.radians(20.0)
 
 def arming_complaints(flight: Flight, view: View, settings: Settings) -> tuple[str, ...]:
     """What keeps the vehicle from being armed, in words."""
-    found = list(view.complaints)  # of the estimator: `autopilot.estimation.filter.complaints`
+    # `view.complaints` are the estimator's: `autopilot.estimation.filter.complaints`
+    found = [*flight.lost, *view.complaints]
     if not view.tilt_rad <= TILT_TO_ARM_RAD:
         found.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:
         found.append(f"moving at {norm(view.v_quad):.1f} m/s")
     place = below(view.x_quad, settings) if flight.cable.released else view.x_load
-    where = forbidden(flight.area.fence, place, settings) if settings.fence.action else ""
+    where = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
     if where:
         found.append(where)
     return tuple(found)

@@ -10,6 +10,7 @@ from autopilot.services.requests import (
     ChangeAltitude,
     ChangeSpeed,
     Continue,
+    EnableFence,
     FollowAttitude,
     FollowSetpoint,
     FollowStick,
@@ -38,7 +39,7 @@ from autopilot.supervisor.requests.mission import (
     set_current,
     start_mission,
 )
-from autopilot.supervisor.requests.modes import hold, land, return_home, set_home, set_mode
+from autopilot.supervisor.requests.modes import enable_fence, hold, land, return_home, set_home, set_mode
 from autopilot.supervisor.requests.orbit import orbit
 from autopilot.supervisor.requests.payload import grab, let_go, winch
 from autopilot.supervisor.requests.reposition import change_altitude, change_speed, reposition
@@ -75,6 +76,7 @@ HANDLERS: dict[type, Handler] = {
     Orbit: orbit,
     ChangeAltitude: change_altitude,
     SetHome: set_home,
+    EnableFence: enable_fence,
     Winch: winch,
     Release: let_go,
     Grab: grab,

@@ -5,44 +5,57 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from autopilot.services.records import Verdict
 from autopilot.services.requests import ReplaceMission, SetCurrent, StartMission
+from autopilot.supervisor.machine import must_happen
 from autopilot.supervisor.mission import at_step, begin_step, step_event
 from autopilot.supervisor.requests.mission_checks import lift_altitude_m, mission_trouble, upload_trouble
 from autopilot.supervisor.requests.takeoff import take_off
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import ON_GROUND, Event, Flight, Phase, Selected, View
+from autopilot.supervisor.state import ON_GROUND, Event, Flight, Phase, Selected, View, off_mission
 from autopilot.supervisor.table import TRANSITIONS
 from autopilot.wire.dialect import plumbline as mavlink
 from missions import model
 
+_LATER = ACCEPTED._replace(text="Mission begins when its paths are prepared")
+
 
 def begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
     """Start the mission at its present step, from the ground or from the air."""
-    before, plan = flight, flight.mission.plan
+    plan = flight.mission.plan
     if not plan.steps:
         return flight, denied("Mission denied: there is none")
-    if plan.prepared.pending:
-        return flight, Verdict(mavlink.MAV_RESULT_IN_PROGRESS, "Mission begins when its paths are prepared")
-    trouble = mission_trouble(flight, view, settings)
+    trouble = mission_trouble(flight, view, settings) or plan.prepared.refusal
     if trouble:
         return flight, denied(f"Mission denied: {trouble}")
-    if plan.prepared.refusal:
-        return flight, denied(f"Mission denied: {plan.prepared.refusal}")
     if flight.phase == Phase.DISARMED:
         return replace(flight, selected=Selected.MISSION), ACCEPTED
+    event = Event.LAND if isinstance(plan.steps[flight.mission.step], model.Land) else Event.MISSION
+    if flight.phase != Phase.ARMED and (flight.phase, event) not in TRANSITIONS:
+        return flight, wrong_phase(flight, "Mission")
+    if plan.prepared.pending:
+        return _waiting(flight, view, settings), _LATER
     flight = replace(
-        flight, mission=replace(flight.mission, active=True, done=False), selected=Selected.MISSION
+        flight,
+        mission=replace(flight.mission, active=True, done=False, waiting=False),
+        selected=Selected.MISSION,
     )
     if flight.phase == Phase.ARMED:
         altitude = lift_altitude_m(plan, settings)
         flight = replace(flight, mission=replace(flight.mission, takeoff_altitude_m=altitude))
         return take_off(flight, view, settings), ACCEPTED
-    event = Event.LAND if isinstance(plan.steps[flight.mission.step], model.Land) else Event.MISSION
-    if (before.phase, event) not in TRANSITIONS:
-        return before, wrong_phase(before, "Mission")
     return begin_step(flight, event, view, settings), ACCEPTED
+
+
+def _waiting(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight that holds, or stands armed, until the paths of its mission are prepared.
+
+    That the mission will begin is said at once and once: clients (MAVSDK) do not know what to do with an
+    answer that comes in two parts.
+    """
+    if flight.phase != Phase.ARMED:
+        flight = must_happen(off_mission(flight), Event.HOLD, view, settings)
+    return replace(flight, selected=Selected.MISSION, mission=replace(flight.mission, waiting=True))
 
 
 def start_mission(flight: Flight, request: StartMission, view: View, settings: Settings) -> Decision:

@@ -13,7 +13,7 @@ from autopilot.geometry.linear import Vec3, axpy, norm, sub
 from autopilot.supervisor.motion import length_at, stop
 from autopilot.supervisor.requests.limits import LEAST_ALTITUDE_M
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import ON_GROUND, Flight, MissionPlan, View, below, forbidden
+from autopilot.supervisor.state import ON_GROUND, Flight, MissionPlan, View, below, fenced, forbidden
 from autopilot.supervisor.step_legs import LEAST_REEL_M
 from autopilot.trajectory.timeline import ANYWHERE, MissionState, TimelineEntry, timeline
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
@@ -85,7 +85,7 @@ def leaves_fence(flight: Flight, ahead: Ahead, settings: Settings) -> str:
     Looked at are the straight ways to take-off height, to waypoints and home, and the places at which signals
     and the winch leave the load; signals and curves between waypoints are watched in flight.
     """
-    if not settings.fence.action:
+    if not fenced(flight, settings):
         return ""
     for seq, entry in ahead:
         why = _why_forbidden(flight, entry, settings)

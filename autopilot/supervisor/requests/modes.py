@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from autopilot.services import identity
-from autopilot.services.requests import SetHome, SetMode, Takeoff
+from autopilot.services.records import Verdict
+from autopilot.services.requests import EnableFence, SetHome, SetMode, Takeoff
 from autopilot.supervisor.machine import happen
 from autopilot.supervisor.requests.guided import offboard, position_control
 from autopilot.supervisor.requests.limits import FARTHEST_M
@@ -32,16 +33,19 @@ LEVEL_HOME_M = 1.0
 def hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Stop and hold; on the ground, select nothing."""
     if flight.phase in ON_GROUND:
-        return replace(flight, selected=Selected.NOTHING), ACCEPTED
+        return replace(off_mission(flight), selected=Selected.NOTHING), ACCEPTED
     after = happen(off_mission(flight), Event.HOLD, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Hold"))
 
 
 def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """Set the load down where it is, and the vehicle beside it."""
-    if flight.phase in ON_GROUND or flight.phase in (Phase.LOWER, Phase.SET_DOWN):
+    if flight.phase in ON_GROUND:
         return flight, ACCEPTED
-    after = happen(off_mission(flight), Event.LAND, view, settings)
+    here = replace(flight, returning=False)
+    if flight.phase in (Phase.LOWER, Phase.SET_DOWN):
+        return here, ACCEPTED
+    after = happen(off_mission(here), Event.LAND, view, settings)
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, "Landing"))
 
 
@@ -59,6 +63,12 @@ def set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -
     if request.position is not None and not abs(place[2]) <= LEVEL_HOME_M:
         return flight, denied("Home denied: its height must be that of the ground here, which is flat")
     return replace(flight, area=replace(flight.area, home=(place[0], place[1], 0.0))), ACCEPTED
+
+
+def enable_fence(flight: Flight, request: EnableFence, view: View, settings: Settings) -> Decision:
+    """Heed the fence, or do not; a breach there was is forgotten."""
+    area = replace(flight.area, guarded=request.on, breach="")
+    return replace(flight, area=area), Verdict(ACCEPTED.result, f"Fence {'on' if request.on else 'off'}")
 
 
 def _mode_takeoff(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:

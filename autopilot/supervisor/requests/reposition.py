@@ -13,7 +13,7 @@ from autopilot.supervisor.requests.limits import FASTEST_M_S, LEAST_ALTITUDE_M, 
 from autopilot.supervisor.requests.modes import hold
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, later, wrong_phase
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import CARRYING, Flight, Phase, View, below, forbidden
+from autopilot.supervisor.state import CARRYING, Flight, Phase, View, below, fenced, forbidden
 from autopilot.wire.dialect import plumbline as mavlink
 
 
@@ -43,7 +43,7 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     if there[2] < LEAST_ALTITUDE_M:
         return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
     place = below(there, settings) if flight.cable.released else there
-    beyond = forbidden(flight.area.fence, place, settings) if settings.fence.action else ""
+    beyond = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
     if beyond:
         return flight, denied(f"Reposition denied: {beyond}")
     if norm(sub(there, here)) == 0.0:

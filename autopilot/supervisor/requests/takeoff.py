@@ -25,7 +25,7 @@ def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) ->
         return flight, denied(f"Take-off denied: load height {altitude:.2f} m, least {LEAST_ALTITUDE_M} m")
     flight_up = replace(
         flight,
-        mission=replace(flight.mission, takeoff_altitude_m=altitude, active=False),
+        mission=replace(flight.mission, takeoff_altitude_m=altitude, active=False, waiting=False),
         selected=Selected.TAKEOFF,
     )
     if flight.phase == Phase.DISARMED:

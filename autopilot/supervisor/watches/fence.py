@@ -15,6 +15,7 @@ from autopilot.supervisor.state import (
     Flight,
     View,
     below,
+    fenced,
     forbidden,
     off_mission,
 )
@@ -31,7 +32,7 @@ def watch_fence(flight: Flight, view: View, settings: Settings) -> Watched:
     """Do what GF_ACTION says when the fence is breached, or the load could not stop before it."""
     limits, area = settings.fence, flight.area
     limited = area.fence.zones or limits.radius_m > 0.0 or limits.height_m > 0.0
-    if flight.phase not in CARRYING or limits.action == NO_ACTION or not limited:
+    if flight.phase not in CARRYING or not fenced(flight, settings) or not limited:
         return Watched(flight)
     if isinstance(flight.legs[0], Catch):
         return Watched(flight)

@@ -9,7 +9,7 @@ Positions are positions of the load. DO_JUMP is flown by flying its items again.
 """
 
 from autopilot.wire.items.command import Command, Fate
-from autopilot.wire.items.decode import decode_items, located_steps, unflown
+from autopilot.wire.items.decode import decode_items, endless_from, located_steps, unflown
 from autopilot.wire.items.encode import encode_mission, encode_steps
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
 from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, fate
@@ -26,6 +26,7 @@ __all__ = [
     "decode_items",
     "encode_mission",
     "encode_steps",
+    "endless_from",
     "fate",
     "located_steps",
     "unflown",

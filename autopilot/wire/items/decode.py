@@ -23,6 +23,9 @@ _TERM, _FACTOR, _RUN = (
 )
 
 
+ENDLESS = -1  # repetitions of a jump
+
+
 def decode_items(items: Sequence[WireItem], home: Home) -> tuple[Step, ...]:
     """The steps that the items stand for, or MissionItemError for the first item that cannot be flown."""
     return tuple(located.step for located in located_steps(items, home))
@@ -42,7 +45,13 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
             reader.expect_no_terms(seq - 1)
             last = len(items) - 1
             target = choice(seq, 1, "item to jump to", item.param1, range(last + 1), f"0 ... {last}")
-            times = choice(seq, 2, "repetitions", item.param2, range(MOST_JUMPS + 1), f"0 ... {MOST_JUMPS}")
+            allowed = f"0 ... {MOST_JUMPS}, or -1: without end"
+            times = choice(seq, 2, "repetitions", item.param2, range(ENDLESS, MOST_JUMPS + 1), allowed)
+            if times == ENDLESS:
+                if not any(step.last >= target for step in reader.steps):
+                    text = "a jump without end must lead back to something that is flown"
+                    raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
+                break
             jumps[seq] = jumps.get(seq, 0) + 1
             seq = target if jumps[seq] <= times else seq + 1
         else:
@@ -54,6 +63,14 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
             raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
     reader.expect_no_terms(len(items) - 1)
     return tuple(reader.steps)
+
+
+def endless_from(items: Sequence[WireItem], steps: Sequence[LocatedStep]) -> int | None:
+    """Which of the items' steps comes after the last one, where a jump without end leads back to it."""
+    for item in items:
+        if item.command == mavlink.MAV_CMD_DO_JUMP and item.param2 == ENDLESS:
+            return next(i for i, step in enumerate(steps) if step.last >= item.param1)
+    return None
 
 
 def unflown(items: Sequence[WireItem]) -> tuple[int, ...]:

@@ -129,8 +129,9 @@ COMMANDS: tuple[Command, ...] = (
     Command(m.MAV_CMD_CONDITION_DELAY, "a hold", _DELAY, Delay),
     Command(
         m.MAV_CMD_DO_JUMP,
-        f"the items from item p1 on again, p2 times (0 ... {MOST_JUMPS}); without end (-1) it is "
-        f"refused, and so is a mission of more than {MOST_FLOWN} items with all repetitions",
+        f"the items from item p1 on again, p2 times (0 ... {MOST_JUMPS}) or without end (-1): then those "
+        "behind it are never flown. A mission that comes to more than "
+        f"{MOST_FLOWN} items with all repetitions is refused",
     ),
     Command(
         m.MAV_CMD_DO_GRIPPER,
@@ -255,4 +256,5 @@ def fate(command: int) -> Fate:
     """What becomes of an item with this command, if its parameters will do."""
     if command in COMMAND:
         return COMMAND[command].fate
-    return Fate.REFUSED if command <= m.MAV_CMD_NAV_LAST else Fate.KEPT
+    known = command in m.enums["MAV_CMD"] and command != m.MAV_CMD_ENUM_END
+    return Fate.KEPT if known and command > m.MAV_CMD_NAV_LAST else Fate.REFUSED

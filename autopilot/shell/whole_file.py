@@ -1,0 +1,79 @@
+"""Files that are there whole or not at all, whenever the process or the machine dies.
+
+A file is written beside the old one, brought to the disk, and put in its place at once; then the directory is
+brought to the disk, so that the new name outlives a power failure. Texts end with the checksum of what stands
+before: a bit that a disk has lost makes another number, or another key, of a text.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from pathlib import Path
+
+_MARK = b"# crc32 "
+
+
+class DamagedError(ValueError):
+    """The file is not what was written."""
+
+
+def seal(text: str) -> bytes:
+    """The bytes of a text with its checksum as a last line, a comment in files of parameters."""
+    body = text.encode()
+    return body + _MARK + _digits(body)
+
+
+def unseal(data: bytes) -> str:
+    """The text that was sealed; DamagedError for anything else."""
+    body, mark, check = data.rpartition(_MARK)
+    if not mark:
+        raise DamagedError("it has no checksum")
+    if check != _digits(body):
+        raise DamagedError("its checksum is wrong")
+    return body.decode()
+
+
+def _digits(body: bytes) -> bytes:
+    return b"%08x\n" % zlib.crc32(body)
+
+
+def write_whole(path: Path, data: bytes, private: bool = False) -> None:
+    """Put a file with this content in place; OSError leaves the old one. `private`: nobody else reads it."""
+    new = path.with_suffix(".new")
+    new.unlink(missing_ok=True)  # it may be readable by others
+    handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600 if private else 0o666)
+    try:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(handle, rest) :]
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+    new.replace(path)
+    _bring_to_disk(path.parent)
+
+
+def remove(path: Path) -> None:
+    """Take a file away for good, if it is there."""
+    path.unlink(missing_ok=True)
+    _bring_to_disk(path.parent)
+
+
+def keep_copy(path: Path) -> Path:
+    """Copy a damaged file to a name that is free, as long as it may be mended: the new name."""
+    aside = path.with_suffix(".corrupt")
+    number = 1
+    while aside.exists():
+        number += 1
+        aside = path.with_suffix(f".corrupt{number}")
+    write_whole(aside, path.read_bytes(), private=True)
+    return aside
+
+
+def _bring_to_disk(directory: Path) -> None:
+    handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

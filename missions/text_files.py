@@ -1,0 +1,27 @@
+"""Text files that a user names: read whole, or not at all and with a reason. Imports nothing of Plumbline."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+MOST_BYTES = 16 * 2**20  # ten times the largest plan that a vehicle takes
+
+
+class TextFileError(ValueError):
+    """Why the file cannot be read, without its name."""
+
+
+def text_of(path: Path) -> str:
+    """The text of a file in UTF-8; TextFileError for what is none, is too long, or would never end."""
+    try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise TextFileError("cannot be read: a device or a pipe, which may have no end")
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise TextFileError(f"cannot be read: more than {MOST_BYTES // 2**20} MiB")
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise TextFileError(f"not a text file in UTF-8 (byte {error.start})") from None
+    except OSError as error:
+        raise TextFileError(f"cannot be read: {error.strerror}") from None
