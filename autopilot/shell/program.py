@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import socket
 import sys
@@ -556,6 +557,7 @@ def main(
         parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
         compiled = ready(parts)
         if not compiled:
+            gc.enable()  # the compiler leaves much behind
             say(ONCE)
         mission, trouble = kept.load_mission(place)
         troubles += [trouble] if trouble else []
