@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 
 def main() -> None:
     """Run the program."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of matrices this small threads only cost time
+    gc.disable()  # until everything is loaded (`be_punctual`): what is loaded stays
     from autopilot.shell.program import main as run
 
     run()

@@ -1,11 +1,13 @@
 """For all tests: examples of hypothesis have no deadline, for the first one may compile a kernel; a failed
 assertion in the shared doubles is explained like one of a test; linear algebra keeps to one thread, for on a
-busy machine several of them wait for each other.
+busy machine several of them wait for each other; a path that was shaped is not shaped again.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from functools import cache
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read as numpy is imported
 
@@ -16,3 +18,16 @@ pytest.register_assert_rewrite("tests.doubles")
 
 settings.register_profile("plumbline", deadline=None)
 settings.load_profile("plumbline")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shaped_once() -> Iterator[None]:
+    """Each path is shaped once, whoever flies or checks it: shaping takes longer than most tests, and the
+    same path leads to the same bits."""
+    from autopilot.trajectory import feasibility, prepare
+
+    shape = cache(prepare.shape)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(prepare, "shape", shape)
+        patch.setattr(feasibility, "shape", shape)
+        yield

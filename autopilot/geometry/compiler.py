@@ -10,6 +10,7 @@ runs twice as fast. References are not counted: a kernel makes no arrays, and it
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -167,8 +168,12 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         self._kept: Any = None
         self._cache_of = cache_of
         super().__init__(function, targetoptions=dict(_OPTIONS), pipeline_class=_OuterCompiler)
+
+    @cached_property
+    def _inner(self) -> _Inner:
+        """Made only where something is compiled: a few hundred of them take a while."""
         inner = dict(_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-        self._inner = _Inner(function, targetoptions=inner, pipeline_class=_InnerCompiler)
+        return _Inner(self.py_func, targetoptions=inner, pipeline_class=_InnerCompiler)
 
     @property
     def _cache(self) -> Any:

@@ -97,7 +97,9 @@ class _SharedCache(caching.FunctionCache):
 
     def _load(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            # numba would first load all that it can compile with, which takes longer than most kernels do
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
         except (AttributeError, ImportError):
             # an index that names types which are no longer where they were
             index = self._lock("index")

@@ -24,9 +24,8 @@ from platformdirs import user_cache_path
 
 ROOT = Path(__file__).resolve().parents[2]
 CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
-_IMPORT = re.compile(
-    rb"^\s*from\s+((?:autopilot|sitl|missions|gcs)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)", re.MULTILINE
-)
+# it begins with letters, which are found fast: what is found in a text too does no harm
+_IMPORT = re.compile(rb"from[ \t]+((?:autopilot|sitl|missions|gcs)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)")
 _NAME = re.compile(rb"\w+")
 _CPU_INFO = Path("/proc/cpuinfo")
 _CPU_FIELDS = ("model name", "flags", "Features", "CPU implementer", "CPU part")
@@ -35,6 +34,11 @@ _CPU_FIELDS = ("model name", "flags", "Features", "CPU implementer", "CPU part")
 @cache
 def _source(path: Path) -> bytes:
     return path.read_bytes()
+
+
+@cache
+def _digest(path: Path) -> bytes:
+    return hashlib.sha256(_source(path)).digest()
 
 
 @cache
@@ -71,7 +75,7 @@ def sources_hash(path: Path, root: Path = ROOT) -> str:
         ahead += fresh
     digest = hashlib.sha256()
     for name, file in sorted((os.path.relpath(file, root), file) for file in seen):
-        digest.update(name.encode() + b"\0" + _source(file) + b"\0")
+        digest.update(name.encode() + b"\0" + _digest(file))
     return digest.hexdigest()[:16]
 
 
@@ -100,7 +104,12 @@ def is_ready(source: Path, parts: Iterable[str]) -> bool:
     """True if all kernels of these parts are there, or none is ever compiled; `source` imports them all."""
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return True
-    return all(_mark(source, part).is_file() for part in parts)
+    return all(is_marked(source, part) for part in parts)
+
+
+def is_marked(source: Path, part: str) -> bool:
+    """True if `mark_ready` was called for this part with these very sources, on this machine."""
+    return _mark(source, part).is_file()
 
 
 def mark_ready(source: Path, parts: Iterable[str]) -> None:

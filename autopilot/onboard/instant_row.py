@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+from itertools import accumulate
 from math import nan
 from typing import Any, get_type_hints
 
@@ -31,13 +33,21 @@ _ESTIMATING = (
 )
 
 
+@cache
+def _fields(record: Any) -> dict[str, tuple[int, Any]]:
+    """Where in a packed record the numbers of each field begin, and what the field is."""
+    hints = get_type_hints(record)
+    widths = [width(hints[name]) for name in record._fields]
+    begins = accumulate(widths[:-1], initial=0)
+    return {name: (first, hints[name]) for name, first in zip(record._fields, begins, strict=True)}
+
+
 def _place(record: Any, path: str) -> int:
     """Where in a packed record the numbers of a field begin, a.b for the field b of the field a."""
     first, kind = 0, record
     for name in path.split("."):
-        hints = get_type_hints(kind)
-        first += sum(width(hints[one]) for one in kind._fields[: kind._fields.index(name)])
-        kind = hints[name]
+        before, kind = _fields(kind)[name]
+        first += before
     return first
 
 

@@ -108,8 +108,10 @@ def be_punctual(real_time: bool) -> None:
             os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    gc.collect()
-    gc.freeze()
+    if real_time:
+        gc.collect()
+    gc.freeze()  # what is there is there to stay, and is not looked through again
+    gc.enable()
 
 
 def address_option(text: str) -> Address:

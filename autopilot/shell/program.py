@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import socket
 import sys
@@ -63,7 +64,8 @@ _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
 _BEAT_S = 1.0  # between two heartbeats while the clock stands
 _SLOW_SHARE = 0.8  # of the wall clock, below which the vehicle's is slow
 _SILENCE_S = 3.0  # of the simulator, until it is said
-_GROUND_RESEND_S = 0.5
+_GROUND_RESEND_FIRST_S = 0.05
+_GROUND_RESEND_LAST_S = 0.5
 _TS1 = Field(mavlink.MAVLink_timesync_message, "ts1")
 _LONGEST_SILENCE_US = 1_000_000  # that a ground station which shares our clock can promise
 _MOST_SAID = 32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
@@ -175,6 +177,7 @@ class GroundInStep:
         self._socket = _open(address, "ground station")
         self._address = address
         self._silent_until_us = 0  # it says nothing before
+        self._waits_s = 0.0  # a receive that waits
         self._said: list[bytes] = []  # in this window
         self._size = 0
         self._windows: list[bytes] = []  # datagrams that are to be sent
@@ -183,7 +186,7 @@ class GroundInStep:
         """Serve the link from now on."""
         onboard.add_link(_GROUND_LINK)
         self._silent_until_us = 0
-        set_timeout(self._socket, _GROUND_RESEND_S)
+        self._wait(_GROUND_RESEND_FIRST_S)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
         """Say what is due; at the end of a window wait for the ground station's word on it."""
@@ -203,13 +206,16 @@ class GroundInStep:
             return
         stamp = onboard.now_us * 1000
         asked = time.monotonic()
+        silence_s = _GROUND_RESEND_FIRST_S
         while True:
             stop.check()
+            self._wait(silence_s)
             arrived = receive(self._socket)
             if arrived is None:
                 if time.monotonic() - asked > _GROUND_GONE_S:
                     raise AutopilotError(f"the ground station was silent for {_GROUND_GONE_S:g} s; stopping")
                 self._send(ask)
+                silence_s = min(2.0 * silence_s, _GROUND_RESEND_LAST_S)
                 continue
             if arrived[1] != self._address or _answers_before(arrived[0], stamp):
                 continue
@@ -221,6 +227,12 @@ class GroundInStep:
                     if promised_us <= _LONGEST_SILENCE_US:  # else it is a clock of its own
                         self._silent_until_us = onboard.now_us + promised_us
                     return
+
+    def _wait(self, seconds: float) -> None:
+        """How long a receive waits."""
+        if seconds != self._waits_s:
+            self._waits_s = seconds
+            set_timeout(self._socket, seconds)
 
     def _say(self, datagram: bytes) -> None:
         if self._size + len(datagram) > _MOST_SAID:
@@ -555,6 +567,7 @@ def main(
         parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
         compiled = ready(parts)
         if not compiled:
+            gc.enable()  # the compiler leaves much behind
             say(ONCE)
         mission, trouble = kept.load_mission(place)
         troubles += [trouble] if trouble else []

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
 from gcs.commands.options import (
     AddressType,
     PositiveType,
     SettingType,
     json_option,
+    law_option,
     print_json,
     sensors_option,
     vehicle_option,
@@ -30,13 +30,7 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
 
 @click.command("fly")
 @click.argument("mission")
-@click.option(
-    "--law",
-    type=click.Choice(LAWS),
-    default=DEFAULT_LAW,
-    show_default=True,
-    help="Control law to fly with.",
-)
+@law_option
 @sensors_option
 @vehicle_option()
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of all noise.")

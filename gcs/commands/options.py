@@ -86,6 +86,15 @@ def vehicle_option(what: str = "What flies, in truth and by belief") -> Callable
     return click.option("--vehicle", default="bebop", show_default=True, help=f"{what}: {VEHICLES.choice()}.")
 
 
+def law_option(function: F) -> F:
+    """--law of every command that starts an autopilot, or compiles one."""
+    from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
+
+    law = click.Choice(LAWS)
+    help_text = "Control law to fly with."
+    return click.option("--law", type=law, default=DEFAULT_LAW, show_default=True, help=help_text)(function)
+
+
 def sensors_option(function: F) -> F:
     """--sensors of every command that starts a simulator; its help lists the shipped profiles."""
     from sitl.sensors.shipped import PROFILES

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import click
 
-from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
+from autopilot.vehicle.parameters import LAWS
+from gcs.commands.options import law_option
 
 
 @click.command("warmup")
-@click.option(
-    "--law",
-    type=click.Choice(LAWS),
-    default=DEFAULT_LAW,
-    show_default=True,
-    help="Control law to fly with.",
-)
+@law_option
 @click.option("--all", "all_laws", is_flag=True, help="All control laws.")
 @click.option("--quiet", is_flag=True, help="No progress.")
 def warmup_command(law: str, all_laws: bool, quiet: bool) -> None:

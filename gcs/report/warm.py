@@ -6,14 +6,37 @@ The first time matplotlib looks through the machine's fonts, and Python compiles
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
+from importlib import import_module
+
+_NEEDED = (
+    "gcs.analysis.parquet",
+    "gcs.report.build",
+    "gcs.report.draw",
+    "gcs.report.html",
+    "jinja2",
+    "matplotlib.backends.backend_agg",
+    "mpl_toolkits.mplot3d",
+    "pyarrow.parquet",
+    "rich.console",
+    "rich.table",
+)
+
+
+def load(enough: Callable[[], bool] = lambda: False) -> None:
+    """Import what a report is made with, until it is `enough`: the rest comes when it is needed."""
+    for name in _NEEDED:
+        if enough():
+            return
+        import_module(name)
 
 
 def main() -> None:
     """Draw a picture of nothing."""
     print("matplotlib", flush=True)
+    load()
     from matplotlib.figure import Figure
 
-    import gcs.report.plots  # noqa: F401
     from gcs.report.style import style
 
     with style():

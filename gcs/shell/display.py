@@ -188,7 +188,7 @@ class CompileDisplay(LiveBars):
                     for title, kernel in running.items()
                 },
             },
-            lambda: f"compiling {', '.join(running)}; {remain} of {total} parts remain",
+            lambda: f"compiling {_parts(running)}; {remain} of {total} parts remain",
             " ".join(running),
         )
 
@@ -216,6 +216,11 @@ class StepDisplay(LiveBars):
         from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
 
         return (SpinnerColumn(), "{task.description}", BarColumn(), MofNCompleteColumn())
+
+
+def _parts(running: Mapping[str, str]) -> str:
+    """Titles, each with the kernel that is being compiled, if that is known."""
+    return ", ".join(f"{title} ({kernel})" if kernel else title for title, kernel in running.items())
 
 
 def _or_dash(value: float | None, scale: float, unit: str) -> str:

@@ -75,6 +75,11 @@ class UdpSocket:
     def fileno(self) -> int:
         return self._socket.fileno()
 
+    @property
+    def waiting(self) -> bool:
+        """Whether a datagram is there."""
+        return bool(select.select([self], [], [], 0.0)[0])
+
     def drain(self) -> list[bytes]:
         """All datagrams that are there, without waiting."""
         datagrams: list[bytes] = []

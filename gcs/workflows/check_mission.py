@@ -9,6 +9,7 @@ from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.wire.convert import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
+from gcs.workflows.checked import note_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Mission
@@ -16,7 +17,10 @@ from missions.model import Mission
 
 def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
     """What the vehicle cannot do of it; with paths `shaped` by the autopilot or as they are asked."""
-    return check(mission, load_limits(vehicle), shaped)
+    found = check(mission, load_limits(vehicle), shaped)
+    if not found:
+        note_flyable(mission, vehicle, shaped)
+    return found
 
 
 def path_reports(mission: Mission, vehicle: str) -> list[PathReport]:

@@ -24,6 +24,7 @@ from gcs.errors import (
 from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
+from gcs.workflows.checked import known_flyable
 from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.mission_file import load
 from gcs.workflows.own_vehicle import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
@@ -101,6 +102,10 @@ def _fly_own(
         from gcs.workflows.own_flight import fly_own  # while they load
 
         _check(mission, options)
+        if options.speed is None:
+            from gcs.report.warm import load as load_report
+
+            load_report(lambda: own.vehicle.waiting)  # there is a core to spare until the vehicle speaks
         return fly_own(mission, options, log, own, stop, watch)
 
 
@@ -120,10 +125,13 @@ def _fly_running(
 
 def _check(mission: Mission, options: FlightOptions) -> None:
     """GcsError unless the vehicle can fly it, or need not."""
-    if not (options.force or options.tries_anyway):
+    if options.force or options.tries_anyway:
+        return
+    shaped = options.law == "plumbline"
+    if not known_flyable(mission, options.vehicle, shaped):
         from gcs.workflows.check_mission import refuse_unflyable
 
-        refuse_unflyable(mission, options.vehicle, options.law == "plumbline")
+        refuse_unflyable(mission, options.vehicle, shaped)
 
 
 def _end(

@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import struct
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from tests.doubles.craft import Craft
+from tests.doubles.plain_python import in_plain_python
 
 TICKS = 150
-SCRIPT = f"""
-import sys
-sys.path.insert(0, {str(Path(__file__).parents[2])!r})
-from tests.core.test_interpreted import fingerprint
-print(fingerprint())
-"""
 
 
 def fingerprint() -> str:
@@ -47,12 +38,4 @@ def numbers(record: Any) -> Iterator[float]:
 
 
 def test_compiled_and_interpreted_flights_are_bit_equal() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=True,
-    )
-    assert done.stdout.strip() == fingerprint()
+    assert in_plain_python(fingerprint) == fingerprint()

@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +31,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterError
 from missions.model import Delay, Land, Takeoff
 from tests.doubles.craft import Craft
+from tests.doubles.plain_python import in_plain_python
 
 TICK_US = 4000
 BEGIN_US = 10_000_000
@@ -130,26 +126,10 @@ def fingerprints() -> dict[str, str]:
     return found
 
 
-SCRIPT = f"""
-import json, sys
-sys.path.insert(0, {str(Path(__file__).parents[2])!r})
-from tests.core.test_tick import fingerprints
-print(json.dumps(fingerprints()))
-"""
-
-
 def test_every_law_in_every_mode_leaves_the_same_rows_compiled_and_interpreted() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=True,
-    )
-    interpreted, compiled = json.loads(done.stdout), fingerprints()
+    plain, compiled = in_plain_python(fingerprints), fingerprints()
     assert len(compiled) > 15 * len(LAWS) * len(MODES)
-    assert [name for name in compiled if compiled[name] != interpreted[name]] == []
+    assert [name for name in compiled if compiled[name] != plain[name]] == []
 
 
 # ---- whatever the sensors say

@@ -8,6 +8,7 @@ import pytest
 
 from autopilot.shell.compiling import Part
 from gcs.errors import GcsError
+from gcs.shell.display import CompileDisplay
 from gcs.workflows import warmup
 from gcs.workflows.warmup import parts_left, warm_up
 
@@ -65,3 +66,10 @@ def test_a_part_that_fails_is_told_with_its_last_words_and_not_marked(monkeypatc
     with pytest.raises(GcsError, match=r"the bad cannot be compiled: .*no compiler"):
         warm_up(("plumbline",), quiet=True)
     assert not bad.ready
+
+
+def test_what_is_compiled_is_told_kernel_by_kernel(capsys):
+    with CompileDisplay(quiet=False) as display:
+        display.update({"the paths": "autopilot.trajectory.splines.sample", "the report": ""}, 2, 5)
+    kernels = "the paths (autopilot.trajectory.splines.sample), the report"
+    assert capsys.readouterr().err == f"gcs: compiling {kernels}; 2 of 5 parts remain\n"

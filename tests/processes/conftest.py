@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -24,6 +25,15 @@ class Program:
             self.process = subprocess.Popen(
                 [sys.executable, "-m", *arguments], stdout=output, stderr=subprocess.STDOUT, cwd=log.parent
             )
+
+    def says(self, pattern: bytes) -> None:
+        """Wait until it has said what matches `pattern`; it must not end before."""
+        while not re.search(pattern, self.log.read_bytes()):
+            try:
+                code = self.process.wait(0.2)
+            except subprocess.TimeoutExpired:
+                continue
+            raise AssertionError(f"{self.log.stem} ended with {code}: {self.log.read_text()}")
 
     def kill(self) -> None:
         """As kill -9 does."""

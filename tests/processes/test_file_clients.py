@@ -44,12 +44,7 @@ def vehicle(start: Start, tmp_path: Path, *options: str) -> str:
     start("sitl", "--listen", sim, "--truth", truth, "--sensors", "ideal")
     storage = ("--storage", str(tmp_path / "storage"))
     program = start("autopilot", "--sim", sim, "--gcs", ground, "--api", "none", *storage, *options)
-    while b"flying with the simulator" not in program.log.read_bytes():
-        try:
-            code = program.process.wait(0.2)
-        except subprocess.TimeoutExpired:
-            continue
-        raise AssertionError(f"autopilot ended with {code}: {program.log.read_text()}")
+    program.says(b"flying with the simulator")
     return ground.rpartition(":")[2]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -30,12 +31,13 @@ ROUND = (
 # of the trapezoid rule over a tick, by a jerk of some m/s^3
 TRAPEZOID_M = 1e-5
 LIMITS = SETTINGS.limits._replace(shaped=True)
+prepared_once = cache(prepare)
 
 
 def prepared_sky(*steps: Step, limits: object = LIMITS) -> Sky:
     sky = Sky(*steps)
     plan = sky.flight.mission.plan
-    found = prepare(plan.steps, plan.sequence, limits)  # type: ignore[arg-type]
+    found = prepared_once(plan.steps, plan.sequence, limits)  # type: ignore[arg-type]
     sky.flight = with_plan(sky.flight, replace(plan, prepared=found))
     return sky
 

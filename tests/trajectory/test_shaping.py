@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache
 from math import acos, cos, inf, nextafter, pi, radians
 
 import numpy as np
@@ -12,11 +10,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from autopilot.trajectory import prepare as preparation
 from autopilot.trajectory.convex import NO_ROWS, Goal, Problem
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import AS_ASKED, REFUSE, SLOW_DOWN, Limits, prepare, slow_down, trouble_of
 from autopilot.trajectory.rotor_demand import Bounds, commanded, demand, slopes
-from autopilot.trajectory.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, shape, unshaped
+from autopilot.trajectory.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, unshaped
 from autopilot.trajectory.splines import Array, Basis
 from missions.fileformat import load_mission
 from missions.model import Signals, Sine, Term
@@ -31,12 +30,9 @@ BETWEEN_N = 0.05
 HASTY = 1.0, 0.7  # m, s: a step that no vehicle flies
 
 
-@pytest.fixture(scope="module", autouse=True)
-def shaped_once() -> Iterator[None]:
-    """Each path is shaped once, whoever asks for it."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("autopilot.trajectory.prepare.shape", cache(shape))
-        yield
+def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
+    """Shaped once, whoever asks for it (`shaped_once`)."""
+    return preparation.shape(step, body, bounds)
 
 
 def signals_of(name: str) -> Signals:

@@ -69,8 +69,10 @@ def test_answers_go_to_whoever_spoke():
     with UdpContext() as ours:
         theirs = open_address(parse_address(f"udpout:{ours.address}"))
         ours.send(b"to nobody yet")
+        assert not ours.waiting
         theirs.send(b"hello")
         wait([ours], WAIT_S)
+        assert ours.waiting
         assert ours.drain() == [b"hello"]
         ours.send(b"hello yourself")
         wait([theirs], WAIT_S)
