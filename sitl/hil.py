@@ -24,10 +24,11 @@ from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.simulator_frames import Answer, answer_in
 from sitl.messages import (
     CAMERA,
+    DIALECT_COMPONENT,
+    DIALECT_FRAMES,
     ENCODER,
     NOTHING_NEW,
     SIMULATOR_COMPONENT,
-    TRUTH_FRAMES,
     VEHICLE_SYSTEM,
     Statement,
     put_sensors,
@@ -100,6 +101,7 @@ class HilSimulator:
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
+        self._dialect_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
         self._begin()
 
     def _begin(self) -> None:
@@ -293,17 +295,20 @@ class HilSimulator:
         snapped = core.snap_speed > LEAST_SNAP
         if not (due or wind_due or snapped):
             return None
-        writer, datagram = self._truth_writer, b""
+        writer, dialect, datagram = self._truth_writer, self._dialect_writer, b""
         if due:
             room = (self._buffer, self._payload)
             rows = (core.rows.world, core.rows.model, self._statement)
             if self._put_truth is None:
-                self._put_truth = entry_of(put_truth, *rows, *room, writer.sequence)
-            length = self._put_truth(*rows, *room, writer.sequence)
-            writer.sequence = (writer.sequence + TRUTH_FRAMES) & 0xFF
+                self._put_truth = entry_of(put_truth, *rows, *room, writer.sequence, dialect.sequence)
+            length = self._put_truth(*rows, *room, writer.sequence, dialect.sequence)
+            writer.sequence = (writer.sequence + 1) & 0xFF
+            dialect.sequence = (dialect.sequence + DIALECT_FRAMES) & 0xFF
             datagram = self._written[:length].tobytes()
         if wind_due or snapped:
-            datagram += b"".join(map(writer.frame, self._events(wind_due, snapped, status_due)))
+            datagram += b"".join(map(dialect.frame, self._events(wind_due, snapped, status_due)))
+            if status_due and self.diverged:
+                datagram += writer.frame(_DIVERGED)
         return datagram
 
     def _events(self, wind_due: bool, snapped: bool, status_due: bool) -> list[Any]:
@@ -319,8 +324,6 @@ class HilSimulator:
             messages.append(mavlink.MAVLink_cable_snap_message(now_us, speed, reduced_mass * speed))
         if status_due:
             messages.append(self._status())
-            if self.diverged:
-                messages.append(_DIVERGED)
         return messages
 
     def _status(self) -> object:

@@ -60,8 +60,10 @@ from sitl.world import MAG as MAGNETOMETER
 
 VEHICLE_SYSTEM = 1
 SIMULATOR_COMPONENT = 26
+# that says the messages of our dialect: tools that do not know these would take their numbers for lost ones
+DIALECT_COMPONENT = 27
 TRACKER, CAMERA, ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
-TRUTH_FRAMES = 3  # that `put_truth` writes
+DIALECT_FRAMES = 2  # that `put_truth` writes, behind one of the common dialect
 _TRUTH = mavlink.PLUMBLINE_SOURCE_TRUTH
 _NAN3: Vec3 = (nan, nan, nan)
 
@@ -215,9 +217,18 @@ def put_sensors(
 
 @kernel
 def put_truth(
-    world_row: Row, model_row: Row, statement: Row, buffer: Bytes, payload: Bytes, sequence: int
+    world_row: Row,
+    model_row: Row,
+    statement: Row,
+    buffer: Bytes,
+    payload: Bytes,
+    sequence: int,
+    dialect_sequence: int,
 ) -> int:
-    """Write HIL_STATE_QUATERNION, LOAD_STATE and ROTOR_STATE of this tick; how many bytes they have."""
+    """Write HIL_STATE_QUATERNION, LOAD_STATE and ROTOR_STATE of this tick; how many bytes they have.
+
+    The first has the number `sequence` of the one component, the others follow in that of the other.
+    """
     world, truth = unpack(World, world_row, 0), unpack(WorldModel, model_row, 0).truth
     state, home = world.plant, unpack(Statement, statement, 0).home
     a = state.accel_quad
@@ -244,14 +255,16 @@ def put_truth(
         state.taut > 0.0,
         int(state.slack_events),
     )
-    at = _put(LOAD_STATE, load, payload, buffer, at, sequence + 1)
+    first = Origin(dialect_sequence & 0xFF, VEHICLE_SYSTEM, DIALECT_COMPONENT)
+    second = Origin((dialect_sequence + 1) & 0xFF, VEHICLE_SYSTEM, DIALECT_COMPONENT)
+    at = put_frame(LOAD_STATE, load, payload, buffer, at, first)
     low, high = truth.rotor_min, truth.rotor_max
     cut = 0
     for i in range(4):
         if not low <= world.command[i] <= high:
             cut |= 1 << i
     rotors = rotor_state_values(world.now_us, _TRUTH, state.rotor_force, low, high, cut)
-    return _put(ROTOR_STATE, rotors, payload, buffer, at, sequence + 2)
+    return put_frame(ROTOR_STATE, rotors, payload, buffer, at, second)
 
 
 NOTHING_NEW = Newest(ImuReading(ZERO, ZERO), MagnetometerReading(ZERO), BarometerReading(0.0))

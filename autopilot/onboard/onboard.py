@@ -65,6 +65,8 @@ from autopilot.wire.signing import Signing
 from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
+# that asks whether the ground has caught up: no log has its messages, and their numbers would be missed
+LOCKSTEP_COMPONENT = mavlink.MAV_COMP_ID_SYSTEM_CONTROL
 _TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -378,7 +380,7 @@ class Onboard:
         if self.now_us < self._next_question_us:
             return None
         self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
-        return self.endpoint.datagram(link, (_TIMESYNC, (0, self.now_us * 1000)))
+        return self.endpoint.datagram(link, (_TIMESYNC, (0, self.now_us * 1000)), LOCKSTEP_COMPONENT)
 
     def restore_world(self, values: Mapping[str, float]) -> None:
         """What the simulator's parameters were saved as; it is told when it is there."""

@@ -252,9 +252,9 @@ class VehicleEndpoint:
         """The vehicle itself changed a parameter: show it to all links."""
         self._do([Send(None, self._parameters.value_message(name))], [])
 
-    def datagram(self, link: Link, message: Any) -> bytes:
-        """One message of the autopilot for a link, now, in the link's sequence."""
-        return self._links[link].frame(self._own, message)
+    def datagram(self, link: Link, message: Any, component: int = AUTOPILOT_COMPONENT) -> bytes:
+        """One message of a component for a link, now, in the link's sequence."""
+        return self._links[link].frame((self.identity.system, component), message)
 
     def due(self, now_us: int) -> bool:
         """Whether `poll` has anything to do."""
