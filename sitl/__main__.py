@@ -42,6 +42,8 @@ _TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another 
 _LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
 _SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
 _TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
+_SLOW_SHARE = 0.95  # of the clock that was asked for: a slower one is said
+_SLOW_AGAIN_NS = 10_000_000_000  # between two words about it
 _STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
 
 
@@ -179,19 +181,16 @@ def run_lockstep(
     simulator: HilSimulator,
     stop: StopRequest,
     say: Callable[[str], None],
-    speed: float | None = None,
+    pacing: Pacing | None = None,
 ) -> None:
-    """Tick for ever, each tick as soon as the one before is answered, but no faster than `speed`."""
+    """Tick for ever, each tick as soon as the one before is answered, but no faster than `pacing` says."""
     watch = Watch(say)
-    period_ns = round(simulator.tick_us * 1000 / speed) if speed else 0
-    due = time.perf_counter_ns()
+    clock = None if pacing is None else _Clock(pacing, simulator, say)
     link.timeout(_RESEND_FIRST_S)
     while True:
         stop.check()
-        if period_ns:
-            # what was waited for is not caught up with
-            due = max(due, time.perf_counter_ns() - _STALL_NS) + period_ns
-            _sleep_until(due)
+        if clock is not None:
+            clock.wait()
         link.gather_truth(simulator)
         link.send(simulator)
         arrived = link.receive()
@@ -199,6 +198,34 @@ def run_lockstep(
         if not simulator.answered:
             _insist(link, simulator, stop, watch, arrived is None or greeted)
         simulator.advance()
+
+
+class _Clock:
+    """The wall clock that lockstep keeps to where the machine can; says where it cannot."""
+
+    def __init__(self, pacing: Pacing, simulator: HilSimulator, say: Callable[[str], None]) -> None:
+        self._pacing, self._simulator, self._say = pacing, simulator, say
+        self._period_ns = round(simulator.tick_us * 1000 / pacing.speed)
+        self._due = time.perf_counter_ns()
+        self._told_ns = 0
+
+    def wait(self) -> None:
+        """Until the next tick is due."""
+        # what was waited for is not caught up with
+        self._due = max(self._due, time.perf_counter_ns() - _STALL_NS) + self._period_ns
+        now = _sleep_until(self._due)
+        pacing = self._pacing
+        pacing.record(self._due, now)
+        figures = pacing.figures
+        if figures is self._simulator.pacing:
+            return
+        self._simulator.pacing = figures
+        share = figures.rate_hz * self._simulator.tick_us * 1e-6 / pacing.speed
+        if 0.0 < share < _SLOW_SHARE and now - self._told_ns > _SLOW_AGAIN_NS:
+            self._told_ns = now
+            text = f"Machine busy: clock at {share:.2f} of {pacing.speed:g} x"
+            self._say(text.lower())
+            self._simulator.parameters.say(text)
 
 
 def _insist(link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool) -> None:
@@ -224,14 +251,13 @@ def _insist(link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch
 def run_real_time(
     link: Link,
     simulator: HilSimulator,
-    speed: float,
     pacing: Pacing,
     stop: StopRequest,
     say: Callable[[str], None],
 ) -> None:
     """Tick for ever on an absolute schedule; a command that comes too late is missed, and counted."""
     watch = Watch(say)
-    period_ns = simulator.tick_us * 1000 / speed
+    period_ns = simulator.tick_us * 1000 / pacing.speed
     simulator.pacing = pacing.figures
     heard = time.monotonic()
     start = time.perf_counter_ns()
@@ -306,11 +332,16 @@ def _run_on(cpu: int) -> None:
 @click.option(
     "--seed", default=1, show_default=True, type=click.IntRange(0, 2**63 - 1), help="Seed of all noise."
 )
-@click.option("--lockstep", is_flag=True, help="Wait for the answer to every tick; as fast as it goes.")
 @click.option(
     "--speed",
     type=click.FloatRange(0.0, 1000.0, min_open=True),
-    help="Simulated seconds per second, with --lockstep at most.  [default: 1; with --lockstep: no limit]",
+    help="Simulated seconds per second, at most.  [default: 1; with --lockstep: no limit]",
+)
+@click.option("--lockstep", is_flag=True, help="As fast as the autopilot answers.")
+@click.option(
+    "--real-time",
+    is_flag=True,
+    help="Keep to the wall clock: do not wait for an autopilot that is late, its command is missed.",
 )
 @click.option(
     "--listen",
@@ -352,8 +383,9 @@ def main(
     sensors: str,
     vehicle: str,
     seed: int,
-    lockstep: bool,
     speed: float | None,
+    lockstep: bool,
+    real_time: bool,
     listen: Address,
     truth: Address,
     truth_every: int,
@@ -364,8 +396,11 @@ def main(
 ) -> None:
     """Simulate a quadrotor with a load on a cable, and its sensors.
 
-    Waits for an autopilot, sends it sensor readings and takes rotor commands back, by MAVLink over UDP.
+    Waits for an autopilot, sends it sensor readings and takes rotor commands back, by MAVLink over UDP. The
+    world waits for the answer to every tick: on a busy machine its clock is slower, and nothing is lost.
     """
+    if lockstep and real_time:
+        raise click.UsageError("--lockstep and --real-time exclude each other")
 
     def say(text: str) -> None:
         if not quiet:
@@ -374,6 +409,7 @@ def main(
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to bring to an end
     link: Link | None = None
     factor = 1.0 if speed is None else speed
+    unlimited = lockstep and speed is None
     pacing = Pacing(factor)
     simulator: HilSimulator | None = None
     began = time.monotonic()
@@ -382,7 +418,9 @@ def main(
         link = Link(listen, truth, say)
 
         def build() -> HilSimulator:
-            return HilSimulator.build(vehicle, sensors, seed, dict(settings), home, lockstep, truth_every)
+            return HilSimulator.build(
+                vehicle, sensors, seed, dict(settings), home, not real_time, truth_every
+            )
 
         compiled = SIMULATOR.ready
         if not compiled:
@@ -397,10 +435,10 @@ def main(
         if cpu is not None:
             _run_on(cpu)
         # where it would wait spinning for most of the time, it would keep others from their work
-        be_punctual(not lockstep and simulator.tick_us * 1000 / factor > 4 * _SPIN_NS)
-        mode = f"at {factor:g} x real time"
-        if lockstep:
-            mode = "in lockstep" if speed is None else f"in lockstep, at most {mode[3:]}"
+        be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * _SPIN_NS)
+        mode = "in lockstep" if unlimited else f"at {factor:g} x real time, waiting where that is too fast"
+        if real_time:
+            mode = f"at {factor:g} x real time, waiting for nobody"
         say(
             f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
             f"waiting for an autopilot on {shown(listen)}"
@@ -408,10 +446,10 @@ def main(
         with StopRequest() as stop:
             meet(link, simulator, stop)
             began = time.monotonic()
-            if lockstep:
-                run_lockstep(link, simulator, stop, say, speed)
+            if real_time:
+                run_real_time(link, simulator, pacing, stop, say)
             else:
-                run_real_time(link, simulator, factor, pacing, stop, say)
+                run_lockstep(link, simulator, stop, say, None if unlimited else pacing)
     except ValueError as error:
         print(f"sitl: {error}", file=sys.stderr)
         sys.exit(1)
@@ -421,16 +459,16 @@ def main(
         if link is not None:
             link.close()
     if simulator is not None:
-        say(_summary(simulator, lockstep, pacing, time.monotonic() - began))
+        say(_summary(simulator, real_time, pacing, time.monotonic() - began))
 
 
-def _summary(simulator: HilSimulator, lockstep: bool, pacing: Pacing, wall_s: float) -> str:
+def _summary(simulator: HilSimulator, real_time: bool, pacing: Pacing, wall_s: float) -> str:
     simulated_s = simulator.now_us / 1e6
     text = f"stopped at t = {simulated_s:.3f} s; "
-    if lockstep:
-        text += f"{simulated_s / max(wall_s, 1e-9):.1f} x real time"
-    else:
+    if real_time:
         text += pacing.summary(simulator.missed)
+    else:
+        text += f"{simulated_s / max(wall_s, 1e-9):.2f} x real time"
     if simulator.rejected:
         text += f"; {simulator.rejected} commands were not numbers"
     if simulator.diverged:

@@ -62,7 +62,7 @@ def _asks_reboot(message: Any) -> bool:
 
 
 class PacingFigures(NamedTuple):
-    """What the shell measured of its own timeliness, for SIM_STATUS; all 0 in lockstep."""
+    """What the shell measured of its own timeliness, for SIM_STATUS; all 0 without a wall clock."""
 
     speed_factor: float = 0.0
     rate_hz: float = 0.0
@@ -274,6 +274,8 @@ class HilSimulator:
     def _sensor_frames(self) -> bytes:
         writer, core = self._sensor_writer, self.core
         aside = self.parameters.take()
+        if not self._lockstep and core.now_us % SECOND_US == 0:  # how punctual the answers are
+            aside.append(self._status())
         first = b"".join(map(writer.frame, aside)) if aside else b""
         room = (self._buffer, self._payload)
         arguments = (core.rows, core.now_us, self._newest, self._statement, *room, writer.sequence)

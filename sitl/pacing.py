@@ -24,7 +24,7 @@ class Pacing:
 
     def __init__(self, speed: float) -> None:
         self.figures = PacingFigures(speed_factor=speed)
-        self._speed = speed
+        self.speed = speed  # simulated seconds per second that are wanted
         self._late_us = array("L")
         self._window_start = 0
         self._window_first = 0  # index of its first tick
@@ -43,7 +43,7 @@ class Pacing:
         if elapsed >= _WINDOW_NS:
             window = sorted(self._late_us[self._window_first :])
             self.figures = PacingFigures(
-                speed_factor=self._speed,
+                speed_factor=self.speed,
                 rate_hz=len(window) * 1e9 / elapsed,
                 late_p50_us=percentile(window, 0.50),
                 late_p99_us=percentile(window, 0.99),

@@ -43,13 +43,17 @@ class ParameterServer:
         self.table.set(name, value)
         self._waiting.append(self._value(name))
 
+    def say(self, text: str) -> None:
+        """A text for whoever flies the vehicle."""
+        line = text.encode("ascii", errors="replace")[:STATUSTEXT_BYTES]
+        self._waiting.append(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_WARNING, line))
+
     def _set(self, name: str, value: float) -> bool:
         before = self.table[name]
         try:
             self.table.set(name, value)
         except ParameterError as error:
-            text = str(error).encode("ascii", errors="replace")[:STATUSTEXT_BYTES]
-            self._waiting.append(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_WARNING, text))
+            self.say(str(error))
         self._waiting.append(self._value(name))
         return self.table[name] != before
 

@@ -31,6 +31,7 @@ from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
 from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, Loss
+from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import Moment, Moments, Options
 from autopilot.onboard.tick_answer import answer_tick
@@ -155,6 +156,8 @@ class Onboard:
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
+        self._punctuality = Punctuality()
+        self._lost: tuple[str, ...] = ()  # what of the storage cannot be read
         self._world_told = False  # what parameters it has
         self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is asked to begin anew
@@ -267,6 +270,10 @@ class Onboard:
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
             self.endpoint.say(message.severity, message.text)
+            return
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
+            self._punctuality.hear(message, self.tick)
+            self._look_for_hindrances()
             return
         name = self._world.receive(message)
         if name is not None:
@@ -453,7 +460,15 @@ class Onboard:
 
     def take_losses(self, lost: tuple[str, ...]) -> None:
         """What of the storage cannot be read: the vehicle is not armed until that is made good."""
-        self.core.change(replace(self.core.flight, lost=lost))
+        self._lost = lost
+        self._look_for_hindrances()
+
+    def _look_for_hindrances(self) -> None:
+        """What keeps the vehicle from being armed besides what the supervisor sees."""
+        late = self._punctuality.complaint
+        hindrances = (*self._lost, *((late,) if late else ()))
+        if hindrances != self.core.flight.hindrances:
+            self.core.change(replace(self.core.flight, hindrances=hindrances))
 
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None, self.core.flight.area.home)

@@ -78,6 +78,7 @@ from autopilot.wire.signing import Signing
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
 REACHED_AGAIN = 4  # times that the end of a mission is said again
 REACHED_US = 300_000  # between two of them
+PATIENCE = 64  # bytes of a datagram that may be part of no message, before the rest of it is passed over
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
 _SECOND_US = 1_000_000
 _INT32 = 2**31 - 1
@@ -190,7 +191,7 @@ class VehicleEndpoint:
         """Handle a datagram of `link`; answers leave with the next `poll`. Malformed input never raises."""
         events: list[Event] = []
         self._stirred = True
-        for received in decode(datagram)[0]:
+        for received in decode(datagram, PATIENCE)[0]:
             message_id = received.id
             if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue

@@ -60,10 +60,13 @@ def set_timeout(sock: socket.socket, seconds: float) -> None:
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
 
 
-def receive(sock: socket.socket, flags: int = 0) -> tuple[bytes, Address] | None:
-    """The next datagram and its sender; None after the timeout, or if one of ours found no listener."""
+def receive(
+    sock: socket.socket, flags: int = 0, most_bytes: int = LARGEST_DATAGRAM
+) -> tuple[bytes, Address] | None:
+    """The next datagram, or so much of it, and its sender; None after the timeout, or if one of ours found no
+    listener."""
     try:
-        return sock.recvfrom(LARGEST_DATAGRAM, flags)
+        return sock.recvfrom(most_bytes, flags)
     except OSError:
         return None
 

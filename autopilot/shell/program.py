@@ -70,7 +70,8 @@ _TS1 = Field(mavlink.MAVLink_timesync_message, "ts1")
 _LONGEST_SILENCE_US = 1_000_000  # that a ground station which shares our clock can promise
 _MOST_SAID = 32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
 _TOGETHER = 4  # windows that are sent at once to a ground station that says nothing meanwhile
-_MOST_AT_ONCE = 64  # datagrams that one socket may bring between two ticks; a flood must not stop the clock
+_LARGEST_HEARD = 2048  # bytes of a datagram from the ground; what is behind them is not heard
+_GROUND_BUDGET_S = 0.5e-3  # for all that the ground says between two ticks; a flood must not stop the clock
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
@@ -124,13 +125,13 @@ class GroundStations:
         """Hand over what came and send what is due."""
         if self._tcp is not None:
             self._tcp.exchange(onboard, handle)
+        until = time.perf_counter() + _GROUND_BUDGET_S
         for i, sock in enumerate(self._sockets):
-            for _ in range(_MOST_AT_ONCE):
-                arrived = receive(sock, socket.MSG_DONTWAIT)
-                if arrived is None:
-                    break
+            while (arrived := receive(sock, socket.MSG_DONTWAIT, _LARGEST_HEARD)) is not None:
                 datagram, sender = arrived
                 handle(onboard.receive_ground(datagram, (i, sender)))
+                if time.perf_counter() > until:  # the others have their turn, and the rest waits
+                    break
         self.send(onboard)
 
     def send(self, onboard: Onboard) -> None:

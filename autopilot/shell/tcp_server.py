@@ -11,7 +11,7 @@ from autopilot.services.records import Event, Link
 from autopilot.shell.options import Address
 from autopilot.wire.codec import whole_frames
 
-_LARGEST_READ = 65536
+_LARGEST_READ = 2048  # between two ticks, of each client
 _LARGEST_BACKLOG = 262_144  # bytes that a client has not taken: it is stuck, and is let go
 
 

@@ -169,7 +169,7 @@ class Flight:
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
     returning: bool = False  # home, or landing there
-    lost: tuple[str, ...] = ()  # what was stored and cannot be read: reasons not to arm
+    hindrances: tuple[str, ...] = ()  # reasons not to arm that lie beside the flight: the storage, the clock
 
 
 class View(NamedTuple):

@@ -269,18 +269,21 @@ class Field:
         return self._number.unpack_from(frame, begin)[0]
 
 
-def decode(datagram: bytes) -> tuple[list[Received], int]:
+def decode(datagram: bytes, patience: int | None = None) -> tuple[list[Received], int]:
     """The messages of a datagram in their order, and how many of its bytes were not part of one.
 
     Whatever the bytes are, nothing is raised: behind a byte that begins no frame, or begins one with a wrong
-    checksum, the search goes on at the next byte. A frame of an unknown id cannot be checked; it is stepped
-    over whole where it ends with the datagram or before what may be another frame.
+    checksum, the search goes on at the next byte, at so many bytes as `patience` says if it says anything: to
+    search costs time. A frame of an unknown id cannot be checked; it is stepped over whole where it ends with
+    the datagram or before what may be another frame.
     """
     received: list[Received] = []
     end = len(datagram)
-    good = 0
+    good = unknown = 0  # bytes of messages, and of whole frames that cannot be checked
     start = 0
     while start < end:
+        if patience is not None and start - good - unknown > patience:
+            break
         magic = datagram[start]
         if magic == _MAGIC_V2 and start + _HEADER_V2 + _CRC <= end:
             _, payload, flags, _, sequence, system, component, low, high = _HEADER2.unpack_from(
@@ -303,7 +306,9 @@ def decode(datagram: bytes) -> tuple[list[Received], int]:
             continue
         layout = _BY_ID.get(message_id)
         if layout is None:
-            start = stop if stop == end or datagram[stop] in MAGICS else start + 1
+            whole = stop == end or datagram[stop] in MAGICS
+            unknown += stop - start if whole else 0
+            start = stop if whole else start + 1
             continue
         checksum = mcrf4xx(layout.extra, mcrf4xx(datagram[start + 1 : tail]))
         if checksum != datagram[tail] | datagram[tail + 1] << 8:

@@ -16,7 +16,7 @@ Time limits run on the vehicle's clock once it flies, so that they hold at any s
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Literal
 
@@ -52,6 +52,10 @@ class Outcome:
 
     name: OutcomeName
     reason: str = ""
+
+    def because(self, why: str) -> Outcome:
+        """The outcome with another reason beside its own, if there is one."""
+        return replace(self, reason="; ".join(filter(None, (why, self.reason)))) if why else self
 
 
 class Stage(Enum):

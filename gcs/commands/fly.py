@@ -25,7 +25,15 @@ if TYPE_CHECKING:
     from gcs.analysis.record import Record
     from gcs.clients.flight import Outcome
 
-_OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to a vehicle that runs already
+_OWN = (
+    "law",
+    "sensors",
+    "seed",
+    "lockstep",
+    "speed",
+    "real_time",
+    "settings",
+)  # nothing to a vehicle that runs already
 
 
 @click.command("fly")
@@ -39,6 +47,11 @@ _OWN = ("law", "sensors", "seed", "lockstep", "speed", "settings")  # nothing to
     "--speed",
     type=PositiveType(most=100.0),
     help="On the wall clock, so many times as fast; other ground stations may watch on 14550 and 14540.",
+)
+@click.option(
+    "--real-time",
+    is_flag=True,
+    help="As --speed 1, but the simulator waits for nobody: what comes too late is missed, and counted.",
 )
 @click.option(
     "--set",
@@ -79,6 +92,7 @@ def fly_command(
     seed: int,
     lockstep: bool,
     speed: float | None,
+    real_time: bool,
     settings: tuple[str, ...],
     out: Path | None,
     connect: Address | None,
@@ -100,12 +114,15 @@ def fly_command(
     gcs fly square --set SIM_WIND_E=3 --seed 7 --out windy
     gcs fly hover --speed 1
     """
-    if lockstep and speed is not None:
-        raise click.UsageError("--lockstep and --speed exclude each other", ctx)
+    if lockstep and (speed is not None or real_time):
+        other = "--speed" if speed is not None else "--real-time"
+        raise click.UsageError(f"--lockstep and {other} exclude each other", ctx)
+    if real_time and speed is None:
+        speed = 1.0
     if connect is not None:
         given = [name for name in _OWN if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE]
         if given:
-            option = "--set" if given[0] == "settings" else f"--{given[0]}"
+            option = "--set" if given[0] == "settings" else f"--{given[0].replace('_', '-')}"
             raise click.UsageError(
                 f"{option} is for processes that fly starts; with --connect give it to sitl and autopilot",
                 ctx,
@@ -131,6 +148,7 @@ def fly_command(
             vehicle=vehicle,
             seed=seed,
             speed=speed,
+            real_time=real_time,
             out=out,
             settings=settings,
             connect=connect,

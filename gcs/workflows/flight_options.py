@@ -20,6 +20,7 @@ class FlightOptions:
     vehicle: str
     seed: int
     speed: float | None  # None: lockstep
+    real_time: bool  # the simulator waits for nobody
     out: Path | None
     settings: tuple[str, ...]  # NAME=VALUE
     connect: Address | None
@@ -36,6 +37,7 @@ class FlightOptions:
         words += ["--law", self.law, "--sensors", self.sensors, "--vehicle", self.vehicle]
         words += ["--seed", str(self.seed)]
         words += ["--lockstep"] if self.speed is None else ["--speed", f"{self.speed:g}"]
+        words += ["--real-time"] if self.real_time else []
         for setting in self.settings:
             words += ["--set", setting]
         return " ".join(words)

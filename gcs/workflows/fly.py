@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from autopilot.vehicle.file import VEHICLES
-from autopilot.wire.tlog import TlogWriter
+from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import (
     EXIT_DONE,
     EXIT_ERROR,
@@ -46,6 +46,8 @@ _EXIT = {
     "refused": EXIT_ERROR,
     "lost": EXIT_ERROR,
 }
+
+MOST_MISSED = 1e-3  # share of the commands that may come too late before it is told of
 
 Told = Callable[["Record", "Outcome"], None]
 
@@ -153,6 +155,8 @@ def _end(
             raise StoppedError("stopped before the vehicle said anything")
         raise GcsError(outcome.reason or "the vehicle said nothing")
     folder.keep()
+    if options.real_time and outcome.name != "completed":
+        outcome = outcome.because(_too_slow(tlog))
     try:
         meta = _meta(mission, options, outcome, wall_s)
         record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
@@ -160,6 +164,22 @@ def _end(
         say(f"report abandoned; the telemetry is in {tlog}")
         raise
     return Flight(outcome, record, out, bool(stop))
+
+
+def _too_slow(tlog: Path) -> str:
+    """What the simulator counted of commands that came too late, where it is more than one of a thousand."""
+    from autopilot.wire.dialect import plumbline as mavlink
+
+    sent = missed = 0
+    for _, received in read_tlog(tlog):
+        if received.id == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
+            status = received.message
+            sent, missed = round(status.time_usec * 1e-6 * status.rate_hz), status.missed
+    if missed <= MOST_MISSED * sent:
+        return ""
+    return (
+        f"the machine was too slow: {missed} of some {sent} commands came too late; try without --real-time"
+    )
 
 
 def _meta(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: float) -> FlightMeta:

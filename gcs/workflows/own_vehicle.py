@@ -64,6 +64,7 @@ def _start(
 ) -> None:
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
+    pace += ["--real-time"] if options.real_time else []
     both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS.index(options.law)}"]
     if options.force:
         both += ["--set", "MIS_INFEASIBLE=0"]

@@ -112,11 +112,11 @@ def test_lockstep_over_udp(port: int, lockstep_sitl: subprocess.Popen[str]) -> N
 
 def test_real_time_over_udp(port: int) -> None:
     process = start(
-        *("--speed", "4", "--sensors", "ideal", "--listen", f"127.0.0.1:{port}"),
+        *("--real-time", "--speed", "4", "--sensors", "ideal", "--listen", f"127.0.0.1:{port}"),
         *("--truth", f"127.0.0.1:{free_port()}"),
     )
     assert process.stdout is not None
-    assert "at 4 x real time" in process.stdout.readline()
+    assert "at 4 x real time, waiting for nobody" in process.stdout.readline()
     pilot = Pilot(port)
     pilot.greet()
     times = []
@@ -131,10 +131,11 @@ def test_real_time_over_udp(port: int) -> None:
     assert "ticks/s, late p50" in output
 
 
-def test_lockstep_goes_no_faster_than_it_may(port: int) -> None:
-    process = start("--lockstep", "--speed", "10", "--listen", f"127.0.0.1:{port}")
+@pytest.mark.parametrize("lockstep", [(), ("--lockstep",)])
+def test_the_clock_goes_no_faster_than_it_may_and_waits(port: int, lockstep: tuple[str, ...]) -> None:
+    process = start(*lockstep, "--speed", "10", "--listen", f"127.0.0.1:{port}")
     assert process.stdout is not None
-    assert "in lockstep, at most 10 x real time" in process.stdout.readline()
+    assert "at 10 x real time, waiting where that is too fast" in process.stdout.readline()
     pilot = Pilot(port)
     pilot.greet()
     time_us = pilot.sensors()[1]
@@ -144,6 +145,7 @@ def test_lockstep_goes_no_faster_than_it_may(port: int) -> None:
         time_us = pilot.sensors(after_us=time_us)[1]
     # 0.2 s from when the first tick was sent, which may have been a while before it was received
     assert time.monotonic() - began > 0.1
+    assert pilot.sensors()[1] == time_us, "asked again, until it is answered"
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, errors) == (0, "")

@@ -215,3 +215,13 @@ def test_no_frame_is_longer_than_it_says(any_message: Sample) -> None:
     rng = np.random.default_rng(0)
     writer = FrameWriter(1, 1)
     assert max(len(writer.frame(any_message(c, rng))) for c in CLASSES) <= LONGEST_FRAME - 13
+
+
+def test_the_search_for_messages_has_an_end_where_that_is_asked_for():
+    good = FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3))
+    unknown = bytes((0xFD, 200, 0, 0, 0, 1, 1, 0xFF, 0xFF, 0xFF)) + bytes(202)
+    for junk, found in ((b"\0" * 64, 2), (b"\0" * 65, 1), (b"\xfe" * 65, 1), (unknown * 3, 2)):
+        received, rest = decode(good + junk + good, 64)
+        assert len(received) == found
+        assert rest == len(junk) + (2 - found) * len(good)
+    assert len(decode(good + b"\xfe" * 500 + good)[0]) == 2
