@@ -3,6 +3,7 @@
     python benchmarks/yardstick.py                # fly all, compare with what was recorded
     python benchmarks/yardstick.py --record       # fly all, and record
     python benchmarks/yardstick.py case-b         # only the flights whose name contains this
+    python benchmarks/yardstick.py --lanes case-b # three seeds of these, together and each alone
 
 Each flight goes over the byte queues of `gcs.closed_loop`; its telemetry is hashed, texts apart from the
 rest, so that a reworded STATUSTEXT does not hide a changed flight. The same flights are swept, and every
@@ -16,7 +17,7 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -26,7 +27,9 @@ from autopilot.wire.codec import decode
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
-from gcs.sweep.flight import TRACE_COLUMNS, boarding, fly
+from gcs.sweep.cell import cell_of
+from gcs.sweep.flight import TRACE_COLUMNS, Flight, boarding, fly
+from gcs.sweep.group import FEWEST, Group, suits
 from missions.fileformat import load_mission
 
 RECORD = Path(__file__).with_name("yardstick.json")
@@ -102,8 +105,40 @@ def measured(name: str) -> dict[str, str]:
     }
 
 
+def lanes_measured(name: str) -> dict[str, str]:
+    """Whether three seeds of a flight find together what each finds alone."""
+    mission_name, conditions = FLIGHTS[name]
+    mission = load_mission(mission_name)
+    try:
+        start = boarding(mission, conditions)
+    except ValueError as error:
+        return {"outcome": str(error)}
+    seeds = range(conditions.seed, conditions.seed + FEWEST)
+    flights = [Flight(cell_of(mission, conditions), seed, start) for seed in seeds]
+    if not suits(flights[0]):
+        return {"outcome": "alone"}
+    group = Group(flights)
+    group.run()
+    alone = [fly(mission, replace(conditions, seed=seed), start) for seed in seeds]
+    unlike = sum(repr(one) != repr(flight.flown) for one, flight in zip(alone, flights, strict=True))
+    share = group.in_lanes / sum(flight.tick for flight in flights)
+    found = {"outcome": alone[0].outcome, "in lanes": f"{share:.0%}"}
+    return {**found, "differ": str(unlike)} if unlike else found
+
+
 def _hash(data: bytes | np.ndarray) -> str:
     return sha256(data if isinstance(data, bytes) else data.tobytes()).hexdigest()[:16]
+
+
+def compare_lanes(only: str) -> int:
+    """Fly in lanes; 1 if a flight is another there."""
+    differ = 0
+    for name in FLIGHTS:
+        if only in name:
+            found = lanes_measured(name)
+            differ += "differ" in found
+            print(f"{name:26} {', '.join(f'{key}: {value}' for key, value in found.items())}", flush=True)
+    return 1 if differ else 0
 
 
 def main() -> int:
@@ -111,7 +146,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n\n", maxsplit=1)[0])
     parser.add_argument("only", nargs="?", default="", help="part of the names of the flights")
     parser.add_argument("--record", action="store_true", help="record what is flown now")
+    parser.add_argument("--lanes", action="store_true", help="fly three seeds together, and each alone")
     options = parser.parse_args()
+    if options.lanes:
+        return compare_lanes(options.only)
     recorded = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
     changed = 0
     for name in FLIGHTS:

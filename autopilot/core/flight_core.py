@@ -116,8 +116,7 @@ class FlightCore:
             references=_NO_ROWS,
         )
 
-        first = width(Command)  # forces are the first of what the mixer gives
-        self.force_row = self.rows.pilot[first : first + 4]  # what the rotors are to give, N
+        self.locate_forces()
 
     # ---- what there is
 
@@ -172,6 +171,11 @@ class FlightCore:
         )
 
     # ---- from tick to tick
+
+    def locate_forces(self) -> None:
+        """Find what the rotors are to give in the rows as they lie now."""
+        first = width(Command)  # forces are the first of what the mixer gives
+        self.force_row = self.rows.pilot[first : first + 4]  # N
 
     def take_inbox(self, inbox: Array) -> None:
         """A larger inbox."""

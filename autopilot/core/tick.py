@@ -30,8 +30,9 @@ from autopilot.estimation.filter import (
 )
 from autopilot.estimation.records import RECEIVER, Array, EstimatorState, EstimatorTuning, History
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import rows_in, taken
 from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
-from autopilot.geometry.packed import Row, pack, unpack, with_field
+from autopilot.geometry.packed import Each, Row, pack, unpack, with_field
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_POSITION
 from autopilot.supervisor.quiescence import RESTING, Stretch, may_decide
@@ -76,7 +77,7 @@ class Pilot(NamedTuple):
     moment: Vec3  # N m
     observed: Observed
     control_mode: int  # that the law's memory was made for; RESTING: it has none
-    slack_events: int
+    slack_events: Each
     was_taut: bool
 
 
@@ -109,20 +110,27 @@ class CoreRows(NamedTuple):
 
 
 @kernel
-def _vector(row: Row, first: int) -> Vec3:
-    return (row[first], row[first + 1], row[first + 2])
+def row_at(stretch: Stretch, now_us: int) -> int:
+    """The row of the stretch's setpoints that is for this tick."""
+    return (now_us - stretch.first_us) // stretch.period_us
 
 
 @kernel
-def _jet(row: Row) -> Jet:
+def vector_at(table: Array, at: int, first: int) -> Vec3:
+    """Three numbers of a row of setpoints."""
+    return (taken(table, at, first), taken(table, at, first + 1), taken(table, at, first + 2))
+
+
+@kernel
+def _jet(table: Array, at: int) -> Jet:
     return (
-        _vector(row, 0),
-        _vector(row, 3),
-        _vector(row, 6),
-        _vector(row, 9),
-        _vector(row, 12),
-        _vector(row, 15),
-        _vector(row, 18),
+        vector_at(table, at, 0),
+        vector_at(table, at, 3),
+        vector_at(table, at, 6),
+        vector_at(table, at, 9),
+        vector_at(table, at, 12),
+        vector_at(table, at, 15),
+        vector_at(table, at, 18),
     )
 
 
@@ -226,8 +234,8 @@ def fly_law(
 
 
 @kernel
-def control_tick(rows: CoreRows, law_rows: Any, at: int) -> None:
-    """Observer, law and mixer for the estimate of this tick; `at` is its row in the stretch's setpoints."""
+def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
+    """Observer, law and mixer for the estimate of this tick."""
     constants = unpack(CoreConstants, rows.constants, 0)
     pilot, seen = unpack(Pilot, rows.pilot, 0), unpack(Seen, rows.seen, 0)
     stretch, cable = unpack(Stretch, rows.stretch, 0), unpack(Winch, rows.winch, 0).cable
@@ -252,7 +260,7 @@ def control_tick(rows: CoreRows, law_rows: Any, at: int) -> None:
         observed = with_field(fresh, "load_ground", observed.load_ground)
     else:
         law = constants_of(law_rows)
-        jet = _jet(rows.references[at])
+        jet = _jet(rows.references, row_at(stretch, now_us))
         if stretch.mode == pilot.control_mode:
             memory = memory_of(law_rows)
         else:
@@ -276,6 +284,17 @@ def control_tick(rows: CoreRows, law_rows: Any, at: int) -> None:
 
 
 @kernel
+def _to_decide(rows: CoreRows, now_us: int) -> bool:
+    stretch, seen = unpack(Stretch, rows.stretch, 0), unpack(Seen, rows.seen, 0)
+    at = row_at(stretch, now_us)
+    target = ZERO
+    if stretch.mode != RESTING and 0 <= at < rows_in(rows.targets):
+        target = vector_at(rows.targets, at, 0)
+    known = seen.vehicle_complaint == 0 and (not stretch.carried or seen.load_complaint == 0)
+    return may_decide(stretch, now_us, seen.state, known, seen.taut, seen.tilt_rad, seen.pull_n, target)
+
+
+@kernel
 def fly_tick(
     rows: CoreRows, law_rows: Any, count: int, now_us: int, tick: int, dt: float, decided: bool
 ) -> int:
@@ -283,20 +302,12 @@ def fly_tick(
 
     `decided`: of a tick that was to be decided upon, what is left.
     """
-    if decided:
-        control_tick(rows, law_rows, 0)
-        return FLOWN
-    sense(rows, count, now_us, dt)
-    constants = unpack(CoreConstants, rows.constants, 0)
-    if tick % constants.control_every != 0:
-        return ESTIMATED
-    stretch, seen = unpack(Stretch, rows.stretch, 0), unpack(Seen, rows.seen, 0)
-    at = (now_us - stretch.first_us) // stretch.period_us
-    target = ZERO
-    if stretch.mode != RESTING and 0 <= at < rows.targets.shape[0]:
-        target = _vector(rows.targets[at], 0)
-    known = seen.vehicle_complaint == 0 and (not stretch.carried or seen.load_complaint == 0)
-    if may_decide(stretch, now_us, seen.state, known, seen.taut, seen.tilt_rad, seen.pull_n, target):
-        return TO_DECIDE
-    control_tick(rows, law_rows, 0 if stretch.mode == RESTING else at)
+    if not decided:
+        sense(rows, count, now_us, dt)
+        constants = unpack(CoreConstants, rows.constants, 0)
+        if tick % constants.control_every != 0:
+            return ESTIMATED
+        if _to_decide(rows, now_us):
+            return TO_DECIDE
+    control_tick(rows, law_rows, now_us)
     return FLOWN

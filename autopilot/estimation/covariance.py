@@ -33,7 +33,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, apply_transposed, cross, dot, scale
-from autopilot.geometry.wide import WIDTH, mirror_block, put_wide, transpose_blocks, wide_at
+from autopilot.geometry.wide import columns_at_once, mirror_block, put_wide, transpose_blocks, wide_at
 
 
 class Transit(NamedTuple):
@@ -83,16 +83,18 @@ def _cable_drive(to: Transit, dt: float, i: int) -> CableDrive:
 
 
 @kernel
-def _move_rows(P: Array, to: Transit, first: CableDrive, second: CableDrive, dt: float, n: int) -> None:
+def _move_rows(
+    P: Array, to: Transit, first: CableDrive, second: CableDrive, dt: float, n: int, cable_from: int
+) -> None:
     """P becomes Phi P, eight columns at a time: half a step of position and direction with their present
-    rates, then the rates and the attitude, then the other half."""
-    half = 0.5 * dt
+    rates, then the rates and the attitude, then the other half. The cable's rows only from a column on."""
+    half, step = 0.5 * dt, columns_at_once(P)
     f, R = scale(dt, to.force), to.R
-    for j in range(0, n, WIDTH):
+    for j in range(0, n, step):
         a0, a1, a2 = wide_at(P, ATTITUDE, j), wide_at(P, ATTITUDE + 1, j), wide_at(P, ATTITUDE + 2, j)
         b0, b1, b2 = wide_at(P, ACCEL_BIAS, j), wide_at(P, ACCEL_BIAS + 1, j), wide_at(P, ACCEL_BIAS + 2, j)
         g0, g1, g2 = wide_at(P, GYRO_BIAS, j), wide_at(P, GYRO_BIAS + 1, j), wide_at(P, GYRO_BIAS + 2, j)
-        if to.taut > 0.0:
+        if to.taut > 0.0 and j + step > cable_from:
             r0, r1, length = wide_at(P, RATE, j), wide_at(P, RATE + 1, j), wide_at(P, LENGTH, j)
             d0 = wide_at(P, DIRECTION, j) + half * r0
             d1 = wide_at(P, DIRECTION + 1, j) + half * r1
@@ -130,8 +132,9 @@ def _move_rows(P: Array, to: Transit, first: CableDrive, second: CableDrive, dt:
 @kernel
 def _forget_slow(P: Array, keep: float, n: int) -> None:
     """The rows of the receiver's slow error, of which a share is kept."""
+    step = columns_at_once(P)
     for i in range(GNSS, n):
-        for j in range(0, n, WIDTH):
+        for j in range(0, n, step):
             put_wide(P, i, j, keep * wide_at(P, i, j))
 
 
@@ -139,15 +142,17 @@ def _forget_slow(P: Array, keep: float, n: int) -> None:
 def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n: int) -> None:
     """The covariance dt seconds on, in place, with the noise of one sample."""
     P = history.covariance
+    step = columns_at_once(P)
     forget = dt / tuning.gnss_time
     keep = 1.0 - forget * to.reversion
     first, second = _cable_drive(to, dt, 0), _cable_drive(to, dt, 1)
-    _move_rows(P, to, first, second, dt, n)
+    _move_rows(P, to, first, second, dt, n, 0)
     _forget_slow(P, keep, n)
-    for i in range(0, n, WIDTH):
-        for j in range(i, n, WIDTH):
+    for i in range(0, n, step):
+        for j in range(i, n, step):
             transpose_blocks(P, i, j)
-    _move_rows(P, to, first, second, dt, n)
+    # what lies below the diagonal is written over in the end
+    _move_rows(P, to, first, second, dt, n, DIRECTION)
     _forget_slow(P, keep, n)
 
     accel = tuning.accel_std * tuning.accel_std * dt * dt
@@ -181,8 +186,9 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
 @kernel
 def symmetrise(P: Array, n: int) -> None:
     """Write what lies above the diagonal to below it."""
-    for i in range(0, n, WIDTH):
-        for j in range(i, n, WIDTH):
+    step = columns_at_once(P)
+    for i in range(0, n, step):
+        for j in range(i, n, step):
             mirror_block(P, i, j)
 
 
@@ -227,13 +233,16 @@ def enter(history: History, k: int, column: int, share: float) -> None:
 @kernel
 def gather(history: History, first: int, last: int, n: int) -> None:
     """The rows of H P of the scalars from `first` to before `last`."""
-    P, columns, shares = history.covariance, history.columns, history.shares
+    P, gain, columns, shares = history.covariance, history.gain, history.columns, history.shares
+    step = columns_at_once(P)
     for k in range(first, last):
-        for j in range(0, n, WIDTH):
-            total = shares[k, 1] * wide_at(P, columns[k, 1], j)
-            for entry in range(2, columns[k, 0] + 1):
-                total = total + shares[k, entry] * wide_at(P, columns[k, entry], j)
-            put_wide(history.gain, k, j, total)
+        share, row = shares[k, 1], columns[k, 1]
+        for j in range(0, n, step):
+            put_wide(gain, k, j, share * wide_at(P, row, j))
+        for entry in range(2, columns[k, 0] + 1):
+            share, row = shares[k, entry], columns[k, entry]
+            for j in range(0, n, step):
+                put_wide(gain, k, j, wide_at(gain, k, j) + share * wide_at(P, row, j))
 
 
 @kernel
@@ -263,6 +272,7 @@ def absorb(history: History, count: int, n: int) -> float:
     Returns the sum of their innovations squared over their variances, each given those before it.
     """
     gain, error, scalars = history.gain, history.error, history.scalars
+    step = columns_at_once(gain)
     nis = 0.0
     for k in range(count):
         # what is left of scalar k: its row and its innovation given the scalars before it
@@ -271,11 +281,11 @@ def absorb(history: History, count: int, n: int) -> float:
         for m in range(k + 1, count):
             share = shared(history, m, k) * s
             scalars[m, INNOVATION] -= share * off
-            for j in range(0, n, WIDTH):
+            for j in range(0, n, step):
                 put_wide(gain, m, j, wide_at(gain, m, j) - share * wide_at(gain, k, j))
         nis += off * off * s
         root, left = sqrt(s), off * s
-        for j in range(0, n, WIDTH):
+        for j in range(0, n, step):
             row = wide_at(gain, k, j)
             put_wide(error, 0, j, wide_at(error, 0, j) + left * row)
             put_wide(gain, k, j, root * row)
@@ -283,14 +293,16 @@ def absorb(history: History, count: int, n: int) -> float:
         for k in range(count, first + 3):
             _clear(gain, k)
         _narrow(history.covariance, gain, first, n)
+    symmetrise(history.covariance, n)
     return nis
 
 
 @kernel
 def _narrow(P: Array, gain: Array, first: int, n: int) -> None:
-    """P without the squares of three rows; symmetric to the bit, for a product has no order."""
+    """P without the squares of three rows, from the diagonal on: a product has no order."""
+    step = columns_at_once(P)
     for i in range(n):
-        a, b, c = float(gain[first, i]), float(gain[first + 1, i]), float(gain[first + 2, i])
-        for j in range(0, n, WIDTH):
+        a, b, c = gain[first, i], gain[first + 1, i], gain[first + 2, i]
+        for j in range(i - i % step, n, step):
             left = wide_at(P, i, j) - a * wide_at(gain, first, j) - b * wide_at(gain, first + 1, j)
             put_wide(P, i, j, left - c * wide_at(gain, first + 2, j))

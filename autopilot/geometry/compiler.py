@@ -63,6 +63,9 @@ class _OuterLibrary(JITCodeLibrary):  # type: ignore[misc]
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
                 # known to be called from here alone, it may vanish into its caller
                 function.linkage = llvm.Linkage.internal
+        for variable in self._final_module.global_variables:
+            if not variable.is_declaration and variable.linkage == llvm.Linkage.linkonce_odr:
+                variable.linkage = llvm.Linkage.internal
         options = llvm.create_pipeline_tuning_options(speed_level=3)
         builder = llvm.create_pass_builder(self._codegen._tm, options)
         builder.getModulePassManager().run(self._final_module, builder)

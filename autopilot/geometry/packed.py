@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numba import types
@@ -23,16 +23,18 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from autopilot.geometry.compiler import INLINED
+from autopilot.geometry.lanes import each
 
 Row = NDArray[np.float64]
 R = TypeVar("R")
-_NUMBERS: dict[Any, str] = {float: "{}", int: "int({})", bool: "{} != 0.0"}
+Each = Annotated[int, "each"]  # where flights are flown in lanes, each has its own
+_NUMBERS: dict[Any, str] = {float: "{}", int: "int({})", Each: "each({})", bool: "{} != 0.0"}
 
 
 @cache
 def _fields(record: Any) -> tuple[tuple[str, Any], ...]:
     """Names and types of a NamedTuple's fields."""
-    hints = get_type_hints(record)
+    hints = get_type_hints(record, include_extras=True)
     return tuple((name, hints[name]) for name in record._fields)
 
 
@@ -50,6 +52,13 @@ def width(kind: Any) -> int:
     if get_origin(kind) is tuple and Ellipsis not in get_args(kind):
         return sum(width(part) for part in get_args(kind))
     raise TypeError(f"{kind!r} has no fixed number of floats, ints or bools")
+
+
+def place_of(record: Any, name: str) -> int:
+    """Where the first number of a field lies in the row of a record."""
+    names = record._fields[: record._fields.index(name)]
+    kinds = dict(_fields(record))
+    return sum(width(kinds[before]) for before in names)
 
 
 def _taken(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
@@ -86,7 +95,7 @@ def _put(kind: Any, value: str, at: int) -> Iterator[tuple[int, str]]:
 
 @cache
 def _unpacker(kind: Any) -> Any:
-    known: dict[str, Any] = {}
+    known: dict[str, Any] = {"each": each}
     text, _ = _taken(kind, 0, known)
     exec(f"def take(kind: Any, row: Any, first: Any) -> Any:\n    return {text}\n", known)
     return known["take"]

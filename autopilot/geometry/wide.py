@@ -11,18 +11,17 @@ in kernels generally, nothing is checked.
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_model
+from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
 from autopilot.geometry.compiler import INLINED
+from autopilot.geometry.lane_numbers import VECTOR, WIDE
 
 WIDTH = 8
 Array = NDArray[np.float64]
@@ -56,6 +55,11 @@ def put_wide(array: Array, i: int, j: int, wide: Wide) -> None:
     array[i, j : j + WIDTH] = wide.numbers
 
 
+def columns_at_once(array: Array) -> int:
+    """How many columns `wide_at` takes: eight; of an array in lanes, one."""
+    return WIDTH
+
+
 def transpose_blocks(array: Array, i: int, j: int) -> None:
     """Exchange the blocks of 8 x 8 numbers that begin at [i, j] and [j, i], each transposed."""
     upper = array[i : i + WIDTH, j : j + WIDTH].T.copy()
@@ -73,28 +77,15 @@ def mirror_block(array: Array, i: int, j: int) -> None:
 # ---- for the compiler
 
 
-class _WideType(types.Type):  # type: ignore[misc]
-    def __init__(self) -> None:
-        super().__init__(name="Wide")
-
-
-_WIDE = _WideType()
-_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _LANE = ir.IntType(32)
 
 
-@register_model(_WideType)
-class _WideModel(models.PrimitiveModel):  # type: ignore[misc]
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
-
-
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) -> Any:
-    """Pointer to the eight numbers from array[i, j] on."""
+    """Pointer to the eight numbers from array[i, j] on; of an array in lanes, to the one of eight lanes."""
     held = context.make_array(kind)(context, builder, array)
     columns = cgutils.unpack_tuple(builder, held.shape)[1]
     place = builder.gep(held.data, [builder.add(builder.mul(i, columns), j)])
-    return builder.bitcast(place, _VECTOR.as_pointer())
+    return builder.bitcast(place, VECTOR.as_pointer())
 
 
 def _shuffled(builder: Any, a: Any, b: Any, lanes: list[int]) -> Any:
@@ -136,13 +127,27 @@ def _known(array: Any) -> bool:
     return isinstance(array, types.Array) and array.ndim == 2 and array.layout == "C"
 
 
+def _of_lanes(array: Any) -> bool:
+    return bool(array.dtype == WIDE)
+
+
+@overload(columns_at_once, jit_options=INLINED)
+def _columns_at_once(array: Any) -> Any:
+    count = 1 if _of_lanes(array) else WIDTH
+
+    def made(array: Any) -> Any:
+        return count
+
+    return made if _known(array) else None
+
+
 @intrinsic
 def _taken(_: Any, array: Any, i: Any, j: Any) -> Any:
     def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         place = _pointer(context, builder, signature.args[0], *given)
         return builder.load(place, align=8)
 
-    return _WIDE(array, types.intp, types.intp), made
+    return WIDE(array, types.intp, types.intp), made
 
 
 @intrinsic
@@ -152,7 +157,7 @@ def _given(_: Any, array: Any, i: Any, j: Any, wide: Any) -> Any:
         builder.store(given[3], place, align=8)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, types.intp, _WIDE), made
+    return types.void(array, types.intp, types.intp, WIDE), made
 
 
 @intrinsic
@@ -187,29 +192,6 @@ def _mirrored(_: Any, array: Any, i: Any, j: Any) -> Any:
     return types.void(array, types.intp, types.intp), made
 
 
-def _by_lane(name: str) -> Callable[..., Any]:
-    @intrinsic
-    def done(_: Any, a: Any, b: Any) -> Any:
-        def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            return getattr(builder, name)(*given)
-
-        return _WIDE(_WIDE, _WIDE), made
-
-    return done  # type: ignore[no-any-return]
-
-
-_added, _taken_off = _by_lane("fadd"), _by_lane("fsub")
-
-
-@intrinsic
-def _scaled(_: Any, factor: Any, wide: Any) -> Any:
-    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), given[0], ir.Constant(_LANE, 0))
-        return builder.fmul(_shuffled(builder, one, one, [0] * WIDTH), given[1])
-
-    return _WIDE(types.float64, _WIDE), made
-
-
 @overload(wide_at, jit_options=INLINED)
 def _wide_at(array: Any, i: Any, j: Any) -> Any:
     def made(array: Any, i: Any, j: Any) -> Any:
@@ -231,7 +213,14 @@ def _transpose_blocks(array: Any, i: Any, j: Any) -> Any:
     def made(array: Any, i: Any, j: Any) -> Any:
         return _exchanged(array, i, j)
 
-    return made if _known(array) else None
+    def of_lanes(array: Any, i: Any, j: Any) -> Any:
+        upper = wide_at(array, i, j)
+        put_wide(array, i, j, wide_at(array, j, i))
+        put_wide(array, j, i, upper)
+
+    if not _known(array):
+        return None
+    return of_lanes if _of_lanes(array) else made
 
 
 @overload(mirror_block, jit_options=INLINED)
@@ -239,28 +228,9 @@ def _mirror_block(array: Any, i: Any, j: Any) -> Any:
     def made(array: Any, i: Any, j: Any) -> Any:
         return _mirrored(array, i, j)
 
-    return made if _known(array) else None
+    def of_lanes(array: Any, i: Any, j: Any) -> Any:
+        _given(array, j, i, _taken(array, i, j))
 
-
-@overload(operator.add, jit_options=INLINED)
-def _add(a: Any, b: Any) -> Any:
-    def made(a: Any, b: Any) -> Any:
-        return _added(a, b)
-
-    return made if a == b == _WIDE else None
-
-
-@overload(operator.sub, jit_options=INLINED)
-def _sub(a: Any, b: Any) -> Any:
-    def made(a: Any, b: Any) -> Any:
-        return _taken_off(a, b)
-
-    return made if a == b == _WIDE else None
-
-
-@overload(operator.mul, jit_options=INLINED)
-def _mul(a: Any, b: Any) -> Any:
-    def made(a: Any, b: Any) -> Any:
-        return _scaled(a, b)
-
-    return made if a == types.float64 and b == _WIDE else None
+    if not _known(array):
+        return None
+    return of_lanes if _of_lanes(array) else made

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from autopilot.control.records import State
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, norm, sub
+from autopilot.geometry.packed import Each
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Calm, Catch, Creep, Leg, Swing, top_of
 from autopilot.guidance.setpoint_follower import Posture
 from autopilot.supervisor.motion import position_mode
@@ -39,8 +40,8 @@ class Stretch(NamedTuple):
 
     mode: int  # RESTING or a control mode
     idle: bool  # the rotors idle, while none is controlled
-    first_us: int
-    stop_us: int  # at the latest
+    first_us: Each
+    stop_us: Each  # at the latest
     period_us: int  # of the ticks for which the setpoints are laid out
     watch: int
     level: float  # m: of the watch

@@ -20,21 +20,21 @@ F = TypeVar("F")
 R = TypeVar("R")
 
 Clock = Callable[[], float]  # seconds
-FlyOne = Callable[[F, Clock], R]  # must be picklable
+FlyMany = Callable[[tuple[F, ...], Clock], list[R]]  # must be picklable
 
 _AHEAD = 2  # groups waiting for each worker
 _POLL_S = 0.2
 
 
-def fly_group(fly: FlyOne[F, R], group: tuple[F, ...]) -> list[R]:
-    """Fly some flights, one after the other; what a worker runs."""
-    return [fly(flight, time.monotonic) for flight in group]
+def fly_group(fly: FlyMany[F, R], group: tuple[F, ...]) -> list[R]:
+    """Fly some flights; what a worker runs."""
+    return fly(group, time.monotonic)
 
 
 class PoolCrew(Generic[F, R]):
-    """A crew of the `workers` of an executor, each of which calls `fly` for its flights."""
+    """A crew of the `workers` of an executor, each of which calls `fly` with its flights."""
 
-    def __init__(self, executor: Executor, workers: int, fly: FlyOne[F, R]) -> None:
+    def __init__(self, executor: Executor, workers: int, fly: FlyMany[F, R]) -> None:
         self._executor, self._workers, self._fly = executor, workers, fly
         self._futures: set[Future[list[R]]] = set()
 

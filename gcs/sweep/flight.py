@@ -7,52 +7,44 @@ station's part is known beforehand: the two instants at which it arms and starts
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
 from math import nan, sqrt
 
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, commanded_rate
-from autopilot.core.scheduler import divider
 from autopilot.estimation.inbox import new_inbox
-from autopilot.geometry.packed import packed, unpack
+from autopilot.geometry.entry import entry_of
+from autopilot.geometry.packed import packed, place_of, unpack
 from autopilot.guidance.layout import COLUMNS, jets
 from autopilot.guidance.legs import LOAD_POSITION
-from autopilot.onboard.onboard import Onboard, build_setup, plan_of
-from autopilot.services.mission_store import StoredMission
+from autopilot.onboard.onboard import Onboard
 from autopilot.services.requests import Arm, StartMission
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.quiescence import Stretch
 from autopilot.supervisor.requests.arming import arming_complaints
-from autopilot.supervisor.state import IN_AIR, MissionPlan, Phase
-from autopilot.trajectory.prepare import Limits
-from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
-from autopilot.wire.convert import Home
+from autopilot.supervisor.state import IN_AIR, Phase
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, encode_mission
-from gcs.clients.flight import READY_LIMIT_US, TIME_FACTOR, TIME_MARGIN_S
+from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
+from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.kernel import NO_FIGURES, Figures, fly_stretch
-from gcs.sweep.plan import simulated
-from gcs.sweep.wire import most_readings, wire_of, wire_rate
+from gcs.sweep.wire import most_readings, wire_rate
 from missions.model import Mission
 from sitl.hil import HilSimulator
-from sitl.sensors.files import load_profile
-from sitl.sensors.profile import Profile
-from sitl.settings import settings_of
-from sitl.vehicles.sim_parameters import apply as apply_parameters
-from sitl.vehicles.sim_parameters import sim_parameters
-from sitl.vehicles.truth import load_truth
+from sitl.plant.records import PlantState
 from sitl.world import Floats, World, new_world
 
 GROUND_WINDOW_US = 20_000  # between two turns of the ground station
-LAID_OUT = 1000  # setpoints laid out at once
+LAID_OUT = 4000  # setpoints laid out at once
 TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
+_NEVER = 2**62
+_TICK, _NOW = place_of(World, "tick"), place_of(World, "now_us")
+_SLACK_EVENTS = place_of(World, "plant") + place_of(PlantState, "slack_events")
+_ENTRIES: dict[type, Callable[..., bool]] = {}  # machine code of `fly_stretch`, by the type of the law's rows
 _LOAD_CARRIED = (Phase.HOLD, Phase.MISSION, Phase.RETURN)
 
 
@@ -109,82 +101,64 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
     return Boarding(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
 
 
-@lru_cache(maxsize=8)
-def _profile(name: str) -> Profile:
-    return load_profile(name)
-
-
-@lru_cache(maxsize=64)
-def _plan(items: tuple[WireItem, ...], limits: Limits) -> MissionPlan:
-    """Shaping paths takes seconds; it depends on nothing else."""
-    return plan_of(StoredMission(items), Home(), limits)
-
-
-class _Flight:
+class Flight:
     """A flight on its way."""
 
-    def __init__(
-        self, mission: Mission, conditions: Conditions, boarding: Boarding, trace: Floats | None
-    ) -> None:
-        home = Home()
-        table = autopilot_parameters(load_vehicle(conditions.vehicle))
-        apply_settings(table, conditions.settings.items())
-        truth = load_truth(conditions.vehicle)
-        sim_table = sim_parameters(truth)
-        for name, value in simulated(conditions.settings).items():
-            sim_table.set(name, value)
-        settings = settings_of(sim_table)
-        profile = _profile(conditions.sensors)
-        self.tick_us = settings.tick_us
-        every = divider(1e6 / self.tick_us, table["CTL_RATE_HZ"], "CTL_RATE_HZ")
-        self.core = FlightCore(build_setup(table, every), LAID_OUT)
-        items = tuple(encode_mission(mission, home))
-        self.items = len(items)
+    def __init__(self, cell: Cell, seed: int, boarding: Boarding, trace: Floats | None = None) -> None:
+        self.cell = cell
+        self.tick_us = cell.settings.tick_us
+        self.core = FlightCore(cell.setup, LAID_OUT)
         self.item = 0  # of the mission, last flown
-        plan = _plan(items, self.core.setup.settings.limits)
-        self.core.change(with_plan(self.core.flight, plan))
-        self.world = new_world(apply_parameters(truth, sim_table), profile, settings, conditions.seed)
+        self.core.change(with_plan(self.core.flight, cell.plan))
+        self.world = new_world(cell.truth, cell.profile, cell.settings, seed)
         self.core.take_inbox(new_inbox(most_readings(self.world)))
-        self.wire = packed(wire_of(profile, settings.noise_scale, home))
         self.figures = packed(NO_FIGURES)
         self.asked: Floats = _NO_ROWS
         self.trace = np.zeros((0, TRACE_COLUMNS)) if trace is None else trace
         self.arm_us, self.start_us = boarding.arm_us, boarding.start_us
-        self.limit_us = round(1e6 * (expected_duration_s(mission) * TIME_FACTOR + TIME_MARGIN_S))
         self.flown = Flown()
         self.airborne_us = -1
         self.mission_us = 0
-        self.slack_events = 0  # of the plant, so far
+        self.begun = False  # the first tick is over
 
     # ---- the loop
 
     def run(self) -> Flown:
         """Fly to the end."""
-        begun = False
         while not self.flown.outcome:
-            phase = self.core.flight.phase
-            before = self._now()
-            self.core.move_cable(before.now_us + (self.tick_us if begun else 0))
-            flight = self.core.flight
-            reel_rate = wire_rate(commanded_rate(flight, before.now_us, self.tick_us * 1e-6))
-            undecided = self._fly(begun, False, flight.cable.released, reel_rate, self._stop_tick())
-            begun = True
-            now = self._now()
-            self._note(phase, before, now)
-            if undecided:
-                self._decide(now.now_us)
-                self._fly(True, True, False, 0.0, now.tick)
-            self._ground_turn(now.now_us)
-            self._judge(now.now_us)
-        self._conclude()
-        return self.flown
+            self.turn(_NEVER)
+        return self.conclude()
+
+    def turn(self, last_tick: int) -> None:
+        """Fly until something is decided, or this tick is over."""
+        before_us, slack_before = self.now_us, self.slack_events
+        self.core.move_cable(before_us + (self.tick_us if self.begun else 0))
+        flight = self.core.flight
+        reel_rate = wire_rate(commanded_rate(flight, before_us, self.tick_us * 1e-6))
+        stop_tick = min(self.stop_tick(before_us), last_tick)
+        undecided = self._fly(self.begun, False, flight.cable.released, reel_rate, stop_tick)
+        self.begun = True
+        now_us = self.now_us
+        self._note(flight.phase, now_us - before_us, self.slack_events - slack_before)
+        if undecided:
+            self._decide(now_us)
+            self._fly(True, True, False, 0.0, self.tick)
+        self._ground_turn(now_us)
+        self._judge(now_us)
+
+    def flown_in_lanes(self, ticks: int, slack_before: int) -> None:
+        """What follows from so many ticks that were flown together with others."""
+        self._note(self.core.flight.phase, ticks * self.tick_us, self.slack_events - slack_before)
+        self._ground_turn(self.now_us)
+        self._judge(self.now_us)
 
     def _fly(self, begun: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int) -> bool:
-        return fly_stretch(
+        law = type(self.core.law_rows)
+        arguments = (
             self.world,
             self.core.rows,
             self.core.law_rows,
-            self.wire,
+            self.cell.wire,
             self.figures,
             self.asked,
             self.trace,
@@ -194,24 +168,38 @@ class _Flight:
             reel_rate,
             stop_tick,
         )
+        if law not in _ENTRIES:
+            _ENTRIES[law] = entry_of(fly_stretch, *arguments)
+        return _ENTRIES[law](*arguments)
 
-    def _now(self) -> World:
-        return unpack(World, self.world.world, 0)
+    @property
+    def tick(self) -> int:
+        """The present tick."""
+        return int(self.world.world[_TICK])
 
-    def _stop_tick(self) -> int:
+    @property
+    def now_us(self) -> int:
+        """The time of the present tick."""
+        return int(self.world.world[_NOW])
+
+    @property
+    def slack_events(self) -> int:
+        """How often the cable went slack so far."""
+        return int(self.world.world[_SLACK_EVENTS])
+
+    def stop_tick(self, now_us: int) -> int:
         """The tick after which the ground station has something to do, or the time is over."""
-        now_us = self._now().now_us
         due = [time for time in (self.arm_us, self.start_us) if time > now_us]
         if self.airborne_us >= 0:
-            due.append(self.airborne_us + self.limit_us + self.tick_us)
-        return -(-min(due, default=now_us + self.limit_us) // self.tick_us)
+            due.append(self.airborne_us + self.cell.limit_us + self.tick_us)
+        return -(-min(due, default=now_us + self.cell.limit_us) // self.tick_us)
 
-    def _note(self, phase: Phase, before: World, now: World) -> None:
+    def _note(self, phase: Phase, passed_us: int, slack_events: int) -> None:
         """What passed in a stretch that was flown in this phase."""
         if phase in _LOAD_CARRIED:
-            self.flown.slack_events += int(now.plant.slack_events - before.plant.slack_events)
+            self.flown.slack_events += slack_events
         if phase == Phase.MISSION:
-            self.mission_us += now.now_us - before.now_us
+            self.mission_us += passed_us
             mission = self.core.flight.mission
             self.item = mission.plan.sequence[mission.step]
 
@@ -266,24 +254,27 @@ class _Flight:
             return
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
             self._landed()
-        elif self.airborne_us >= 0 and now_us - self.airborne_us > self.limit_us:
+        elif self.airborne_us >= 0 and now_us - self.airborne_us > self.cell.limit_us:
             where: str = flight.phase.name.lower()
             flown.outcome, flown.lost_phase = "timeout", where
-            flown.reason = f"not landed after {self.limit_us * 1e-6:.0f} s of flight: still in phase {where}"
+            flown.reason = (
+                f"not landed after {self.cell.limit_us * 1e-6:.0f} s of flight: still in phase {where}"
+            )
 
     def _landed(self) -> None:
         """The vehicle is disarmed; said as `gcs fly` says it."""
         if self.core.flight.mission.done:
             self.flown.outcome = "completed"
             return
-        where = f"item {self.item} of {self.items}"
+        where = f"item {self.item} of {self.cell.items}"
         self.flown.outcome = "interrupted"
         self.flown.reason = f"the vehicle was disarmed before the end of the mission, at {where}"
 
-    def _conclude(self) -> None:
+    def conclude(self) -> Flown:
+        """What became of the flight."""
         flown, f = self.flown, unpack(Figures, self.figures, 0)
         if self.airborne_us >= 0:
-            flown.flight_s = (self._now().now_us - self.airborne_us) * 1e-6
+            flown.flight_s = (self.now_us - self.airborne_us) * 1e-6
         flown.mission_s = self.mission_us * 1e-6
         if f.samples > 0.0:
             flown.load_error_max_m = f.error_max
@@ -294,6 +285,7 @@ class _Flight:
             flown.psi_R_max, flown.psi_q_max = f.psi_R_max, f.psi_q_max
             flown.tension_min_n, flown.tension_max_n = f.tension_min, f.tension_max
             flown.rotor_force_min_n, flown.rotor_force_max_n = f.rotor_min, f.rotor_max
+        return flown
 
 
 def fly(mission: Mission, conditions: Conditions, boarding: Boarding, trace: Floats | None = None) -> Flown:
@@ -302,4 +294,4 @@ def fly(mission: Mission, conditions: Conditions, boarding: Boarding, trace: Flo
     `trace` (ticks, TRACE_COLUMNS) receives the true state at each tick, for tests: x_load, x_quad, quat_wxyz,
     rotor_force.
     """
-    return _Flight(mission, conditions, boarding, trace).run()
+    return Flight(cell_of(mission, conditions), conditions.seed, boarding, trace).run()

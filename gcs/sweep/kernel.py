@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, fly_tick
+from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, fly_tick, row_at, vector_at
 from autopilot.estimation.records import EstimatorState
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, sub
@@ -82,11 +82,6 @@ def _trace(trace: Floats, world: World) -> None:
 
 
 @kernel
-def _vector(row: Row) -> Vec3:
-    return (row[0], row[1], row[2])
-
-
-@kernel
 def fly_stretch(
     world: WorldRows,
     core: CoreRows,
@@ -124,8 +119,7 @@ def fly_stretch(
         if came == TO_DECIDE:
             return True
         if came == FLOWN and asked.shape[0] > 0:
-            stretch = unpack(Stretch, core.stretch, 0)
-            at = (now.now_us - stretch.first_us) // stretch.period_us
-            count(figures, world, core, _vector(core.targets[at]), _vector(asked[at]))
+            at = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
+            count(figures, world, core, vector_at(core.targets, at, 0), vector_at(asked, at, 0))
         if now.tick >= stop_tick:
             return False

@@ -12,11 +12,12 @@ from pathlib import Path
 from gcs.batch.pool import PoolCrew
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running, fly_all
+from gcs.shell.display import say
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import PLAN_FILE, store_plan, sweep_origin
 from gcs.sweep.results import COMPLETED
 from gcs.sweep.store import Row, Store
-from gcs.sweep.work import batches, fly_case, prepare
+from gcs.sweep.work import batches, fly_cases, prepare
 
 BATCH = 16  # flights handed over at a time: about two seconds
 _KEEP_S = 5.0  # a flight is on disk so long after its end, at the latest
@@ -57,13 +58,13 @@ def sweep(
     missing = [case for case in plan.cases() if case.index not in stored]
     whole, flown, wall_s = True, 0, 0.0
     if missing:
-        work = prepare(plan)
+        work = prepare(plan, (lambda _: None) if quiet else say)
         with workers as (executor, count), BatchDisplay(len(stored), plan.flights, quiet) as display:
 
             def told(rows: Sequence[Row], running: Running) -> None:
                 display.add(len(rows), sum(row["outcome"] == COMPLETED for row in rows), running)
 
-            crew = PoolCrew(executor, count, partial(fly_case, work))
+            crew = PoolCrew(executor, count, partial(fly_cases, work))
             whole = fly_all(batches(missing, BATCH), crew, store.add, told, stopped, _KEEP_S)
             flown, wall_s = display.flown, display.elapsed_s
     table = store.merge()

@@ -15,6 +15,7 @@ from autopilot.estimation import inbox as box
 from autopilot.estimation.records import Array, DirectionReading, GnssReading, LoadReading, PoseReading
 from autopilot.geometry.frames import quat_enu_flu_from_ned_frd, quat_ned_frd_from_enu_flu
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import single
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack
 from autopilot.wire.convert import Home
@@ -42,12 +43,6 @@ class Wire(NamedTuple):
     metres_per_degree: float
     east_metres_per_degree: float
     cosine: float  # of the latitude
-
-
-@kernel
-def single(value: float) -> float:
-    """`value` as a single-precision field of a message keeps it."""
-    return np.float64(np.float32(value))
 
 
 @kernel

@@ -1,17 +1,27 @@
-"""A sweep as work for a crew: what every worker must know, and the function that flies one flight of it."""
+"""A sweep as work for a crew: what every worker must know, and the function that flies some flights of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
 
-from gcs.sweep.flight import Boarding, Flown, boarding, fly
+from autopilot.geometry.lane_numbers import LANES
+from autopilot.geometry.machine_code import is_ready, mark_ready
+from gcs.sweep import lane_kernel
+from gcs.sweep.cell import cell_of
+from gcs.sweep.flight import Boarding, Flight, Flown, boarding, fly
+from gcs.sweep.group import FEWEST, Group, suits
 from gcs.sweep.plan import Case, PlanError, SweepPlan
 from gcs.sweep.store import Row, row_of
 from missions.fileformat import load_mission
 from missions.model import Mission
 
 Clock = Callable[[], float]  # seconds
+LANES_PAY = 1000  # flights with a law, for which its lanes are compiled
+
+_NOT_FLOWN = (ValueError, ArithmeticError)
 
 
 @dataclass(frozen=True)
@@ -21,34 +31,89 @@ class Work:
     plan: SweepPlan
     mission: Mission
     boardings: dict[str, Boarding]  # by law
+    in_lanes: frozenset[str] = frozenset()  # laws of which eight flights are flown at once
 
 
-def prepare(plan: SweepPlan) -> Work:
+def prepare(plan: SweepPlan, tell: Callable[[str], None]) -> Work:
     """The work of a plan; flies the beginning of one flight for each law, which also compiles its kernels.
 
     The instants of arming and starting are those of the settings that all flights share. A vehicle that is
-    not ready at them, under what is varied, is asked again.
+    not ready at them, under what is varied, is asked again. `tell` is told what takes long.
     """
     mission = load_mission(plan.mission)
     cases = {law: Case(0, law, plan.seeds[0], ()) for law in plan.laws}
     bare = SweepPlan(plan.mission, plan.vehicle, plan.sensors, plan.laws, plan.seeds, (), plan.settings)
-    boardings = {}
+    boardings, in_lanes = {}, set()
     for law, case in cases.items():
+        conditions = bare.conditions(case)
         try:
-            boardings[law] = boarding(mission, bare.conditions(case))
+            boardings[law] = boarding(mission, conditions)
         except ValueError as error:
             raise PlanError(f"law {law}: {error}") from None
-    return Work(plan, mission, boardings)
+        if _lanes_pay(plan, law):
+            flights = [Flight(cell_of(mission, conditions), seed, boardings[law]) for seed in range(FEWEST)]
+            if suits(flights[0]):
+                if not _lanes_ready(law):
+                    tell(f"compiling eight flights at once for the law {law}, once; it takes a minute or two")
+                Group(flights).compile()
+                mark_ready(_LANES, (law,))
+                in_lanes.add(law)
+    return Work(plan, mission, boardings, frozenset(in_lanes))
 
 
-def fly_case(work: Work, case: Case, clock: Clock) -> Row:
+_LANES = Path(lane_kernel.__file__)
+
+
+def _lanes_ready(law: str) -> bool:
+    return is_ready(_LANES, (law,))
+
+
+def _lanes_pay(plan: SweepPlan, law: str) -> bool:
+    """Whether there are flights that differ by their seeds alone, and enough of them to compile for, if that
+    is not done yet."""
+    compiled = hasattr(lane_kernel.fly_lanes, "overloads")
+    enough = plan.points * len(plan.seeds) >= LANES_PAY
+    return compiled and len(plan.seeds) >= FEWEST and (enough or _lanes_ready(law))
+
+
+def fly_cases(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row]:
+    """Fly some of the flights, up to eight of a cell at once where that is prepared."""
+    rows: list[Row] = []
+    for (law, _), cell in groupby(cases, key=lambda case: (case.law, case.varied)):
+        members = list(cell)
+        for first in range(0, len(members), LANES):
+            some = members[first : first + LANES]
+            at_once = law in work.in_lanes and len(some) >= FEWEST
+            found = _fly_at_once(work, some, clock) if at_once else None
+            rows += [_fly_one(work, case, clock) for case in some] if found is None else found
+    return rows
+
+
+def _fly_one(work: Work, case: Case, clock: Clock) -> Row:
     """Fly one of the flights. One that cannot be flown at all has the outcome `refused`."""
     began_s = clock()
     try:
         flown = fly(work.mission, work.plan.conditions(case), work.boardings[case.law])
-    except (ValueError, ArithmeticError) as error:
+    except _NOT_FLOWN as error:
         flown = Flown(outcome="refused", reason=str(error))
     return row_of(work.plan, case, flown, clock() - began_s)
+
+
+def _fly_at_once(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row] | None:
+    """Fly flights of one cell in lanes; None: they must be flown one by one."""
+    began_s = clock()
+    try:
+        cell = cell_of(work.mission, work.plan.conditions(cases[0]))
+        flights = [Flight(cell, case.seed, work.boardings[case.law]) for case in cases]
+        if not suits(flights[0]):
+            return None
+        Group(flights).run()
+    except _NOT_FLOWN:
+        return None
+    each_s = (clock() - began_s) / len(cases)
+    return [
+        row_of(work.plan, case, flight.flown, each_s) for case, flight in zip(cases, flights, strict=True)
+    ]
 
 
 def batches(cases: Sequence[Case], size: int) -> list[tuple[Case, ...]]:

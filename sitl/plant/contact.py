@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import sqrt
 
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, apply, apply_transposed, cross
 from sitl.plant.records import Truth
 
@@ -32,7 +33,7 @@ def point_force(height: float, v: Vec3, mass: float, truth: Truth) -> Vec3:
     omega = truth.contact_frequency
     depth = -height
     deflection = truth.gravity / (omega * omega)
-    fade = depth / deflection if depth < deflection else 1.0
+    fade = if_above(deflection, depth, depth / deflection, 1.0)
     normal = mass * omega * (omega * depth - 2.0 * truth.contact_damping * fade * v[2])
     if normal <= 0.0:
         return ZERO

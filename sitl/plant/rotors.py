@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import Vec3
 from sitl.plant.records import Rotors, Truth
 
 
 @kernel
 def _clamp(force: float, low: float, high: float) -> float:
-    # not (a > b), because a comparison with nan is false: a command that is no number gives the lower limit
-    if not force > low:
-        return low
-    return force if force < high else high
+    # a comparison with nan is false: a command that is no number gives the lower limit
+    return if_above(force, low, if_above(high, force, force, high), low)
 
 
 @kernel

@@ -12,6 +12,7 @@ from __future__ import annotations
 from math import ceil
 
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import ZERO, Vec3, axpy, dot, norm, scale, sub
 from autopilot.geometry.s2 import tangent
 from autopilot.geometry.so3 import IDENTITY_QUAT
@@ -119,7 +120,7 @@ def _at_rest(speed: float) -> float:
     On the ground speeds decay without end, and sums of numbers below 1e-308 cost a processor a hundred times
     those of others.
     """
-    return speed if abs(speed) > _LEAST_SPEED else 0.0
+    return if_above(abs(speed), _LEAST_SPEED, speed, 0.0)
 
 
 @kernel

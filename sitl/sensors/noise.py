@@ -7,11 +7,12 @@ reading keeps its noise whatever other sensors are fitted, lost or late.
 
 from __future__ import annotations
 
-from math import cos, isnan, log, pi, sin, sqrt
+from math import isnan, sqrt
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, scale
+from sitl.sensors.elementary import cosine_sine, logarithm
 
 _MASK = 0xFFFFFFFF
 _MULTIPLIER_0 = 0xD2511F53
@@ -68,11 +69,11 @@ def uniform(noise: Noise, block: int) -> tuple[float, float]:
 def gaussian(noise: Noise, block: int) -> Vec3:
     """Three independent normal numbers of deviation `noise.scale`, by Box and Muller; |x| < 6.7 scale."""
     w = words(noise, block)
-    r0 = noise.scale * sqrt(-2.0 * log((w[0] + 1.0) * _UNIT))
-    r1 = noise.scale * sqrt(-2.0 * log((w[2] + 1.0) * _UNIT))
-    angle_0 = 2.0 * pi * _UNIT * w[1]
-    angle_1 = 2.0 * pi * _UNIT * w[3]
-    return (r0 * cos(angle_0), r0 * sin(angle_0), r1 * cos(angle_1))
+    r0 = noise.scale * sqrt(-2.0 * logarithm((w[0] + 1.0) * _UNIT))
+    r1 = noise.scale * sqrt(-2.0 * logarithm((w[2] + 1.0) * _UNIT))
+    cosine_0, sine_0 = cosine_sine(w[1])
+    cosine_1, _ = cosine_sine(w[3])
+    return (r0 * cosine_0, r0 * sine_0, r1 * cosine_1)
 
 
 @kernel

@@ -1,0 +1,87 @@
+"""What the flights of a cell of a sweep share: those of one law under the same settings, of any seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from autopilot.core.flight_core import Setup
+from autopilot.core.scheduler import divider
+from autopilot.geometry.packed import Row, packed
+from autopilot.onboard.onboard import build_setup, plan_of
+from autopilot.services.mission_store import StoredMission
+from autopilot.supervisor.state import MissionPlan
+from autopilot.trajectory.prepare import Limits
+from autopilot.trajectory.timeline import expected_duration_s
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
+from autopilot.wire.convert import Home
+from autopilot.wire.items import WireItem, encode_mission
+from gcs.clients.flight import TIME_FACTOR, TIME_MARGIN_S
+from gcs.closed_loop import Conditions
+from gcs.sweep.plan import simulated
+from gcs.sweep.wire import wire_of
+from missions.model import Mission
+from sitl.plant.records import Truth
+from sitl.sensors.files import load_profile
+from sitl.sensors.profile import Profile
+from sitl.settings import Settings, settings_of
+from sitl.vehicles.sim_parameters import apply as apply_parameters
+from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
+
+
+@dataclass(frozen=True)
+class Cell:
+    """All of a flight but its seed."""
+
+    setup: Setup
+    plan: MissionPlan
+    items: int  # of the mission
+    limit_us: int  # that the flight may last
+    truth: Truth
+    profile: Profile
+    settings: Settings
+    wire: Row
+
+
+def cell_of(mission: Mission, conditions: Conditions) -> Cell:
+    """The cell to which a flight under these conditions belongs. ValueError where it cannot be flown."""
+    return _cell(mission, conditions.vehicle, conditions.sensors, tuple(conditions.settings.items()))
+
+
+@lru_cache(maxsize=8)
+def _cell(mission: Mission, vehicle: str, sensors: str, set_values: tuple[tuple[str, float], ...]) -> Cell:
+    home = Home()
+    table = autopilot_parameters(load_vehicle(vehicle))
+    apply_settings(table, set_values)
+    truth = load_truth(vehicle)
+    sim_table = sim_parameters(truth)
+    for name, value in simulated(dict(set_values)).items():
+        sim_table.set(name, value)
+    settings = settings_of(sim_table)
+    profile = _profile(sensors)
+    every = divider(1e6 / settings.tick_us, table["CTL_RATE_HZ"], "CTL_RATE_HZ")
+    setup = build_setup(table, every)
+    items = tuple(encode_mission(mission, home))
+    return Cell(
+        setup=setup,
+        plan=_plan(items, setup.settings.limits),
+        items=len(items),
+        limit_us=round(1e6 * (expected_duration_s(mission) * TIME_FACTOR + TIME_MARGIN_S)),
+        truth=apply_parameters(truth, sim_table),
+        profile=profile,
+        settings=settings,
+        wire=packed(wire_of(profile, settings.noise_scale, home)),
+    )
+
+
+@lru_cache(maxsize=8)
+def _profile(name: str) -> Profile:
+    return load_profile(name)
+
+
+@lru_cache(maxsize=64)
+def _plan(items: tuple[WireItem, ...], limits: Limits) -> MissionPlan:
+    """Shaping paths takes seconds; it depends on nothing else."""
+    return plan_of(StoredMission(items), Home(), limits)

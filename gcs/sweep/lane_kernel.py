@@ -1,0 +1,100 @@
+"""Ticks of eight flights at once in one call of machine code: the ticks of `gcs.sweep.kernel`, in lanes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, fly_tick, row_at, vector_at
+from autopilot.estimation.records import History
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lane_numbers import LANES
+from autopilot.geometry.lanes import in_lanes, parted
+from autopilot.geometry.packed import Row, unpack, with_field
+from autopilot.supervisor.quiescence import Stretch
+from gcs.sweep.kernel import count
+from gcs.sweep.wire import Wire, deliver, wire_forces
+from sitl.world import World, WorldModel, WorldRows, world_tick
+
+
+@kernel
+def world_in_lanes(rows: WorldRows) -> WorldRows:
+    """The world's rows, of which each flight has its own where they have an axis of lanes."""
+    return WorldRows(
+        in_lanes(rows.world),
+        rows.model,
+        in_lanes(rows.seed),
+        rows.clock,
+        rows.fate,
+        in_lanes(rows.errors),
+        in_lanes(rows.queue),
+        in_lanes(rows.commands),
+        rows.command_ring,
+    )
+
+
+@kernel
+def core_in_lanes(rows: CoreRows) -> CoreRows:
+    """The same of the autopilot's."""
+    h = rows.history
+    history = History(
+        in_lanes(h.ring),
+        in_lanes(h.covariance),
+        in_lanes(h.error),
+        h.columns,
+        in_lanes(h.shares),
+        in_lanes(h.gain),
+        in_lanes(h.scalars),
+        in_lanes(h.consistency),
+    )
+    return CoreRows(
+        in_lanes(rows.estimator),
+        in_lanes(rows.pilot),
+        in_lanes(rows.seen),
+        in_lanes(rows.commands),
+        history,
+        in_lanes(rows.inbox),
+        rows.constants,
+        rows.winch,
+        in_lanes(rows.stretch),
+        rows.targets,
+        rows.references,
+    )
+
+
+@kernel
+def fly_lanes(
+    world_rows: WorldRows,
+    core_rows: CoreRows,
+    own_law_rows: Any,
+    wire: Row,
+    figure_rows: Row,
+    asked: Any,
+    ticks: int,
+) -> tuple[int, int]:
+    """Fly so many ticks: how many of them all lanes flew alike, and which did not fly the one after like
+    lane 0, a bit each.
+
+    The memory of these is not valid then, that of the others is of that tick. Where lane 0 is to be decided
+    upon that is all of them.
+    """
+    world, core = world_in_lanes(world_rows), core_in_lanes(core_rows)
+    law_rows = with_field(own_law_rows, "memory", in_lanes(own_law_rows.memory))
+    figures = in_lanes(figure_rows)
+    link = unpack(Wire, wire, 0)
+    tick_us = unpack(WorldModel, world.model, 0).tick_us
+    parted()
+    for done in range(ticks):
+        forces = unpack(Pilot, core.pilot, 0).mixed.forces
+        world_tick(world, wire_forces(forces), False, 0.0)
+        now = unpack(World, world.world, 0)
+        readings = deliver(world, now.now_us, link, core.inbox)
+        came = fly_tick(core, law_rows, readings, now.now_us, now.tick, tick_us * 1e-6, False)
+        if came == FLOWN and asked[0].shape[0] > 0:
+            at = row_at(unpack(Stretch, core.stretch, 0), now.now_us)
+            count(figures, world, core, vector_at(core.targets, at, 0), vector_at(asked, at, 0))
+        gone = parted()
+        if came == TO_DECIDE:
+            return done, (1 << LANES) - 1
+        if gone != 0:
+            return done, gone
+    return ticks, 0

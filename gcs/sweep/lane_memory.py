@@ -1,0 +1,180 @@
+"""The memory of eight flights: of each its own, and once more with the flights side by side, in lanes.
+
+What a flight carries from tick to tick is moved into one block of numbers for each flight, of which its rows
+are views, so that a copy into lanes or back is the transpose of a matrix. Of the ring of past states, which
+is longer than all the rest, only what is recent enough to be asked for is copied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.core.tick import CoreRows, Pilot
+from autopilot.estimation.inbox import COLUMNS as READING_COLUMNS
+from autopilot.estimation.records import RING_LENGTH, EstimatorState
+from autopilot.geometry.lane_numbers import LANES
+from autopilot.geometry.packed import place_of
+from autopilot.supervisor.quiescence import Stretch
+from gcs.sweep.flight import Flight
+from sitl.world import Floats, WorldRows
+
+# of each flight; `inbox` last, of which only the first row is told on
+_WORLD = ("world", "seed", "errors", "queue", "commands")
+_CORE = ("estimator", "pilot", "seen", "commands", "stretch")
+_HISTORY = ("covariance", "consistency")
+_SCRATCH = ("error", "shares", "gain", "scalars")
+_SHARED = ("clock", "command_ring")  # of the world: whole numbers, the same for all
+_SPARE_ROWS = 3  # of the ring, beyond the age of the oldest reading
+_ALIGNED = 64  # bytes
+_MEMORY, _HEAD, _RESETS = (place_of(EstimatorState, name) for name in ("memory_s", "head", "resets"))
+_STOP_US, _MODE = place_of(Stretch, "stop_us"), place_of(Stretch, "mode")
+_CONTROL_MODE = place_of(Pilot, "control_mode")
+
+
+def _aligned(rows: int) -> Floats:
+    """(rows, LANES) zeros that begin at a whole cache line."""
+    block = np.zeros(rows * LANES + _ALIGNED // 8)
+    first = -block.ctypes.data // 8 % (_ALIGNED // 8)
+    return block[first : first + rows * LANES].reshape(rows, LANES)
+
+
+def _rows_of(flight: Flight) -> dict[str, NDArray[Any]]:
+    """All arrays of a flight, in the order in which they lie in its block."""
+    core, world = flight.core.rows, flight.world
+    found = {f"world.{name}": getattr(world, name) for name in _WORLD}
+    found |= {f"core.{name}": getattr(core, name) for name in _CORE}
+    found |= {f"history.{name}": getattr(core.history, name) for name in _HISTORY}
+    found |= {"law": flight.core.law_rows.memory, "figures": flight.figures, "core.inbox": core.inbox}
+    found |= {f"shared.{name}": getattr(world, name) for name in _SHARED}
+    return found | {"history.ring": core.history.ring}
+
+
+def _named(prefix: str, arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+
+
+class LaneMemory:
+    """The memory of up to eight flights of one cell of a sweep; their rows are views of it from now on.
+
+    `world`, `core`, `law_rows`, `figures` and `asked` are what `fly_lanes` takes, once flights were taken.
+    """
+
+    def __init__(self, flights: Sequence[Flight]) -> None:
+        self.flights = flights
+        first = flights[0]
+        arrays = _rows_of(first)
+        places, end = {}, 0
+        for name, array in arrays.items():
+            places[name] = slice(end, end + array.size)
+            end += array.size
+        own = self._own = np.zeros((len(flights), end))
+        for block, flight in zip(own, flights, strict=True):
+            _move(flight, {name: _view(block[place], arrays[name]) for name, place in places.items()})
+        inbox, shared = places["core.inbox"], places["shared.clock"]
+        self._copied = slice(0, inbox.start + READING_COLUMNS)
+        self._shared = slice(shared.start, places["shared.command_ring"].stop)
+        lanes = self._lanes = _aligned(shared.start)
+        ring = _aligned(arrays["history.ring"].size)
+        common = self._common = np.zeros(self._shared.stop - self._shared.start)
+
+        def in_lanes(name: str, array: NDArray[Any]) -> NDArray[Any]:
+            place = places[name]
+            if name.startswith("shared."):
+                return _view(common[place.start - shared.start : place.stop - shared.start], array)
+            block = ring if name == "history.ring" else lanes[place]
+            return block.view(array.dtype).reshape(*array.shape, LANES)
+
+        self._estimator = lanes[places["core.estimator"]]
+        self._own_estimator = own[:, places["core.estimator"]]
+        self._own_stretch, self._own_pilot = own[:, places["core.stretch"]], own[:, places["core.pilot"]]
+        self._lane_ring = ring.reshape(*arrays["history.ring"].shape, LANES)
+        self._own_ring = own[:, places["history.ring"]].reshape(len(flights), *arrays["history.ring"].shape)
+        made = {name: in_lanes(name, array) for name, array in arrays.items()}
+        history = first.core.rows.history
+        scratch = {
+            name: _aligned(getattr(history, name).size).reshape(*getattr(history, name).shape, LANES)
+            for name in _SCRATCH
+        }
+        history = history._replace(
+            columns=np.zeros_like(history.columns), **_named("history.", made), **scratch
+        )
+        self.core: CoreRows = first.core.rows._replace(history=history, **_named("core.", made))
+        self.world: WorldRows = first.world._replace(**_named("world.", made), **_named("shared.", made))
+        self.law_rows = first.core.law_rows._replace(memory=made["law"])
+        self.figures = made["figures"]
+        self.asked: tuple[Floats, ...] = ()
+        self.lanes: NDArray[np.intp] = np.zeros(LANES, np.intp)  # which flight lies in each
+
+    def take(self, members: Sequence[int]) -> None:
+        """Copy these flights into lanes; where they are fewer than eight the last one lies there again."""
+        self.lanes[:] = [*members, *[members[-1]] * (LANES - len(members))]
+        self._lanes[self._copied] = self._own[self.lanes, self._copied].T
+        self._common[:] = self._own[members[0], self._shared]
+        rows = self._recent()
+        self._lane_ring[rows] = np.moveaxis(self._own_ring[self.lanes[:, None], rows], 0, -1)
+        flights = [self.flights[member] for member in self.lanes.tolist()]
+        theirs: dict[str, Any] = {
+            name: tuple(getattr(flight.core.rows, name) for flight in flights)
+            for name in ("targets", "references")
+        }
+        theirs["winch"] = flights[0].core.rows.winch
+        self.core = self.core._replace(**theirs)
+        self.asked = tuple(flight.asked for flight in flights)
+
+    def give(self, members: Sequence[int], ticks: int) -> None:
+        """Copy some of those that were taken back after so many ticks."""
+        lanes = [self.lanes.tolist().index(member) for member in members]
+        rows = self._recent(ticks)
+        self._own[members, self._copied] = self._lanes[self._copied][:, lanes].T
+        self._own[members, self._shared] = self._common
+        self._own_ring[np.asarray(members)[:, None], rows] = np.moveaxis(
+            self._lane_ring[rows][..., lanes], -1, 0
+        )
+
+    def remembers(self) -> bool:
+        """Whether the ring goes back as far as when the flights were taken, and nobody began anew."""
+        before, now = self._own_estimator[self.lanes[0]], self._estimator[:, 0]
+        return bool(before[_MEMORY] == now[_MEMORY] and before[_RESETS] == now[_RESETS])
+
+    def course(self, member: int) -> tuple[Any, ...]:
+        """What must be the same for flights that are flown together."""
+        flight = self.flights[member]
+        return (
+            self._own_stretch[member, _MODE],
+            self._own_pilot[member, _CONTROL_MODE],
+            len(flight.asked) > 0,
+            self._own[member, self._shared].tobytes(),
+            flight.core.rows.winch.tobytes(),
+        )
+
+    def stop_us(self, member: int) -> int:
+        """When a flight is to be decided upon, at the latest."""
+        return int(self._own_stretch[member, _STOP_US])
+
+    def _recent(self, ticks: int = 0) -> NDArray[np.intp]:
+        """Rows of the ring that may be asked for, and those of the last ticks."""
+        memory_s, head = self._estimator[_MEMORY, 0], int(self._estimator[_HEAD, 0])
+        back = ceil(memory_s / (self.flights[0].tick_us * 1e-6)) + _SPARE_ROWS + ticks
+        return np.arange(head - min(back, RING_LENGTH - 1), head + 1) % RING_LENGTH
+
+
+def _view(block: Floats, array: NDArray[Any]) -> NDArray[Any]:
+    return block.view(array.dtype).reshape(array.shape)
+
+
+def _move(flight: Flight, moved: dict[str, NDArray[Any]]) -> None:
+    """Let the flight's rows be these, with the numbers that they held."""
+    for name, array in _rows_of(flight).items():
+        moved[name][...] = array
+    core = flight.core
+    history = core.rows.history._replace(**_named("history.", moved))
+    core.rows = core.rows._replace(history=history, **_named("core.", moved))
+    core.law_rows = core.law_rows._replace(memory=moved["law"])
+    core.locate_forces()
+    flight.world = flight.world._replace(**_named("world.", moved), **_named("shared.", moved))
+    flight.figures = moved["figures"]

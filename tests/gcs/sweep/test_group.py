@@ -1,0 +1,127 @@
+"""Flights in lanes are the flights of one, figure by figure and bit by bit, whatever becomes of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import count
+
+import pytest
+from numba.core import config
+
+from gcs.closed_loop import Conditions
+from gcs.sweep import work
+from gcs.sweep.cell import cell_of
+from gcs.sweep.flight import Flight, Flown, boarding, fly
+from gcs.sweep.group import Group, suits
+from gcs.sweep.plan import SweepPlan, Varied
+from gcs.sweep.work import Work, fly_cases
+from missions.fileformat import load_mission
+
+pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="lanes are machine code")
+
+PLUMBLINE = 2.0  # the two other laws are flown in lanes by benchmarks/yardstick.py
+EIGHT = range(1, 9)
+
+
+def both_ways(
+    name: str, settings: Mapping[str, float], seeds: Sequence[int], sensors: str = "lab"
+) -> tuple[list[Flown], float]:
+    """Fly the seeds alone and together; what the flights found, and the share of ticks flown in lanes."""
+    mission = load_mission(name)
+    conditions = Conditions(sensors=sensors, settings=settings)
+    start = boarding(mission, conditions)
+    alone = [fly(mission, replace(conditions, seed=seed), start) for seed in seeds]
+    flights = [Flight(cell_of(mission, conditions), seed, start) for seed in seeds]
+    group = Group(flights)
+    group.run()
+    # repr: NaN is not equal to itself
+    assert [repr(flight.flown) for flight in flights] == [repr(flown) for flown in alone]
+    return alone, group.in_lanes / sum(flight.tick for flight in flights)
+
+
+def test_same_bits_with_eight(short: str) -> None:
+    flown, share = both_ways(short, {"CTL_LAW": PLUMBLINE}, EIGHT)
+    assert {one.outcome for one in flown} == {"completed"}
+    assert share > 0.5
+
+
+def test_same_bits_with_fewer_than_eight(short: str) -> None:
+    _, share = both_ways(short, {"CTL_LAW": PLUMBLINE}, range(1, 6), "ideal")
+    assert share > 0.5
+
+
+def test_same_bits_where_flights_are_lost_one_by_one(short: str) -> None:
+    flown, share = both_ways(short, {"CTL_LAW": PLUMBLINE, "SIM_NOISE_SCALE": 20.0}, EIGHT)
+    assert {one.outcome for one in flown} == {"diverged"}
+    assert len({one.flight_s for one in flown}) > 4
+    assert share > 0.05
+
+
+def test_same_bits_where_courses_part_all_the_time(short: str) -> None:
+    flown, share = both_ways(short, {"CTL_LAW": PLUMBLINE, "SIM_NOISE_SCALE": 6.0}, EIGHT)
+    assert len({one.load_error_max_m for one in flown}) == 8
+    assert 0.0 < share < 1.0
+
+
+def test_same_bits_in_gusts(short: str) -> None:
+    gusts = {"SIM_GUST_STD": 0.5, "SIM_WIND_E": 1.0, "SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 9.0}
+    both_ways(short, {"CTL_LAW": PLUMBLINE, **gusts, "SIM_GUST_FOR_S": 1.0}, EIGHT)
+
+
+def test_same_bits_with_receiver_and_camera(short: str) -> None:
+    both_ways(short, {"CTL_LAW": PLUMBLINE}, EIGHT, "rtk")
+
+
+def test_a_load_that_is_released_is_flown_alone(delivery: str) -> None:
+    flown, share = both_ways(delivery, {"CTL_LAW": PLUMBLINE}, range(1, 4))
+    assert {one.outcome for one in flown} == {"completed"}
+    assert 0.0 < share < 0.9
+
+
+def test_while_the_winch_works_each_flies_alone(winched: str) -> None:
+    flown, share = both_ways(winched, {"CTL_LAW": PLUMBLINE}, range(1, 4))
+    assert {one.outcome for one in flown} == {"completed"}
+    assert 0.0 < share < 0.9
+
+
+def test_readings_that_get_lost_do_not_suit(short: str) -> None:
+    mission = load_mission(short)
+    lossy = Conditions(settings={"CTL_LAW": PLUMBLINE, "SIM_DROP_PCT": 5.0})
+    start = boarding(mission, Conditions(settings={"CTL_LAW": PLUMBLINE}))
+    assert suits(Flight(cell_of(mission, Conditions()), 1, start))
+    assert not suits(Flight(cell_of(mission, lossy), 1, start))
+
+
+def test_a_sweep_finds_the_same_with_lanes_and_without(short: str) -> None:
+    """Five seeds of two settings, of which one loses readings."""
+    lost = Varied("SIM_DROP_PCT", (0.0, 5.0), False)
+    plan = SweepPlan(short, "bebop", "lab", ("plumbline",), (1, 2, 3, 4, 5), (lost,), ())
+    said: list[str] = []
+    prepared = work.prepare(plan, said.append)
+    cases, clock = list(plan.cases()), partial(next, count(1.0))
+    without = fly_cases(replace(prepared, in_lanes=frozenset()), cases, clock)
+    lanes: Work = replace(prepared, in_lanes=frozenset({"plumbline"}))
+    found = fly_cases(lanes, cases, clock)
+    assert [{**row, "wall_s": 0.0} for row in found] == [{**row, "wall_s": 0.0} for row in without]
+    assert all(row["wall_s"] > 0.0 for row in found)
+
+
+def test_lanes_are_compiled_where_many_flights_differ_by_their_seeds(
+    short: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = SweepPlan(short, "bebop", "lab", ("plumbline",), tuple(range(1, 21)), (), ())
+    marks: set[str] = set()
+    monkeypatch.setattr(work, "is_ready", lambda _, parts: set(parts) <= marks)
+    monkeypatch.setattr(work, "mark_ready", lambda _, parts: marks.update(parts))
+    said: list[str] = []
+    assert work.prepare(plan, said.append).in_lanes == frozenset() and not said
+    monkeypatch.setattr(work, "LANES_PAY", 20)
+    assert work.prepare(plan, said.append).in_lanes == {"plumbline"}
+    assert len(said) == 1 and "plumbline" in said[0]
+    # from then on fewer flights suffice, of which there are seeds enough
+    monkeypatch.setattr(work, "LANES_PAY", 1000)
+    assert work.prepare(plan, said.append).in_lanes == {"plumbline"}
+    assert work.prepare(replace(plan, seeds=(1, 2)), said.append).in_lanes == frozenset()
+    assert len(said) == 1
