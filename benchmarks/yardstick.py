@@ -28,7 +28,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.cell import cell_of
-from gcs.sweep.flight import TRACE_COLUMNS, Flight, boarding, fly
+from gcs.sweep.flight import TRACE_COLUMNS, SweptFlight, boarding, fly
 from gcs.sweep.group import FEWEST, Group, suits
 from missions.fileformat import load_mission
 
@@ -114,7 +114,7 @@ def lanes_measured(name: str) -> dict[str, str]:
     except ValueError as error:
         return {"outcome": str(error)}
     seeds = range(conditions.seed, conditions.seed + FEWEST)
-    flights = [Flight(cell_of(mission, conditions), seed, start) for seed in seeds]
+    flights = [SweptFlight(cell_of(mission, conditions), seed, start) for seed in seeds]
     if not suits(flights[0]):
         return {"outcome": "alone"}
     group = Group(flights)

@@ -243,6 +243,7 @@ def _to_int(context: Any, builder: Any, sig: Any, given: Any) -> Any:
 
 
 _define(int, _to_int, signature(types.int64, WIDE), signature(types.int64, WHOLE))
+_define(float, lambda context, builder, sig, given: given[0], signature(WIDE, WIDE))
 
 
 def _to_ceil(context: Any, builder: Any, sig: Any, given: Any) -> Any:

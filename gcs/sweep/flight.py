@@ -101,7 +101,7 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
     return Boarding(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
 
 
-class Flight:
+class SweptFlight:
     """A flight on its way."""
 
     def __init__(self, cell: Cell, seed: int, boarding: Boarding, trace: Floats | None = None) -> None:
@@ -294,4 +294,4 @@ def fly(mission: Mission, conditions: Conditions, boarding: Boarding, trace: Flo
     `trace` (ticks, TRACE_COLUMNS) receives the true state at each tick, for tests: x_load, x_quad, quat_wxyz,
     rotor_force.
     """
-    return Flight(cell_of(mission, conditions), conditions.seed, boarding, trace).run()
+    return SweptFlight(cell_of(mission, conditions), conditions.seed, boarding, trace).run()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from autopilot.core.tick import Winch
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.packed import unpack
-from gcs.sweep.flight import Flight
+from gcs.sweep.flight import SweptFlight
 from gcs.sweep.lane_kernel import fly_lanes
 from gcs.sweep.lane_memory import LaneMemory
 from sitl.world import LOSS, OUTAGE_CHANCE
@@ -26,7 +26,7 @@ _ALONE, _MOST_ALONE = 4, 128  # ticks that are flown alone after courses have pa
 _ENTRIES: dict[type, Callable[..., tuple[int, int]]] = {}  # machine code, by the type of the law's rows
 
 
-def suits(flight: Flight) -> bool:
+def suits(flight: SweptFlight) -> bool:
     """Whether a flight can be flown in lanes: nothing gets lost by chance."""
     fate = flight.world.fate
     return bool((fate[:, LOSS] == 0.0).all() and (fate[:, OUTAGE_CHANCE] == 0.0).all())
@@ -35,7 +35,7 @@ def suits(flight: Flight) -> bool:
 class Group:
     """Flights of one cell on their way."""
 
-    def __init__(self, flights: Sequence[Flight]) -> None:
+    def __init__(self, flights: Sequence[SweptFlight]) -> None:
         self._flights = flights
         self._memory = LaneMemory(flights)
         self._block = _SHORTEST

@@ -20,7 +20,7 @@ from autopilot.estimation.records import RING_LENGTH, EstimatorState
 from autopilot.geometry.lane_numbers import LANES
 from autopilot.geometry.packed import place_of
 from autopilot.supervisor.quiescence import Stretch
-from gcs.sweep.flight import Flight
+from gcs.sweep.flight import SweptFlight
 from sitl.world import Floats, WorldRows
 
 # of each flight; `inbox` last, of which only the first row is told on
@@ -43,7 +43,7 @@ def _aligned(rows: int) -> Floats:
     return block[first : first + rows * LANES].reshape(rows, LANES)
 
 
-def _rows_of(flight: Flight) -> dict[str, NDArray[Any]]:
+def _rows_of(flight: SweptFlight) -> dict[str, NDArray[Any]]:
     """All arrays of a flight, in the order in which they lie in its block."""
     core, world = flight.core.rows, flight.world
     found = {f"world.{name}": getattr(world, name) for name in _WORLD}
@@ -64,7 +64,7 @@ class LaneMemory:
     `world`, `core`, `law_rows`, `figures` and `asked` are what `fly_lanes` takes, once flights were taken.
     """
 
-    def __init__(self, flights: Sequence[Flight]) -> None:
+    def __init__(self, flights: Sequence[SweptFlight]) -> None:
         self.flights = flights
         first = flights[0]
         arrays = _rows_of(first)
@@ -167,7 +167,7 @@ def _view(block: Floats, array: NDArray[Any]) -> NDArray[Any]:
     return block.view(array.dtype).reshape(array.shape)
 
 
-def _move(flight: Flight, moved: dict[str, NDArray[Any]]) -> None:
+def _move(flight: SweptFlight, moved: dict[str, NDArray[Any]]) -> None:
     """Let the flight's rows be these, with the numbers that they held."""
     for name, array in _rows_of(flight).items():
         moved[name][...] = array

@@ -11,7 +11,7 @@ from autopilot.geometry.lane_numbers import LANES
 from autopilot.geometry.machine_code import is_ready, mark_ready
 from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
-from gcs.sweep.flight import Boarding, Flight, Flown, boarding, fly
+from gcs.sweep.flight import Boarding, Flown, SweptFlight, boarding, fly
 from gcs.sweep.group import FEWEST, Group, suits
 from gcs.sweep.plan import Case, PlanError, SweepPlan
 from gcs.sweep.store import Row, row_of
@@ -51,7 +51,9 @@ def prepare(plan: SweepPlan, tell: Callable[[str], None]) -> Work:
         except ValueError as error:
             raise PlanError(f"law {law}: {error}") from None
         if _lanes_pay(plan, law):
-            flights = [Flight(cell_of(mission, conditions), seed, boardings[law]) for seed in range(FEWEST)]
+            flights = [
+                SweptFlight(cell_of(mission, conditions), seed, boardings[law]) for seed in range(FEWEST)
+            ]
             if suits(flights[0]):
                 if not _lanes_ready(law):
                     tell(f"compiling eight flights at once for the law {law}, once; it takes a minute or two")
@@ -104,7 +106,7 @@ def _fly_at_once(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row] |
     began_s = clock()
     try:
         cell = cell_of(work.mission, work.plan.conditions(cases[0]))
-        flights = [Flight(cell, case.seed, work.boardings[case.law]) for case in cases]
+        flights = [SweptFlight(cell, case.seed, work.boardings[case.law]) for case in cases]
         if not suits(flights[0]):
             return None
         Group(flights).run()

@@ -12,7 +12,7 @@ from gcs.closed_loop import Conditions, fly
 from missions.model import Land, Mission, Takeoff
 from sitl.vehicles.truth import load_truth
 
-SIMULATOR = 26  # component of its truth telemetry
+SIMULATOR = 27  # component of its truth telemetry, as far as it is in our dialect
 RESTING = 2e-3  # m, by which the ground may give way under the load, and an exchange of telemetry
 
 

@@ -95,7 +95,8 @@ def steady(thrust: float, rows: int = ROWS) -> Actuation:
 @kernel
 def lagged(thrust: float, moment: Vec3, queue: Queue, row: int, kept: float) -> tuple[float, Vec3]:
     """Thrust and moment of the rotors when `kept` of their way to command `row` is left."""
-    f, x, y, z = queue[row, 0], queue[row, 1], queue[row, 2], queue[row, 3]
+    f, x = float(queue[row, 0]), float(queue[row, 1])
+    y, z = float(queue[row, 2]), float(queue[row, 3])
     return f + kept * (thrust - f), (
         x + kept * (moment[0] - x),
         y + kept * (moment[1] - y),

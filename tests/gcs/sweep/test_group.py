@@ -13,7 +13,7 @@ from numba.core import config
 from gcs.closed_loop import Conditions
 from gcs.sweep import work
 from gcs.sweep.cell import cell_of
-from gcs.sweep.flight import Flight, Flown, boarding, fly
+from gcs.sweep.flight import Flown, SweptFlight, boarding, fly
 from gcs.sweep.group import Group, suits
 from gcs.sweep.plan import SweepPlan, Varied
 from gcs.sweep.work import Work, fly_cases
@@ -33,7 +33,7 @@ def both_ways(
     conditions = Conditions(sensors=sensors, settings=settings)
     start = boarding(mission, conditions)
     alone = [fly(mission, replace(conditions, seed=seed), start) for seed in seeds]
-    flights = [Flight(cell_of(mission, conditions), seed, start) for seed in seeds]
+    flights = [SweptFlight(cell_of(mission, conditions), seed, start) for seed in seeds]
     group = Group(flights)
     group.run()
     # repr: NaN is not equal to itself
@@ -90,8 +90,8 @@ def test_readings_that_get_lost_do_not_suit(short: str) -> None:
     mission = load_mission(short)
     lossy = Conditions(settings={"CTL_LAW": PLUMBLINE, "SIM_DROP_PCT": 5.0})
     start = boarding(mission, Conditions(settings={"CTL_LAW": PLUMBLINE}))
-    assert suits(Flight(cell_of(mission, Conditions()), 1, start))
-    assert not suits(Flight(cell_of(mission, lossy), 1, start))
+    assert suits(SweptFlight(cell_of(mission, Conditions()), 1, start))
+    assert not suits(SweptFlight(cell_of(mission, lossy), 1, start))
 
 
 def test_a_sweep_finds_the_same_with_lanes_and_without(short: str) -> None:
