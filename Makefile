@@ -54,7 +54,7 @@ bench: $(STAMP) ## measure this machine
 	$(BIN)/python benchmarks/plant_convergence.py
 	$(BIN)/python benchmarks/cascade_margin.py
 	$(BIN)/python benchmarks/thesis_assumptions.py
-	$(BIN)/python benchmarks/performance.py --flights 200 --real-time 20 --linear --docs docs/performance.md
+	$(BIN)/python benchmarks/performance.py --flights 1000 --real-time 60 --linear --docs docs/performance.md
 
 clean: ## remove what was made here
 	rm -rf $(VENV) *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -139,6 +139,7 @@ def real_time(seconds: float, folder: Path) -> str:
             sys.executable,
             "-m",
             "sitl",
+            "--real-time",
             "--listen",
             port,
             "--truth",

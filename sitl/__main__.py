@@ -31,6 +31,7 @@ from autopilot.shell.options import (
 )
 from autopilot.vehicle.file import VEHICLES
 from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing
 from sitl.sensors.shipped import PROFILES
@@ -225,7 +226,7 @@ class _Clock:
             self._told_ns = now
             text = f"Machine busy: clock at {share:.2f} of {pacing.speed:g} x"
             self._say(text.lower())
-            self._simulator.parameters.say(text)
+            self._simulator.parameters.say(text, mavlink.MAV_SEVERITY_NOTICE)
 
 
 def _insist(link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool) -> None:

@@ -43,10 +43,10 @@ class ParameterServer:
         self.table.set(name, value)
         self._waiting.append(self._value(name))
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, severity: int = mavlink.MAV_SEVERITY_WARNING) -> None:
         """A text for whoever flies the vehicle."""
         line = text.encode("ascii", errors="replace")[:STATUSTEXT_BYTES]
-        self._waiting.append(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_WARNING, line))
+        self._waiting.append(mavlink.MAVLink_statustext_message(severity, line))
 
     def _set(self, name: str, value: float) -> bool:
         before = self.table[name]
