@@ -104,7 +104,9 @@ def test_mavsdk_flies(mavsdk_and_two_ground_stations: Callable[[], Watched]) -> 
     assert told["version"] == [1, 15]
     assert told["parameters"] == {"real": True, "whole": True}
     assert told["progress"] == [0, 1, 2, 3]
-    assert told["texts"] == [*FLOWN, "Load released", "Load taken"]
+    # how busy this machine is, is no matter of the client's
+    texts = [text for text in told["texts"] if not text.startswith("Machine busy")]
+    assert texts == [*FLOWN, "Load released", "Load taken"]
     assert "again" not in told
     result, size, path, name = told["log"]
     assert (result, size) == ("SUCCESS", len(flight.log))
