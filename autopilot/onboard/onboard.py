@@ -33,7 +33,7 @@ from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, Loss
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
-from autopilot.onboard.snapshot import Moment, Moments, Options
+from autopilot.onboard.snapshot import UNARMED, Moment, Moments, Options
 from autopilot.onboard.tick_answer import answer_tick
 from autopilot.onboard.warmup import rehearse_answer, rehearse_telemetry
 from autopilot.services.endpoint import VehicleEndpoint
@@ -71,7 +71,6 @@ _TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
 _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
-_UNARMED = (Phase.DISARMED, Phase.FAILSAFE)
 MOST_NAMED = 8  # items in one text
 LEAP_US = 5_000_000  # larger jumps are rejected
 
@@ -210,7 +209,7 @@ class Onboard:
         arguments = (
             *(self._health, self._sensors.imu, core.force_row, self._battery_row),
             *(tick.fields_updated, tick.fixed, now_us, dt, self._frame, self._payload),
-            *(writer.sequence, writer.system, writer.component, flight.phase not in _UNARMED),
+            *(writer.sequence, writer.system, writer.component, flight.phase not in UNARMED),
             *(self._options.lockstep, flight.cable.released),
             commanded_rate(flight, now_us, self._shortest_us * 1e-6) if core.reels else 0.0,
         )
@@ -228,7 +227,7 @@ class Onboard:
     @property
     def armed(self) -> bool:
         """Whether rotors may turn."""
-        return self.core.flight.phase not in _UNARMED
+        return self.core.flight.phase not in UNARMED
 
     def _run(self, tick: Tick) -> bytes:
         """One tick of the flight software; the answer to it."""

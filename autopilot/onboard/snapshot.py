@@ -41,6 +41,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
 
 FRESH_S = 0.5  # a tracker is healthy while its last reading is no older
+UNARMED = (Phase.DISARMED, Phase.FAILSAFE)  # the rotors stand
 _NO_COUNT = 255  # satellites of a fix that no receiver gave
 
 _PHASE_MODES = {
@@ -191,7 +192,7 @@ def told(flight: Flight, items: int) -> Told:
         area.breach,
         area.breaches,
         area.breach_us,
-        flight.phase not in (Phase.DISARMED, Phase.FAILSAFE),
+        flight.phase not in UNARMED,
         int(flight.phase),
         *mode_of(flight),
         _LANDED_STATES.get(flight.phase, mavlink.MAV_LANDED_STATE_IN_AIR),
@@ -346,7 +347,7 @@ class Moment(Snapshot):
     @cached_property
     def ready(self) -> bool:
         """Whether the vehicle may be armed, or is: in flight it does not count what keeps one from that."""
-        if self.flight.phase not in (Phase.DISARMED, Phase.FAILSAFE):
+        if self.flight.phase not in UNARMED:
             return True
         return not arming_complaints(self.flight, self.view, self.core.settings)
 

@@ -111,17 +111,26 @@ def parts_of(keys: tuple[int, ...]) -> tuple[Part, ...]:
 
 
 @kernel
+def _put(
+    kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin
+) -> tuple[int, Origin]:
+    """Write a frame; where the next one begins, and its origin."""
+    end = put_frame(kind, values, payload, buffer, at, origin)
+    return end, Origin(origin.sequence + 1, origin.system, origin.component)
+
+
+@kernel
 def _put_vector(
     now_us: int, vector: Vec3, name: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin
-) -> int:
-    return put_frame(DEBUG_VECT, (now_us, *vector, *name), payload, buffer, at, origin)
+) -> tuple[int, Origin]:
+    return _put(DEBUG_VECT, (now_us, *vector, *name), payload, buffer, at, origin)
 
 
 @kernel
 def _put_value(
     now_us: int, value: float, name: Any, payload: Bytes, buffer: Bytes, at: int, origin: Origin
-) -> int:
-    return put_frame(NAMED_VALUE_FLOAT, (boot_ms(now_us), value, *name), payload, buffer, at, origin)
+) -> tuple[int, Origin]:
+    return _put(NAMED_VALUE_FLOAT, (boot_ms(now_us), value, *name), payload, buffer, at, origin)
 
 
 @kernel
@@ -146,76 +155,49 @@ def put_streams(
     at = 0
     origin = Origin(sequence, system, component)
     if streams & 1:
-        at = put_frame(ATTITUDE, attitude_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(ATTITUDE, attitude_of(s), payload, buffer, at, origin)
     if streams & 2:
-        at = put_frame(ATTITUDE_QUATERNION, attitude_quaternion_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(ATTITUDE_QUATERNION, attitude_quaternion_of(s), payload, buffer, at, origin)
     if streams & 4:
-        at = put_frame(LOCAL_POSITION_NED, local_position_ned_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(LOCAL_POSITION_NED, local_position_ned_of(s), payload, buffer, at, origin)
     if streams & 8:
-        at = put_frame(GLOBAL_POSITION_INT, global_position_int_of(s, place), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(GLOBAL_POSITION_INT, global_position_int_of(s, place), payload, buffer, at, origin)
     if streams & 16:
-        at = put_frame(ALTITUDE, altitude_of(s, place), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(ALTITUDE, altitude_of(s, place), payload, buffer, at, origin)
     if streams & 32:
-        at = put_frame(VFR_HUD, vfr_hud_of(s, place), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(VFR_HUD, vfr_hud_of(s, place), payload, buffer, at, origin)
     if streams & 64 and not isnan(s.x_quad_d[0]):
-        at = put_frame(
+        at, origin = _put(
             POSITION_TARGET_LOCAL_NED, position_target_local_ned_of(s), payload, buffer, at, origin
         )
-        origin = _next(origin)
     if streams & 128:
-        at = put_frame(ATTITUDE_TARGET, attitude_target_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(ATTITUDE_TARGET, attitude_target_of(s), payload, buffer, at, origin)
     if streams & 256:
-        at = put_frame(SERVO_OUTPUT_RAW, servo_output_raw_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(SERVO_OUTPUT_RAW, servo_output_raw_of(s), payload, buffer, at, origin)
     if streams & 512:
         position, velocity, cable, error = debug_vectors_of(s)
-        at = _put_vector(s.now_us, position, _POSITION, payload, buffer, at, origin)
-        origin = _next(origin)
-        at = _put_vector(s.now_us, velocity, _VELOCITY, payload, buffer, at, origin)
-        origin = _next(origin)
-        at = _put_vector(s.now_us, cable, _CABLE, payload, buffer, at, origin)
-        origin = _next(origin)
-        at = _put_vector(s.now_us, error, _ERROR, payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put_vector(s.now_us, position, _POSITION, payload, buffer, at, origin)
+        at, origin = _put_vector(s.now_us, velocity, _VELOCITY, payload, buffer, at, origin)
+        at, origin = _put_vector(s.now_us, cable, _CABLE, payload, buffer, at, origin)
+        at, origin = _put_vector(s.now_us, error, _ERROR, payload, buffer, at, origin)
     if streams & 1024:
         tension, swing, distance, psi_r, psi_q = named_values_of(s)
-        at = _put_value(s.now_us, tension, _TENSION, payload, buffer, at, origin)
-        origin = _next(origin)
-        at = _put_value(s.now_us, swing, _SWING, payload, buffer, at, origin)
-        origin = _next(origin)
-        at = _put_value(s.now_us, distance, _DISTANCE, payload, buffer, at, origin)
-        origin = _next(origin)
-        at = _put_value(s.now_us, psi_r, _PSI_R, payload, buffer, at, origin)
-        origin = _next(origin)
-        at = _put_value(s.now_us, psi_q, _PSI_Q, payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put_value(s.now_us, tension, _TENSION, payload, buffer, at, origin)
+        at, origin = _put_value(s.now_us, swing, _SWING, payload, buffer, at, origin)
+        at, origin = _put_value(s.now_us, distance, _DISTANCE, payload, buffer, at, origin)
+        at, origin = _put_value(s.now_us, psi_r, _PSI_R, payload, buffer, at, origin)
+        at, origin = _put_value(s.now_us, psi_q, _PSI_Q, payload, buffer, at, origin)
     own_sequence = origin.sequence
     origin = Origin(dialect_sequence, system, dialect_component)
     if streams & 2048:
-        at = put_frame(LOAD_STATE, load_state_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(LOAD_STATE, load_state_of(s), payload, buffer, at, origin)
     if streams & 4096:
-        at = put_frame(LOAD_SETPOINT, load_setpoint_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(LOAD_SETPOINT, load_setpoint_of(s), payload, buffer, at, origin)
     if streams & 8192:
-        at = put_frame(CASCADE_ERRORS, cascade_errors_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(CASCADE_ERRORS, cascade_errors_of(s), payload, buffer, at, origin)
     if streams & 16384:
-        at = put_frame(ROTOR_STATE, rotor_state_of(s), payload, buffer, at, origin)
-        origin = _next(origin)
+        at, origin = _put(ROTOR_STATE, rotor_state_of(s), payload, buffer, at, origin)
     return at, own_sequence & 0xFF, origin.sequence & 0xFF
-
-
-@kernel
-def _next(origin: Origin) -> Origin:
-    return Origin(origin.sequence + 1, origin.system, origin.component)
 
 
 class StreamFrames:

@@ -286,7 +286,6 @@ class Program:
             system_status=mavlink.MAV_STATE_BOOT,
             mavlink_version=3,
         )
-        self._lost = storage.lost
         self._aside = Aside()
         self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
@@ -420,9 +419,8 @@ class Program:
             except OSError as error:
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
                 self._say(f"cannot store: {error}")
-        if self._lost != self._storage.lost:
-            self._lost = self._storage.lost
-            self.onboard.take_losses(self._lost)
+        if events:  # some may make good what was lost
+            self.onboard.take_losses(self._storage.lost)
 
     def _keep_log(self, least_bytes: int) -> None:
         chunk = self.onboard.take_log(least_bytes)

@@ -58,7 +58,7 @@ class Storage:
         self._directory = directory
         self._parameters: dict[str, float] = {}
         self._logs: set[files.Path] = set()  # begun by this process
-        self._lost: dict[int | str, Path] = {}  # files that cannot be read: they stay until others come
+        self._lost: set[int | str] = set()  # whose files cannot be read: they stay until others come
         self._lock = FileLock(directory / LOCK_FILE)
         try:
             directory.mkdir(parents=True, exist_ok=True)
@@ -102,11 +102,16 @@ class Storage:
             return _why(error)
         return f"moved to {aside.name}"
 
-    def _give_up(self, what: int | str) -> None:
-        """Before another takes its place: a copy of the file that cannot be read."""
-        path = self._lost.get(what)
-        if path is not None:
+    def _replace(self, what: int | str, name: str, data: bytes | None) -> None:
+        """Put other data into a file, or take it away, after a copy of what cannot be read of it."""
+        path = self._directory / name
+        if what in self._lost:
             keep_copy(path)
+        if data is None:
+            remove(path)
+        else:
+            write_whole(path, data)
+        self._lost.discard(what)
 
     def load_areas(self, home: Home) -> tuple[dict[int, tuple[WireItem, ...]], list[str]]:
         """The stored fence and rally points by MAV_MISSION_TYPE, and a line for each that is none."""
@@ -123,7 +128,7 @@ class Storage:
             except FileNotFoundError:
                 continue
             except (OSError, DamagedError, MissionItemError) as error:
-                self._lost[kind] = path
+                self._lost.add(kind)
                 troubles.append(f"{path}: {_why(error)}; starting without it")
         return found, troubles
 
@@ -134,13 +139,7 @@ class Storage:
 
     def keep_areas(self, kind: int, items: tuple[WireItem, ...]) -> None:
         """Store fence or rally points; none are stored as none."""
-        path = self._directory / AREA_FILES[kind]
-        self._give_up(kind)
-        if items:
-            write_whole(path, serialise(items))
-        else:
-            remove(path)
-        self._lost.pop(kind, None)
+        self._replace(kind, AREA_FILES[kind], serialise(items) if items else None)
 
     def load_parameters(self, table: ParameterTable) -> list[str]:
         """Set what is stored; returns a line for each stored value that no longer fits."""
@@ -160,16 +159,12 @@ class Storage:
         except FileNotFoundError:
             return {}, []
         except (OSError, DamagedError, UnicodeDecodeError, ParameterError) as error:
-            self._lost[name] = path
+            self._lost.add(name)
             return {}, [f"{path}: {_why(error)}; {then}"]
 
     def keep_mission(self, mission: StoredMission) -> None:
         """Store the mission; an empty one is stored as none."""
-        path = self._directory / MISSION_FILE
-        if mission.items:
-            write_whole(path, serialise(mission.items))
-        else:
-            remove(path)
+        self._replace(MISSION_FILE, MISSION_FILE, serialise(mission.items) if mission.items else None)
 
     def keep_parameter(self, name: str, value: float) -> None:
         """Store one more parameter."""
@@ -178,9 +173,7 @@ class Storage:
 
     def keep_parameters(self) -> None:
         """Store all that were set; so what could not be read is given up."""
-        self._give_up(PARAMETER_FILE)
-        write_whole(self._directory / PARAMETER_FILE, seal(_lines(sorted(self._parameters.items()))))
-        self._lost.pop(PARAMETER_FILE, None)
+        self._replace(PARAMETER_FILE, PARAMETER_FILE, seal(_lines(sorted(self._parameters.items()))))
 
     def load_world(self) -> tuple[dict[str, float], list[str]]:
         """The simulator's parameters as they were saved, and a line if the file is none."""
@@ -188,13 +181,7 @@ class Storage:
 
     def keep_world(self, values: Mapping[str, float]) -> None:
         """Store the simulator's parameters; none are stored as none."""
-        path = self._directory / WORLD_FILE
-        self._give_up(WORLD_FILE)
-        if values:
-            write_whole(path, seal(_lines(values.items())))
-        else:
-            remove(path)
-        self._lost.pop(WORLD_FILE, None)
+        self._replace(WORLD_FILE, WORLD_FILE, seal(_lines(values.items())) if values else None)
 
     def load_signing(self) -> Signing | None:
         """The stored key with a time later than any that was used; StorageError if it is none."""

@@ -46,14 +46,11 @@ _AUTO_MODES = {
     8: "follow",
     9: "precision-land",
 }
-FLOWN_MODES: dict[str, tuple[int, int]] = {  # by this vehicle: main mode and sub-mode
-    "position": (3, 0),
-    "offboard": (6, 0),
-    "takeoff": (_AUTO, 2),
-    "hold": (_AUTO, 3),
-    "mission": (_AUTO, 4),
-    "return": (_AUTO, 5),
-    "land": (_AUTO, 6),
+_FLOWN = ("position", "offboard", "takeoff", "hold", "mission", "return", "land")
+# by this vehicle: main mode and sub-mode
+FLOWN_MODES: dict[str, tuple[int, int]] = {
+    **{name: (main, 0) for main, name in _MAIN_MODES.items() if name in _FLOWN},
+    **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items() if name in _FLOWN},
 }
 
 _PHASES = {
