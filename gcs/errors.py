@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import errno
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from missions.toml_files import FileError
 
 EXIT_DONE = 0
 EXIT_ERROR = 1  # a known error, told in one line
@@ -35,6 +39,11 @@ class StoppedError(GcsError):
 
 class RefusedError(GcsError):
     """The vehicle answered no."""
+
+
+def input_error(error: FileError) -> GcsError:
+    """What is wrong with a file that the command line names, or with the name."""
+    return (InputError if error.unknown else GcsError)(str(error))
 
 
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)

@@ -15,7 +15,6 @@ import click
 
 from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
-    LARGEST_DATAGRAM,
     Address,
     Stop,
     StopRequest,
@@ -24,6 +23,7 @@ from autopilot.shell.options import (
     datagram_socket,
     home_option,
     reason,
+    receive,
     send,
     set_timeout,
     setting_option,
@@ -92,10 +92,7 @@ class Link:
 
     def receive(self, flags: int = 0) -> tuple[bytes, Address] | None:
         """The next datagram and its sender, None after the timeout."""
-        try:
-            return self._socket.recvfrom(LARGEST_DATAGRAM, flags)
-        except OSError:
-            return None
+        return receive(self._socket, flags)
 
     def send(self, simulator: HilSimulator) -> None:
         """The sensors of the present tick to the autopilot. What cannot be sent counts as lost on the way."""

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
-from gcs.errors import GcsError, InputError
+from gcs.errors import InputError, input_error
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
 from sitl.vehicles.sim_parameters import sim_parameters
@@ -27,7 +27,7 @@ def check_flight_inputs(vehicle: str, sensors: str, settings: Iterable[tuple[str
         found = load_vehicle(vehicle)
         load_profile(sensors)
     except FileError as error:
-        raise (InputError if error.unknown else GcsError)(str(error)) from None
+        raise input_error(error) from None
     own, world = autopilot_parameters(found), sim_parameters(truth_of(found))
     for name, value in settings:
         table = world if name.startswith(_WORLD) and name not in own else own

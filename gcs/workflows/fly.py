@@ -233,7 +233,7 @@ class _Folder:
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:
         trouble, tlog = disk_trouble(error), self._path / TLOG_FILE
         if trouble:
-            size = tlog.stat().st_size
+            size = tlog.stat().st_size if tlog.exists() else 0
             raise GcsError(
                 f"--out {self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}"
             ) from None

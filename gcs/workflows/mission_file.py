@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gcs.errors import GcsError, InputError
+from gcs.errors import input_error
 from missions.fileformat import MissionFileError, load_mission
 from missions.model import Mission
 
@@ -12,4 +12,4 @@ def load(name_or_path: str) -> Mission:
     try:
         return load_mission(name_or_path)
     except MissionFileError as error:
-        raise (InputError if error.unknown else GcsError)(str(error)) from None
+        raise input_error(error) from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from autopilot.trajectory.feasibility import VehicleLimits
 from autopilot.vehicle.file import VehicleFileError, load_vehicle
-from gcs.errors import GcsError, InputError
+from gcs.errors import input_error
 
 
 def load_limits(name_or_path: str) -> VehicleLimits:
@@ -12,4 +12,4 @@ def load_limits(name_or_path: str) -> VehicleLimits:
     try:
         return VehicleLimits(load_vehicle(name_or_path))
     except VehicleFileError as error:
-        raise (InputError if error.unknown else GcsError)(str(error)) from None
+        raise input_error(error) from None
