@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from autopilot.onboard.onboard import Onboard
 from autopilot.vehicle.parameters import LAWS
 from autopilot.wire.convert import Home
 from gcs.clients.capture import FrameLog
@@ -14,7 +13,6 @@ from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.own_flight import flight_client
 from gcs.workflows.warmup import flight_parts, warm_up
 from missions.model import Mission
-from sitl.hil import HilSimulator
 
 
 def fly_here(mission: Mission, options: FlightOptions, log: FrameLog) -> Outcome:
@@ -26,7 +24,7 @@ def fly_here(mission: Mission, options: FlightOptions, log: FrameLog) -> Outcome
     client = flight_client(mission, options, Home())
     with FlightDisplay(mission.name, options.quiet) as display:
 
-        def watch(_onboard: Onboard, _simulator: HilSimulator) -> bool:
+        def watch(*_: object) -> bool:
             if display.due:
                 display.update(client.progress)
             return True

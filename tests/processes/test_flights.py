@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import plumbline
 from tests.doubles.recorded_flights import STABLE_KEYS
 
 pytestmark = pytest.mark.processes
