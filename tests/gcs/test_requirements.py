@@ -98,5 +98,5 @@ def test_a_run_that_does_not_come_about_is_an_error_in_the_report(tmp_path: Path
 
 def test_a_report_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(GcsError, match=r"--junit .*file/report.xml: Not a directory"):
+    with pytest.raises(GcsError, match=r"--junit .*file/report.xml: File exists"):
         conclude("run", tmp_path / "file" / "report.xml", "completed", 1.0, [])
