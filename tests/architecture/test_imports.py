@@ -6,7 +6,8 @@ everything below. A law is known by its folder: nothing outside imports one by n
 autopilot its geometry and its wire, and is built like it: the plant on geometry, the sensors on the plant,
 the world's tick on both. `gcs` knows also the paths and the definitions of parameters; only
 `gcs/closed_loop.py` and `gcs/sweep` join the cores. `plumbline`, which scripts import, stands on it. What a
-vehicle is and how a TOML file is read are leaves that every program shares. Sockets, clocks, threads and logging belong to the shells alone.
+vehicle is and how a TOML file is read are leaves that every program shares. Sockets, clocks, threads and
+logging belong to the shells alone.
 """
 
 from __future__ import annotations
