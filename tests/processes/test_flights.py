@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.wire.tlog import TlogWriter
+from autopilot.wire.tlog import TlogPair
 from gcs.closed_loop import Conditions, fly
 from missions.fileformat import load_mission
 from tests.doubles.recorded_flights import STABLE_KEYS
@@ -18,7 +18,8 @@ from tests.doubles.recorded_flights import STABLE_KEYS
 pytestmark = pytest.mark.processes
 Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
 
-FILES = ("flight.tlog", "flight.ulg", "flight.parquet", "summary.json", "report.html", "overview.png")
+LOGS = ("flight.tlog", "flight.plumbline.tlog")
+FILES = (*LOGS, "flight.ulg", "flight.parquet", "summary.json", "report.html", "overview.png")
 
 
 def test_a_flight_over_udp_leaves_the_log_of_the_same_flight_in_one_process(gcs: Gcs, tmp_path: Path) -> None:
@@ -32,9 +33,9 @@ def test_a_flight_over_udp_leaves_the_log_of_the_same_flight_in_one_process(gcs:
     for name in FILES:
         assert (out / name).stat().st_size > 0, name
 
-    log = io.BytesIO()
-    fly(load_mission("hover"), Conditions(sensors="lab", seed=7), TlogWriter(log))
-    assert (out / "flight.tlog").read_bytes() == log.getvalue()
+    logs = io.BytesIO(), io.BytesIO()
+    fly(load_mission("hover"), Conditions(sensors="lab", seed=7), TlogPair(*logs))
+    assert [(out / name).read_bytes() for name in LOGS] == [log.getvalue() for log in logs]
 
 
 def test_what_four_rotors_lose_is_reported_as_diverged(gcs: Gcs, tmp_path: Path) -> None:
@@ -64,6 +65,7 @@ def test_a_disk_that_is_full_is_one_line_and_what_was_captured_is_kept(gcs: Gcs,
     out = tmp_path / "out"
     flown = gcs("fly", "hover", "--sensors", "ideal", "--out", str(out), "--quiet", file_bytes=500_000)
     assert flown.returncode == 1
-    kept = f"500000 bytes of telemetry are kept in {out / 'flight.tlog'}"
+    sizes = [(out / name).stat().st_size for name in LOGS]
+    kept = f"{sum(sizes)} bytes of telemetry are kept there"
     assert flown.stderr == f"gcs: --out {out}: file too large; {kept}\n"
-    assert (out / "flight.tlog").stat().st_size == 500_000
+    assert max(sizes) == 500_000
