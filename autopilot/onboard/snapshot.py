@@ -37,6 +37,7 @@ from autopilot.supervisor.state import (
     View,
     carries,
 )
+from autopilot.supervisor.watches.fence import limited
 from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
@@ -419,7 +420,8 @@ def _system_status(m: Moment) -> tuple[Any, ...]:
 
 @_makes("sensors_present", "sensors_healthy")
 def _sensors(m: Moment) -> tuple[Any, ...]:
-    return sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us)
+    present, healthy = sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us)
+    return present | (snapshot.GEOFENCE if limited(m.flight, m.core.settings) else 0), healthy
 
 
 @_makes("gps")

@@ -29,6 +29,7 @@ TRACKER = mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
 MOTORS = mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 AHRS = mavlink.MAV_SYS_STATUS_AHRS
 BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE  # present: there is something to keep within
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK  # health: the vehicle may be armed
 
 

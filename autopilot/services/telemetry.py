@@ -51,7 +51,7 @@ from autopilot.services.sensor_streams import (
     scaled_imu,
     scaled_pressure,
 )
-from autopilot.services.snapshot import PREARM, Snapshot
+from autopilot.services.snapshot import GEOFENCE, PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import (
@@ -96,9 +96,9 @@ def _heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     # some tools read a missing health bit as a breach
-    health = s.sensors_healthy | (0 if s.breach else mavlink.MAV_SYS_STATUS_GEOFENCE)
+    health = s.sensors_healthy | (0 if s.breach else GEOFENCE)
     present = s.sensors_present | PREARM
-    enabled = present if s.guarded else present & ~mavlink.MAV_SYS_STATUS_GEOFENCE
+    enabled = present if s.guarded else present & ~GEOFENCE
     return (
         mavlink.MAVLink_sys_status_message(
             onboard_control_sensors_present=present,

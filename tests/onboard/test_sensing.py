@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from autopilot.onboard.snapshot import Moment
-from autopilot.services.snapshot import Sortie
+from autopilot.services.snapshot import GEOFENCE, Sortie
 from autopilot.supervisor.state import Phase
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem
 from missions.model import Land, Takeoff
 from sitl.messages import pressure_pa
 from tests.doubles.craft import Craft
@@ -64,3 +65,21 @@ def test_a_flight_is_dated_by_arming_take_off_and_landing() -> None:
     again = moment(craft).sortie
     assert again.armed_us > taken_off_us
     assert (again.takeoff_us, again.landed_us) == (0, 0)
+
+
+@pytest.mark.parametrize("limit", ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"])
+def test_a_fence_of_parameters_is_shown_as_present(limit: str) -> None:
+    assert not moment(Craft()).sensors_present & GEOFENCE
+    assert moment(Craft(**{limit: 20.0})).sensors_present & GEOFENCE
+
+
+def test_a_fence_that_is_uploaded_is_shown_as_present_until_it_is_cleared() -> None:
+    craft = Craft()
+    corners = ((-300, -300), (-300, 300), (300, 300), (300, -300))
+    origin = (473977420, 85455940)
+    fence = tuple(
+        WireItem(3, 5001, 0, 1, 4.0, 0.0, 0.0, 0.0, origin[0] + x, origin[1] + y, 0.0) for x, y in corners
+    )
+    for items in (fence, ()):
+        craft.onboard.take_areas(mavlink.MAV_MISSION_TYPE_FENCE, items)
+        assert bool(moment(craft).sensors_present & GEOFENCE) == bool(items)

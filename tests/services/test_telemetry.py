@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from autopilot.services.identity import Identity
-from autopilot.services.snapshot import ACCEL, GYRO, MAG, PREARM, GpsFix, Sensed
+from autopilot.services.snapshot import ACCEL, GEOFENCE, GYRO, MAG, PREARM, GpsFix, Sensed
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, PROGRAM_INTERVALS_US, STREAMS
 from autopilot.wire.codec import FrameWriter, decode
@@ -141,6 +141,18 @@ def test_health_as_the_sensors_say_and_no_fence_breach(snap):
     assert status.onboard_control_sensors_health & PREARM
     assert status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_GEOFENCE
     assert (status.voltage_battery, status.battery_remaining) == (11_100, 75)
+
+
+@pytest.mark.parametrize("guarded", [True, False])
+def test_a_fence_is_present_and_enabled_unless_it_is_switched_off(snap, guarded):
+    (status,) = sent(
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS, snap(sensors_present=GYRO | GEOFENCE, guarded=guarded)
+    )
+    assert status.onboard_control_sensors_present & GEOFENCE
+    assert bool(status.onboard_control_sensors_enabled & GEOFENCE) == guarded
+    assert status.onboard_control_sensors_enabled & GYRO
+    (status,) = sent(mavlink.MAVLINK_MSG_ID_SYS_STATUS, snap(sensors_present=GYRO))
+    assert not (status.onboard_control_sensors_present | status.onboard_control_sensors_enabled) & GEOFENCE
 
 
 def test_what_is_unknown_is_said_to_be(snap):
