@@ -124,11 +124,15 @@ class Pilot:
         )
         for name in ("scaled_imu", "actuator_output_status", "rc_status"):
             getattr(self.telemetry, f"set_rate_{name}")(10.0)
-        for name in streams:
-            getattr(self.telemetry, f"subscribe_{name}")(
+        heard = {
+            name: getattr(self.telemetry, f"subscribe_{name}")(
                 lambda value, *_, name=name: seen.setdefault(name, value)
             )
+            for name in streams
+        }
         self.until("all streams", lambda: len(seen) == len(streams))
+        for name, handle in heard.items():  # so many callbacks keep a busy machine's Python from the rest
+            getattr(self.telemetry, f"unsubscribe_{name}")(handle)
         battery = seen["battery"]
         self.told["battery"] = [battery.voltage_v, battery.remaining_percent]
         self.told["satellites"] = seen["gps_info"].num_satellites
