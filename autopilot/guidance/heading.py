@@ -25,7 +25,7 @@ K_V = 4.0 * K_P  # 1/s, critically damped with K_P
 LAG_RATE = 25.0  # rad/s, of the acceleration
 BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned
 LONGEST_STEP_S = 0.1  # of time that passes in one step, whatever the clock says
-ARRIVED = 1e-6  # rad, rad/s and rad/s^2
+ARRIVED = 1e-5  # rad, rad/s and rad/s^2
 NEAREST_M = 0.5  # from a place at which the nose is not turned any more
 
 EAST_NOSE = Nose(E1, ZERO, ZERO)

@@ -73,7 +73,7 @@ class PositionSetpoint:
         return not moves and not all(map(isnan, self.position))
 
     def adrift(self, v: Vec3) -> Vec3:
-        """The parts of a velocity about which it does not ask, but for how they are to change."""
+        """The parts of a vector along the axes on which it asks for an acceleration alone."""
         x, y, z = (
             v[axis]
             if isnan(self.position[axis]) and isnan(self.velocity[axis]) and not isnan(self.accel[axis])
@@ -293,7 +293,9 @@ def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLim
             along = (along[0], along[1], max(along[2], 0.0))
     wanted = add(along, _at_most(towards(distance, BRAKE_SHARE * pace.accel), pace.speed))
     if isinstance(asked, PositionSetpoint):
-        wanted = add(wanted, _at_most(asked.adrift(v), pace.fastest))
+        # what an acceleration alone makes of the velocity in the time in which velocities are reached
+        wanted = add(wanted, _at_most(asked.adrift(axpy(1.0 / K_V, push, v)), pace.fastest))
+        push = sub(push, asked.adrift(push))
     # no faster down than stops at the floor
     height = max(x[2] - FLOOR_M, 0.0)
     slowest = -norm(towards((0.0, 0.0, height), BRAKE_SHARE * pace.accel))
