@@ -23,7 +23,6 @@ from pathlib import Path
 
 import numpy as np
 
-from autopilot.services.identity import WINCH_COMPONENT
 from autopilot.wire.codec import decode
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions
@@ -77,8 +76,6 @@ class Hasher:
         for one in decode(b"".join(frames))[0]:
             message = one.message
             kind = message.get_msgId()
-            if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.component == WINCH_COMPONENT:
-                continue  # the winch is there: nothing is flown by that
             into = self.said if kind in TEXTS else self.flown
             into.update(f"{unix_us} {one.system} {kind} {message.to_dict()!r}\n".encode())
 

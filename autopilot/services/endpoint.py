@@ -25,6 +25,7 @@ from autopilot.services.guided import GuidedService
 from autopilot.services.identity import (
     AUTOPILOT_COMPONENT,
     LOAD_COMPONENT,
+    WINCH_COMPONENT,
     Identity,
     available_modes_messages,
 )
@@ -216,9 +217,6 @@ class VehicleEndpoint:
             if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
             state = self._heard(link, now_us)
-            if received.component and not state.heard_component:
-                state.heard_component = True
-                state.streams.set_interval(WINCH_HEARTBEAT, DEFAULT, now_us)
             handler = self.handlers.get(message_id)
             addressed = self._addressed(message_id, received.message) if handler else None
             if handler and addressed:
@@ -226,6 +224,8 @@ class VehicleEndpoint:
                 peer = Peer(link, received.system, received.component, addressed if others else None)
                 if others:
                     handler = self._components.receive
+                if addressed[1] == WINCH_COMPONENT and state.streams.interval(WINCH_HEARTBEAT) == OFF:
+                    state.streams.set_interval(WINCH_HEARTBEAT, DEFAULT, now_us)
                 wrapped = self._decider(state, peer, now_us, decide)
                 try:
                     outputs = handler(received.message, peer, now_us, wrapped)

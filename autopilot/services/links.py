@@ -28,7 +28,6 @@ class LinkState:
     __slots__ = (
         "_streams",
         "announced",
-        "heard_component",
         "heard_us",
         "number",
         "queue",
@@ -49,7 +48,6 @@ class LinkState:
         self.number = number  # that signatures bear
         self.signer = signer
         self.heard_us = now_us
-        self.heard_component = False  # somebody with a component id of its own
         self.streams = Streams(defaults, now_us)
         self.writers: dict[Source, FrameWriter] = {}
         own, dialect = self._writer((system, AUTOPILOT_COMPONENT)), self._writer((system, DIALECT_COMPONENT))

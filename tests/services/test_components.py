@@ -127,11 +127,12 @@ def test_components_have_no_parameters_files_or_missions_and_say_so(rig, to):
     assert rig.events == []
 
 
-def test_the_winch_shows_itself_to_whom_has_a_component_id(rig):
-    """DroneKit, which has none, would take its HEARTBEAT for that of the vehicle."""
+def test_the_winch_shows_itself_where_it_is_addressed(rig):
+    """DroneKit and pymavlink would take its HEARTBEAT for that of the vehicle."""
+    rig.endpoint.add_link("api")
 
-    def hearts(seconds):
-        got = rig.run(seconds * SECOND_US)
+    def hearts(link):
+        got = rig.run(5 * SECOND_US, link)
         return Counter(
             (r.component, r.message.type, r.message.autopilot)
             for r in got
@@ -139,16 +140,15 @@ def test_the_winch_shows_itself_to_whom_has_a_component_id(rig):
         )
 
     winch = (WINCH, m.MAV_TYPE_WINCH, m.MAV_AUTOPILOT_INVALID)
-    beat = m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)
-    assert winch not in hearts(3)
-    rig.send(beat, component=0)
-    assert winch not in hearts(3)
-    rig.send(beat, component=190)
-    assert hearts(5)[winch] == 5
+    rig.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+    rig.send(long((1, AUTOPILOT), m.MAV_CMD_DO_WINCH, 1, 5))
+    assert winch not in hearts("gcs")
+    rig.send(long((1, WINCH), m.MAV_CMD_DO_WINCH, 1, 5))
+    assert hearts("gcs")[winch] == 5
+    assert winch not in hearts("api")
 
 
 def test_each_component_counts_its_own_messages(rig):
-    rig.send(m.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     last: dict[tuple[int, int], int] = {}
     for tick in range(400):
         if tick % 50 == 0:

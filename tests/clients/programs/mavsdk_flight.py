@@ -320,10 +320,10 @@ class Pilot:
         winch, lengths = Winch(self.system), []
         winch.subscribe_status(lambda status, *_: lengths.append(status.line_length_m))
         self.until("a winch", lambda: bool(lengths))
+        self.told["components"] = sorted(self.system.component_ids())
         begun = lengths[-1]
         winch.relative_length_control(1, 0.3, 0.2)
         self.until("a longer cable", lambda: lengths[-1] > begun + 0.25)
-        self.told["components"] = sorted(self.system.component_ids())
         winch.rate_control(1, -0.1)
         self.until("a shorter cable", lambda: lengths[-1] < begun + 0.2)
         winch.hold(1)
