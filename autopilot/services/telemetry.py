@@ -431,8 +431,8 @@ GROUPS = _GROUPED | {mavlink.MAV_DATA_STREAM_ALL: tuple(sum(_GROUPED.values(), (
 # What other parts of the vehicle send under an id that the autopilot uses as well: the keys stand
 # beside those above, since a message id has 24 bits
 MESSAGE_ID = (1 << 24) - 1
-# The winch's HEARTBEAT is sent on a link from the first message on that is addressed to it there: DroneKit, and
-# `set_mode` of pymavlink, take the last HEARTBEAT for that of the vehicle
+# The winch's HEARTBEAT is sent on a link from the first message on that is addressed to it there: DroneKit
+# and `set_mode` of pymavlink take the last HEARTBEAT for that of the vehicle
 WINCH_HEARTBEAT = 1 << 25 | mavlink.MAVLINK_MSG_ID_HEARTBEAT
 COMPONENT_STREAMS: dict[int, Stream] = {
     WINCH_HEARTBEAT: Stream(WINCH_COMPONENT, HEARTBEAT_US, _winch_heartbeat)
