@@ -31,6 +31,7 @@ from math import atan, ceil, comb, cos, exp, inf, isnan, nan, radians, sin, sqrt
 from autopilot.control.records import Jet
 from autopilot.geometry import so3
 from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, column, mul, norm, scale, sub
+from autopilot.guidance.heading import LONGEST_STEP_S
 from autopilot.wire.dialect import plumbline as mavlink
 
 ORDER = 7  # of the smoother: x and its derivatives 1 ... 6 are continuous
@@ -339,7 +340,8 @@ class Posture:
             return replace(self, lean=lean, attitude=None)
         if self.attitude is None:
             return replace(self, lean=lean, attitude=seen, at_us=now_us)
-        turned = mul(self.attitude, so3.exp(scale((now_us - self.at_us) * 1e-6, lean.rates)))
+        elapsed_s = min((now_us - self.at_us) * 1e-6, LONGEST_STEP_S)
+        turned = mul(self.attitude, so3.exp(scale(elapsed_s, lean.rates)))
         leaning = turned[2][2] < min(_LEAST_UP, self.attitude[2][2])
         return replace(self, lean=lean, attitude=self.attitude if leaning else turned, at_us=now_us)
 
