@@ -28,7 +28,7 @@ def heading_kept(flight: Flight, view: View, settings: Settings) -> Flight:
 def heading_before_flight(flight: Flight, view: View) -> Flight:
     """The flight of a vehicle that is armed: its heading is the one it was left with, unless it was moved."""
     nose, heading = heading_of(view.attitude), flight.heading.at_rest()
-    if abs(turn(nose - heading.angle)) > ASKEW:
+    if not abs(turn(nose - heading.angle)) <= ASKEW and not isnan(nose):
         heading = Heading(nose, aim=Towards(nose))
     return replace(flight, heading=heading)
 

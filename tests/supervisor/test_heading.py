@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from autopilot.geometry.linear import IDENTITY, Mat3, column
-from autopilot.guidance.heading import Gaze, Spin, Towards
+from autopilot.guidance.heading import Gaze, Heading, Spin, Towards
 from autopilot.guidance.setpoint_follower import NOWHERE, STEEPEST_DEG, Posture
 from autopilot.services import identity
 from autopilot.services.requests import (
@@ -244,6 +244,16 @@ def test_body_rates_lean_no_further_than_an_attitude_may(sky: Sky) -> None:
     assert math.degrees(math.acos(sky.flight.legs[0].upward(0.0)[2])) < 40.0  # type: ignore[union-attr]
 
 
+def test_a_place_is_not_gone_to_before_the_swing_is_calmed(sky: Sky) -> None:
+    offboard(sky, FollowAttitude((0.0, 0.1, 1.0), None), 1.0)
+    assert sky.ask(Reposition(1.0, 0.0, 2.0, True)).result == LATER
+    assert sky.flight.phase == Phase.GUIDED
+    assert sky.ask(Reposition(None, None, None, True, heading_rad=NORTH)).result == ACCEPTED
+    assert sky.flight.phase == Phase.HOLD
+    sky.wait(10.0)
+    assert sky.ask(Reposition(1.0, 0.0, 2.0, True)).result == ACCEPTED
+
+
 # ---- from flight to flight
 
 
@@ -266,3 +276,11 @@ def test_a_vehicle_that_was_turned_on_the_ground_flies_with_the_heading_it_has(
     assert sky.ask(Arm(True, False)).result == ACCEPTED
     assert sky.flight.heading.angle == pytest.approx(angle)
     assert sky.flight.heading.rests
+
+
+def test_a_heading_that_was_lost_with_the_estimate_is_found_again() -> None:
+    sky = Sky()
+    sky.flight = replace(sky.flight, heading=Heading(math.nan))
+    sky.view = view(attitude=NORTH_NOSE)
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    assert sky.flight.heading.angle == pytest.approx(NORTH)

@@ -32,11 +32,13 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     asked = (request.east_m, request.north_m, request.altitude_m)
     if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
         return held, verdict
+    resting = held.legs[-1]
+    if not isinstance(resting, Hold) and asked != (None, None, None):
+        return flight, later("Reposition denied while the load swings: hold first")
     if request.heading_rad is not None:
         held = pointed(held, Towards(nearest(request.heading_rad, held.heading)), view)
     if asked == (None, None, None):
         return held, verdict
-    resting = held.legs[-1]
     assert isinstance(resting, Hold)
     here = resting.position
     there: Vec3 = (
