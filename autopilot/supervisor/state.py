@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from math import hypot, nan, sqrt
 from typing import NamedTuple
@@ -43,6 +44,7 @@ INFO, WARNING, CRITICAL = (
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
 CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
+LANDING = frozenset({Phase.LOWER, Phase.SET_DOWN})
 
 
 class Event(Enum):
@@ -67,6 +69,7 @@ class Event(Enum):
     LOAD_DOWN = "load on the ground"
     VEHICLE_DOWN = "vehicle on the ground"
     FAIL = "give up"
+    FOUND = "found in flight"
 
 
 class Selected(Enum):
@@ -169,7 +172,8 @@ class Flight:
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
     returning: bool = False  # home, or landing there
-    hindrances: tuple[str, ...] = ()  # reasons not to arm that lie beside the flight: the storage, the clock
+    # reasons not to arm that lie beside the flight, by their source: the storage, the clock
+    hindrances: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 class View(NamedTuple):
@@ -185,6 +189,7 @@ class View(NamedTuple):
     complaints: tuple[str, ...]
     pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
     height_std: float = 0.0  # m, of heights over home, where a receiver tells them
+    lost: str = ""  # why not even a landing is possible by these estimates
 
 
 class Report(NamedTuple):
