@@ -5,9 +5,8 @@ from __future__ import annotations
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing, timestamp_of
-from autopilot.wire.tlog import TlogWriter
 from gcs.clients import command
-from gcs.clients.capture import Capture
+from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError
 from gcs.shell.display import FlightDisplay, say
@@ -25,7 +24,7 @@ def fly_running(
     mission: Mission,
     options: FlightOptions,
     address: Address,
-    log: TlogWriter,
+    log: FrameLog,
     stop: StopRequest,
     watch: Stopwatch,
 ) -> FlightClient:

@@ -67,7 +67,7 @@ def test_the_loop_does_not_wait_for_a_disk_and_the_ground_does(aside: Storing) -
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(LISTENER)
         listener.setblocking(False)
-        stations = GroundStations((listener.getsockname(),), None, aside)
+        stations = GroundStations((listener.getsockname(),), (), None, aside)
         link = (0, listener.getsockname())
         onboard: Any = SimpleNamespace(said=[b"before"])
         onboard.ground_datagrams = lambda: [(link, datagram) for datagram in onboard.said]
