@@ -3,7 +3,8 @@
 "use strict";
 (() => {
   const GROUND_D = 0;
-  const DEFAULT_ROTORS = [[1, 1, 1], [-1, -1, 1], [1, -1, -1], [-1, 1, -1]];
+  // a plus frame as the mixer counts it: rotor 1 behind, 2 right, 3 in front, 4 left
+  const PLUS_FRAME = [[-1, 0, -1], [0, 1, 1], [1, 0, -1], [0, -1, 1]];
   const CLICK_PX = 4; // a pointer that moved further turns the camera and picks nothing
   // x east, y up, z south are the axes of three.js
   const NED_TO_SCENE = new THREE.Matrix4().set(0, 1, 0, 0, 0, 0, -1, 0, -1, 0, 0, 0, 0, 0, 0, 1);
@@ -17,12 +18,11 @@
      */
     constructor(canvas, options = {}) {
       this.canvas = canvas;
-      const arm = options.armLength || 0.18;
+      const arm = options.armLength || 0.126;
       this.layout = {
         armLength: arm,
         cableLength: options.cableLength || 0.7,
-        rotors: options.rotors || DEFAULT_ROTORS.map(([x, y, spin]) => (
-          { position: [x * arm * Math.SQRT1_2, y * arm * Math.SQRT1_2, 0], spin })),
+        rotors: options.rotors || Plumbline.plusFrame(arm),
       };
       this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
       this.scene = new THREE.Scene();
@@ -340,6 +340,9 @@
       this.renderer.dispose();
     }
   }
+
+  /** The rotors of a vehicle whose arms are that long (m). */
+  Plumbline.plusFrame = (arm) => PLUS_FRAME.map(([x, y, spin]) => ({ position: [x * arm, y * arm, 0], spin }));
 
   function toScene([n, e, d]) {
     return new THREE.Vector3(e, -d, -n);
