@@ -78,13 +78,23 @@ class RepositionOperation(CommandOperation):
 
     def __init__(self, target: Target, latitude_degE7: int, longitude_degE7: int, height_m: float) -> None:
         super().__init__(target, "reposition", mavlink.MAV_CMD_DO_REPOSITION)
-        self._place = latitude_degE7, longitude_degE7, height_m
+        self._latitude_degE7 = latitude_degE7
+        self._longitude_degE7 = longitude_degE7
+        self._height_m = height_m
 
     def _message(self, confirmation: int) -> Any:
-        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
-        speed, change_mode, radius, yaw = -1.0, 1.0, 0.0, UNUSED
-        parameters = (speed, change_mode, radius, yaw, *self._place)
-        return mavlink.MAVLink_command_int_message(*self._target, frame, self._command, 0, 0, *parameters)
+        speed, change_mode, radius = -1.0, 1.0, 0.0
+        return mavlink.MAVLink_command_int_message(
+            *self._target,
+            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+            self._command,
+            0,
+            0,
+            *(speed, change_mode, radius, UNUSED),
+            self._latitude_degE7,
+            self._longitude_degE7,
+            self._height_m,
+        )
 
 
 def arm(target: Target, force: bool = False) -> CommandOperation:

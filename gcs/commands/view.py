@@ -32,8 +32,9 @@ def view_command(
 ) -> None:
     """Show running vehicles live in a browser.
 
-    A page on this machine shows vehicle, cable and load in 3-D with what is known of them, and commands them. Its
-    address is printed; whoever knows it may use the page. Several vehicles are told apart by their system ids.
+    A page on this machine shows vehicle, cable and load in 3-D with what is known of them, and commands
+    them. Its address is printed; whoever knows it may use the page. Several vehicles are told apart by their
+    system ids.
 
     \b
     gcs view

@@ -1,7 +1,7 @@
 """The pipe between `gcs fly` and the process that serves its page.
 
-The flight tells what it hears, by messages that are dropped where the page falls behind: nothing ever waits for a
-page. The page tells how many readers it has and what they ask of the vehicle.
+The flight tells what it hears, by messages that are dropped where the page falls behind: nothing ever waits
+for a page. The page tells how many readers it has and what they ask of the vehicle.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Serves one page and its web socket to browsers of this machine, or of others where that is asked for.
 
-Whoever knows the address may use the page: its first part is a token that nobody can guess. A request must name
-us as its host (else a page from elsewhere could have its own name lead here), and a web socket must come from
-our own page. Nothing is taken from disk but what `Site` lists.
+Whoever knows the address may use the page: its first part is a token that nobody can guess. A request must
+name us as its host (else a page from elsewhere could have its own name lead here), and a web socket must come
+from our own page. Nothing is taken from disk but what `Site` lists.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ _TYPES = {
     ".svg": "image/svg+xml",
 }
 _OURS = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self' {socket}; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "connect-src 'self' {socket}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 # a report carries its scripts and pictures within itself, and may ask for nothing
 _OF_REPORTS = (
@@ -165,7 +165,9 @@ class PageServer:
             return None
         if name in self.site.texts:
             socket = f"ws://{hosts[0]}"
-            return _found(self.site.texts[name], Path(name or ".html").suffix, _OURS.format(socket=socket))
+            return _found(
+                self.site.texts[name], Path(name or "page.html").suffix, _OURS.format(socket=socket)
+            )
         return self._of_report(name)
 
     def _of_report(self, name: str) -> Response:
@@ -180,7 +182,7 @@ class PageServer:
             return _refused(http.HTTPStatus.NOT_FOUND)
 
     def _is_ours(self, host: str) -> bool:
-        """Whether a Host header names us: the loopback, the address we are bound to, or any number of ours."""
+        """Whether a Host header names us: the loopback, or the address at which we are."""
         name, _, port = host.rpartition(":")
         if port != str(self._port):
             return False
@@ -226,4 +228,5 @@ def _refused(status: http.HTTPStatus) -> Response:
 def _trouble(host: str, port: int, error: OSError) -> str:
     if error.errno == errno.EADDRINUSE:
         return f"port {port} of {host} is in use by another program; choose another with --port"
-    return f"no page can be served on {host}:{port}: {error.strerror or error}; choose others with --bind and --port"
+    reason = error.strerror or error
+    return f"no page can be served on {host}:{port}: {reason}; choose others with --bind and --port"

@@ -1,6 +1,7 @@
 """What the page can ask of a vehicle: each a few MAVLink exchanges that any other ground station could make.
 
-What a page says is not trusted: an unknown action, a number out of range or of another kind is an ActionError.
+What a page says is not trusted: an unknown action, a number out of range or of another kind is an
+ActionError.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ class LinkQuality:
         return (last_us - first_us) / (now_us - began_us)
 
     def record(self, now_us: int) -> dict[str, Any]:
-        """age (s), loss (0 ... 1), rate (messages a second), pace, lost (whether it has been silent too long)."""
+        """age (s), loss (0 ... 1), rate (messages a second), pace, lost (whether silent too long)."""
         age_us = 0 if self.heard_us is None else max(0, now_us - self.heard_us)
         pace = self.pace
         return {

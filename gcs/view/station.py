@@ -1,19 +1,19 @@
 """The ground station behind the page: hears vehicles, carries out what the page asks, and tells what is new.
 
-    datagrams of vehicles and of the world, requests of pages  ->  Station  ->  datagrams to vehicles, records to pages
+    datagrams of vehicles and of the world  ->  Station  ->  records for pages
+                          requests of pages  ->          ->  datagrams for vehicles
 
-A station that only looks on (`speaks` False) is fed by another ground station: it has no heartbeat, asks for nothing
-by itself, and says a word to a vehicle only where a person asked for it.
+A station that only looks on (`speaks` False) is fed by another ground station: it has no heartbeat, asks for
+nothing by itself, and says a word to a vehicle only where a person asked for it.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from autopilot.wire.codec import Received
-from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing
 from gcs.clients import command
@@ -82,7 +82,7 @@ class Station:
         for one in messages(datagram)[0]:
             if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.system not in self.vehicles:
                 self._meet(one, datagram, now_us)
-        heard = []
+        heard: list[int] = []
         for system, vehicle in self.vehicles.items():
             for one in vehicle.connection.receive(datagram, now_us):
                 if not heard or heard[-1] != system:
@@ -156,7 +156,7 @@ class Station:
         return {"type": "state", "vehicles": states, "samples": fresh}
 
     def news(self) -> list[dict[str, Any]]:
-        """What pages must be told besides, since the last time; a record with "page" is for that page alone."""
+        """What is new since the last time; a record with "page" is for that page alone."""
         news = self._news
         self._news = []
         for vehicle in self.vehicles.values():

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Sequence
 from typing import Any
 
 from autopilot.wire.codec import Received

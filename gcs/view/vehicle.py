@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ from gcs.view.link_quality import LinkQuality
 from gcs.view.truth import Place, Truth
 
 _LONGEST_SHOWN = 1.25  # of its cable: a load that is further from its vehicle has left it
+_ESTIMATES = 8  # that wait for the truth of their time
 _NOT_CARRIED = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
 
 
@@ -34,6 +36,7 @@ class WatchedVehicle:
         self.changed_parameters: dict[str, float] = {}  # since the page was told
         self.fence: dict[str, Any] | None = None
         self.rally: list[Place] = []
+        self._believed: deque[tuple[int, Place]] = deque(maxlen=_ESTIMATES)  # places of the load by time
         self.plan_ids: tuple[int, int] | None = None  # versions of fence and rally points
         self.told_texts = 0  # of view.texts
 
@@ -43,6 +46,9 @@ class WatchedVehicle:
             return
         self.link.heard(one, now_us)
         self.view.update(one, now_us)
+        if one.id == mavlink.MAVLINK_MSG_ID_LOAD_STATE:
+            load = one.message
+            self._believed.append((load.time_usec, (load.x, load.y, load.z)))
         if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             message = one.message
             value = from_the_wire(message.param_value, message.param_type)
@@ -170,7 +176,7 @@ class WatchedVehicle:
         return _rounded(math.degrees(math.acos(max(-1.0, min(1.0, message.qz)))), 2)
 
     def _rotors(self) -> tuple[list[float] | None, float | None]:
-        """Share of the greatest force of each, and that force; of a vehicle without limits shares of its weight."""
+        """Share of the greatest force of each, and that force; without limits the shares of the thrust."""
         message = self.view.latest.get("ROTOR_STATE")
         if message is None:
             return None, None
@@ -181,12 +187,11 @@ class WatchedVehicle:
 
     def _estimator_error(self) -> float | None:
         """Between where the load is believed to be and where it was at that time."""
-        estimate = self.view.latest.get("LOAD_STATE")
-        if estimate is None:
-            return None
-        true = self.truth.load_at(estimate.time_usec)
-        believed = (estimate.x, estimate.y, estimate.z)
-        return None if true is None else _rounded(math.dist(true, believed))
+        for time_us, believed in reversed(self._believed):  # the newest may be ahead of the truth
+            true = self.truth.load_at(time_us)
+            if true is not None:
+                return _rounded(math.dist(true, believed))
+        return None
 
     def _wind(self) -> Sequence[float] | None:
         true = self.truth.wind

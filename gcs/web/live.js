@@ -155,17 +155,13 @@
     page.enabled = some;
     controls.enable(some);
     if (some && vehicle.record) controls.setParameters(vehicle.record.parameters);
-    byId("hint").textContent = some && scene ? "Shift and click: take the load there. Drag: turn, wheel: zoom." : "";
+    byId("hint").textContent = some && scene ? "Double-click: take the load there. Drag: turn. Wheel: zoom." : "";
   }
 
   if (scene) {
-    let wanted = false;
-    byId("scene").addEventListener("pointerdown", (event) => { wanted = event.shiftKey || event.altKey; });
-    byId("scene").addEventListener("dblclick", (event) => { wanted = true; scene.pick(event); });
-    scene.onPick((place) => {
+    scene.onPick((place, ground, clicks) => {
       const vehicle = page.vehicles.get(page.chosen);
-      if (!wanted || !vehicle || !vehicle.state || page.session.outcome) return;
-      wanted = false;
+      if (clicks !== 2 || !vehicle || !vehicle.state || page.session.outcome) return;
       const goal = place.map((value) => Math.round(value * 1000) / 1000);
       scene.setGoal(goal);
       ask("goto", { place: goal });
@@ -199,7 +195,7 @@
   function between(vehicle, now) {
     const { state, before } = vehicle;
     if (!before || !before.position || !state.position || !before.load || !state.load) return state;
-    const share = Math.min((now - vehicle.at) / Math.max(vehicle.every, 1), 1);
+    const share = Math.min(Math.max((now - vehicle.at) / Math.max(vehicle.every, 1), 0), 1);
     const mix = (a, b) => (a && b ? b.map((value, i) => a[i] + share * (value - a[i])) : b);
     const attitude = mix(before.attitude, state.attitude);
     const norm = attitude ? Math.hypot(...attitude) : 1;

@@ -5,14 +5,14 @@
   const AT = Object.fromEntries(FIELDS.map((name, index) => [name, index]));
   // read gives the number of a sample, or null
   const SIGNALS = [
-    { key: "error", label: "Error of the load", unit: "cm", read: (s) => scaled(s[AT.error], 100), on: true },
+    { key: "error", label: "Error", unit: "cm", read: (s) => scaled(s[AT.error], 100), on: true },
     { key: "tension", label: "Tension", unit: "N", read: (s) => s[AT.tension], on: true },
     { key: "swing", label: "Swing", unit: "°", read: (s) => s[AT.swing], on: true },
-    { key: "use", label: "Most used rotor", unit: "%", read: (s) => scaled(s[AT.use], 100) },
-    { key: "height", label: "Height of the load", unit: "m", read: (s) => (s[AT.load] ? -s[AT.load][2] : null) },
-    { key: "velocity", label: "Speed of the load", unit: "m/s", read: (s) => s[AT.velocity] },
-    { key: "estimator", label: "Estimator error", unit: "mm", read: (s) => scaled(s[AT.estimator], 1000) },
-    { key: "pace", label: "Real-time factor", unit: "×", read: (s) => s[AT.pace] },
+    { key: "use", label: "Rotor use", unit: "%", read: (s) => scaled(s[AT.use], 100) },
+    { key: "height", label: "Height", unit: "m", read: (s) => (s[AT.load] ? -s[AT.load][2] : null) },
+    { key: "velocity", label: "Speed", unit: "m/s", read: (s) => s[AT.velocity] },
+    { key: "estimator", label: "Estimator", unit: "mm", read: (s) => scaled(s[AT.estimator], 1000) },
+    { key: "pace", label: "Pace", unit: "×", read: (s) => s[AT.pace] },
   ];
   const COLOURS = ["#4ea1ff", "#ffb454", "#54c7ac", "#c792ea", "#ff7a5c", "#8fb8de", "#e0c341", "#93a3b3"];
   const SPANS = [[20, "20 s"], [60, "1 min"], [300, "5 min"], [Infinity, "all"]];

@@ -55,7 +55,7 @@
       this.listen();
       this.applyTheme();
       this.mode = "orbit";
-      this.look([0, 0, -0.6], 4 * (this.layout.cableLength + arm));
+      this.look([0, 0, -0.6], 3.6 * (this.layout.cableLength + arm));
     }
 
     listen() {
@@ -65,13 +65,12 @@
       this.down = null;
       this.onDown = (event) => { this.down = [event.clientX, event.clientY]; };
       this.onUp = (event) => {
-        if (!this.down || event.button !== 0) return;
+        if (!this.down) return;
         const moved = Math.hypot(event.clientX - this.down[0], event.clientY - this.down[1]);
-        this.down = null;
         if (moved <= CLICK_PX) this.pick(event);
       };
       this.canvas.addEventListener("pointerdown", this.onDown);
-      this.canvas.addEventListener("pointerup", this.onUp);
+      this.canvas.addEventListener("click", this.onUp);
     }
 
     // ---- what is shown
@@ -276,7 +275,10 @@
 
     // ---- places and pixels
 
-    /** Calls back with ([N, E, D] at the height of the load, [N, E, 0] on the ground) where the reader clicks. */
+    /**
+     * Calls back with ([N, E, D] at the height of the load, [N, E, 0] on the ground or null, number of clicks) where
+     * the reader clicks.
+     */
     onPick(callback) {
       this.picked.push(callback);
     }
@@ -292,7 +294,7 @@
       const ground = meet(ray.ray, 0);
       const level = meet(ray.ray, Math.max(height, 0)) || ground;
       if (!level) return;
-      for (const callback of this.picked) callback(level, ground);
+      for (const callback of this.picked) callback(level, ground, event.detail);
     }
 
     /** Where a place is seen: [x, y] in CSS pixels of the canvas, or null behind the eye. */
@@ -328,7 +330,7 @@
     dispose() {
       this.media.removeEventListener("change", this.onMedia);
       this.canvas.removeEventListener("pointerdown", this.onDown);
-      this.canvas.removeEventListener("pointerup", this.onUp);
+      this.canvas.removeEventListener("click", this.onUp);
       this.controls.dispose();
       for (const craft of this.crafts.values()) craft.dispose();
       for (const { flown, asked } of this.tracks.values()) {

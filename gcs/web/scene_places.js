@@ -83,6 +83,7 @@
       this.fence = null;
       this.rally = [];
       this.goal = null;
+      this.arrowSize = 1;
       this.setTheme(theme);
     }
 
@@ -123,6 +124,7 @@
     /** Keeps the ground under what is looked at: `target` in the axes of the scene, `distance` of the eye. */
     spreadGround(target, distance) {
       const reach = 12 * distance + 15;
+      this.arrowSize = Math.min(Math.max(distance / 9, 0.25), 6); // as large to the eye from near and far
       this.ground.position.set(-target.z, target.x, 0);
       this.ground.scale.set(2 * reach, 2 * reach, 1);
       this.ground.material.uniforms.centre.value.set(target.x, target.z);
@@ -236,14 +238,16 @@
 
     point(wind, at, speed) {
       const along = new THREE.Vector3(wind[0], wind[1], 0).normalize();
-      const length = 0.25 + 0.18 * speed;
+      const size = this.arrowSize;
+      const length = size * (0.25 + 0.1 * Math.min(speed, 15));
       const start = new THREE.Vector3(at[0], at[1], -0.03);
       const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), along);
       this.shaft.quaternion.copy(turn);
       this.tip.quaternion.copy(turn);
-      this.shaft.scale.set(1, length, 1);
+      this.shaft.scale.set(size, length, size);
+      this.tip.scale.setScalar(size);
       this.shaft.position.copy(start).addScaledVector(along, length / 2);
-      this.tip.position.copy(start).addScaledVector(along, length + 0.1);
+      this.tip.position.copy(start).addScaledVector(along, length + 0.1 * size);
     }
 
     dispose() {

@@ -1,7 +1,7 @@
 """The live page of one `gcs fly`: a process of its own that is told what the ground station hears.
 
-The flight never waits for it. What a person asks on the page comes back as frames, and is said to the vehicle as
-a word of the ground station's own, where the two take turns at such a turn.
+The flight never waits for it. What a person asks on the page comes back as frames, and is said to the vehicle
+as a word of the ground station's own, in lockstep at its turn.
 """
 
 from __future__ import annotations

@@ -251,7 +251,5 @@ def _truth_socket() -> UdpSocket | None:
     try:
         return UdpSocket(LOOPBACK, TRUTH_PORT)
     except GcsError:
-        say(
-            f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes, not the truth"
-        )
+        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes")
         return None
