@@ -53,19 +53,29 @@
       const gap = document.createElement("span");
       gap.className = "gap";
       box.append(gap);
-      const spans = SPANS.map(([seconds, text]) => {
+      this.spans = SPANS.map(([seconds, text]) => {
         const button = document.createElement("button");
         button.textContent = text;
         button.style.setProperty("--signal", "var(--accent)");
         button.setAttribute("aria-pressed", seconds === this.span);
         button.addEventListener("click", () => {
-          this.span = seconds;
-          for (const other of spans) other.setAttribute("aria-pressed", other === button);
-          this.draw();
+          this.show(seconds);
         });
         return button;
       });
-      box.append(...spans);
+      box.append(...this.spans);
+    }
+
+    /** Shows the last so many seconds. */
+    show(seconds) {
+      this.span = seconds;
+      this.spans.forEach((button, index) => button.setAttribute("aria-pressed", SPANS[index][0] === seconds));
+      this.draw();
+    }
+
+    /** Shows the whole flight. */
+    showAll() {
+      this.show(Infinity);
     }
 
     /** Makes the strips of the signals that are picked. */

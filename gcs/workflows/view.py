@@ -180,7 +180,7 @@ async def _serve(
     def opened() -> list[dict[str, Any]]:
         controls = [slider.record() for slider in SLIDERS]
         hello = {"type": "hello", "controls": controls, "rotors": ROTORS}
-        return [hello, session.record, *station.greeting()]
+        return [hello, *station.greeting(), session.record]
 
     def count_changed(count: int) -> None:
         if feed is not None:
