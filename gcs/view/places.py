@@ -34,7 +34,7 @@ def fence_record(
                 zones.append({"kind": _POLYGONS[item.command], "polygon": corners})
                 corners = []
         elif item.command in _CIRCLES:
-            zone = {"kind": _CIRCLES[item.command], "centre": _spot(item, home), "radius": item.param1}
+            zone = {"kind": _CIRCLES[item.command], "centre": _spot(item, home), "radius": round(item.param1, 3)}
             zones.append(zone)
     radius = parameters.get("GF_MAX_HOR_DIST", 0.0)
     height = parameters.get("GF_MAX_VER_DIST", 0.0)

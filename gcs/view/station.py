@@ -155,6 +155,10 @@ class Station:
         states = [vehicle.state(now_us) for vehicle in self.vehicles.values()]
         return {"type": "state", "vehicles": states, "samples": fresh}
 
+    def forget_samples(self) -> None:
+        """No page is there to be told of what is new: one that opens is given all."""
+        self._fresh.clear()
+
     def news(self) -> list[dict[str, Any]]:
         """What is new since the last time; a record with "page" is for that page alone."""
         news = self._news

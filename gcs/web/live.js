@@ -97,6 +97,7 @@
   function addSamples(vehicle, samples) {
     for (const sample of samples) {
       const last = vehicle.samples[vehicle.samples.length - 1];
+      if (last && sample[AT.time] <= last[AT.time] && sample[AT.time] > last[AT.time] - 1) continue; // known already
       if (last && sample[AT.time] < last[AT.time]) { // the vehicle began anew
         vehicle.samples = [];
         if (scene) scene.clearTrack(vehicle.id);

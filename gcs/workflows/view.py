@@ -211,6 +211,7 @@ async def _serve(
                     server.tell_all(station.state(now_us))
                 else:
                     station.sample(now_us)
+                    station.forget_samples()
             if isinstance(links, FedLinks) and links.ended:
                 return
             try:
