@@ -81,6 +81,11 @@ def _go_to(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
         raise ActionError("place: must be [north, east, down]")
     named = dict(zip(("north", "east", "down"), place, strict=True))
     north, east, down = (_number(named, name, -_FARTHEST_M, _FARTHEST_M) for name in named)
+    places = zip(
+        (north, east, down), vehicle.offset, strict=True
+    )  # in the picture, and of the vehicle's home
+    north, east, down = (place - home for place, home in places)
+    # the change of axes is its own inverse
     latitude, longitude, _ = geodetic_from_enu(ned_from_enu((north, east, down)), vehicle.home)
     return [command.reposition(vehicle.target, latitude, longitude, -down)]
 

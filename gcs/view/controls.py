@@ -16,7 +16,7 @@ class Slider:
     low: float
     high: float
     step: float
-    default: float | None = None  # None: as the vehicle tells
+    default: float | None = None  # None: what the vehicle tells, and the ends are shares of it
 
     def record(self) -> dict[str, Any]:
         """For the page."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any
 
 from autopilot.wire.convert import Home
@@ -30,11 +31,15 @@ def fence_record(
     for item in items:
         if item.command in _POLYGONS:
             corners.append(_spot(item, home))
-            if len(corners) == round(item.param1):
+            if len(corners) == item.param1:
                 zones.append({"kind": _POLYGONS[item.command], "polygon": corners})
                 corners = []
-        elif item.command in _CIRCLES:
-            zone = {"kind": _CIRCLES[item.command], "centre": _spot(item, home), "radius": round(item.param1, 3)}
+        elif item.command in _CIRCLES and 0.0 < item.param1 < inf:
+            zone = {
+                "kind": _CIRCLES[item.command],
+                "centre": _spot(item, home),
+                "radius": round(item.param1, 3),
+            }
             zones.append(zone)
     radius = parameters.get("GF_MAX_HOR_DIST", 0.0)
     height = parameters.get("GF_MAX_VER_DIST", 0.0)

@@ -141,7 +141,9 @@ class Station:
 
     def sample(self, now_us: int) -> None:
         """Take a sample of each vehicle for which one is due."""
+        origin = next((vehicle.home for vehicle in self.vehicles.values()), None)
         for system, vehicle in self.vehicles.items():
+            vehicle.origin = origin  # all are shown in one picture
             time_us = vehicle.time_us
             history = self._histories[system]
             if time_us is not None and history.due(time_us * 1e-6):
@@ -292,7 +294,7 @@ class Station:
             or not operation.result.done
         ):
             return
-        home = vehicle.home
+        home = vehicle.origin or vehicle.home
         if operation.kind == mavlink.MAV_MISSION_TYPE_FENCE:
             vehicle.fence = fence_record(operation.items, home, vehicle.parameters)
         elif operation.kind == mavlink.MAV_MISSION_TYPE_RALLY:
@@ -308,7 +310,7 @@ def _first_questions(vehicle: WatchedVehicle) -> list[Operation]:
     """What we must know of a vehicle that was met."""
     target = vehicle.target
     streams = [command.message_interval(target, message, INTERVAL_US) for message in FAST_MESSAGES]
-    home = command.request_message(target, mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+    home = command.request_message(target, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     names = (*READ, *(slider.name for slider in SLIDERS))
     parameters = [ParameterGet(target, name) for name in names]
     return [*streams, home, *parameters]

@@ -9,6 +9,8 @@ from typing import Any
 
 from autopilot.wire.codec import Received
 from autopilot.wire.convert import Home
+from autopilot.wire.convert.axes import ned_from_enu
+from autopilot.wire.convert.geodesy import enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_encoding import from_the_wire
 from autopilot.wire.parameter_table import decimal_from_float32
@@ -29,6 +31,9 @@ class WatchedVehicle:
     def __init__(self, target: Target, connection: Connection) -> None:
         self.target = target
         self.connection = connection
+        self.origin: Home | None = None  # of the picture
+        self._home: Home | None = None
+        self._cable: float | None = None
         self.view = VehicleView()
         self.truth = Truth()
         self.link = LinkQuality()
@@ -45,6 +50,11 @@ class WatchedVehicle:
         if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.component != self.target.component:
             return
         self.link.heard(one, now_us)
+        if one.id == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN or (
+            one.id == mavlink.MAVLINK_MSG_ID_HOME_POSITION and self._home is None
+        ):
+            place = one.message
+            self._home = Home(place.latitude * 1e-7, place.longitude * 1e-7, place.altitude * 1e-3)
         self.view.update(one, now_us)
         if one.id == mavlink.MAVLINK_MSG_ID_LOAD_STATE:
             load = one.message
@@ -69,11 +79,16 @@ class WatchedVehicle:
 
     @property
     def home(self) -> Home:
-        """Where its places are counted from."""
-        message = self.view.latest.get("HOME_POSITION")
-        if message is None:
-            return Home()
-        return Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
+        """Where its places are counted from; a home that is set later does not move them."""
+        return self._home or Home()
+
+    @property
+    def offset(self) -> Place:
+        """Where that is in the picture, whose origin is `origin`, NED."""
+        if self.origin is None or self.home == self.origin:
+            return 0.0, 0.0, 0.0
+        spot = round(self.home.latitude_deg * 1e7), round(self.home.longitude_deg * 1e7)
+        return ned_from_enu(enu_from_geodetic(*spot, round(self.home.altitude_m * 1e3), self.origin))
 
     def layout(self) -> dict[str, float]:
         """Sizes in m: what the picture needs of the vehicle."""
@@ -85,12 +100,13 @@ class WatchedVehicle:
     def state(self, now_us: int) -> dict[str, Any]:
         """All that is known at this moment; what is not known is None. Places are NED in m, angles deg."""
         view = self.view
-        load, taut = self._load()
+        offset = self.offset
+        load, taut = self._load(offset)
         position, attitude = self._pose()
         rotors, force_max = self._rotors()
         return {
             "id": self.target.system,
-            "time": None if self.time_us is None else self.time_us * 1e-6,
+            "time": None if self.time_us is None else round(self.time_us * 1e-6, 4),
             "armed": view.armed,
             "ready": view.ready_to_arm,
             "mode": view.mode,
@@ -98,12 +114,13 @@ class WatchedVehicle:
             "mission": view.mission_state,
             "item": self._of("MISSION_CURRENT", "seq"),
             "items": self._of("MISSION_CURRENT", "total"),
-            "position": _places(position),
+            "position": _moved(position, offset),
             "attitude": _places(attitude, 5),
             "velocity": self._velocity(),
             "load": load,
             "taut": taut,
-            "asked": self._asked(),
+            "cable": round(self.cable, 3),
+            "asked": self._asked(offset),
             "error": _rounded(view.load_error_m),
             "tension": self._tension(),
             "swing": self._swing(),
@@ -123,18 +140,20 @@ class WatchedVehicle:
         true = self.truth.message(mavlink.MAVLINK_MSG_ID_LOAD_STATE)
         return true if true is not None else self.view.latest.get("LOAD_STATE")
 
-    def _load(self) -> tuple[dict[str, Any] | None, bool | None]:
+    def _load(self, offset: Place) -> tuple[dict[str, Any] | None, bool | None]:
         message = self._load_message()
         if message is None or not math.isfinite(message.x):
             return None, None
         taut = bool(message.taut)
-        longest = _LONGEST_SHOWN * max(self.layout()["cable"], self._cable_out())
-        attached = taut or not message.distance > longest
-        return {"position": _places((message.x, message.y, message.z)), "attached": attached}, taut
+        if taut and math.isfinite(message.distance):
+            self._cable = message.distance
+        attached = taut or not message.distance > _LONGEST_SHOWN * self.cable
+        return {"position": _moved((message.x, message.y, message.z), offset), "attached": attached}, taut
 
-    def _cable_out(self) -> float:
-        length = self._of("WINCH_STATUS", "line_length")
-        return length if length is not None and math.isfinite(length) else 0.0
+    @property
+    def cable(self) -> float:
+        """How long the cable was when it was taut last; a winch may have changed it since take-off."""
+        return self._cable or self.layout()["cable"]
 
     def _pose(self) -> tuple[Sequence[float] | None, Sequence[float] | None]:
         true = self.truth.pose(self.home)
@@ -158,11 +177,11 @@ class WatchedVehicle:
         message = self._load_message()
         return None if message is None else _rounded(math.hypot(message.vx, message.vy, message.vz), 3)
 
-    def _asked(self) -> list[float] | None:
+    def _asked(self, offset: Place) -> list[float] | None:
         message = self.view.latest.get("LOAD_SETPOINT")
         if message is None or message.phase in _NOT_CARRIED:
             return None
-        return _places((message.x, message.y, message.z))
+        return _moved((message.x, message.y, message.z), offset)
 
     def _tension(self) -> float | None:
         message = self._load_message()
@@ -181,8 +200,9 @@ class WatchedVehicle:
         if message is None:
             return None, None
         limited = math.isfinite(message.force_max) and message.force_max > 0.0
-        full = message.force_max if limited else max(sum(message.force), 1e-6)
-        shares = [round(force / full, 3) if math.isfinite(force) else 0.0 for force in message.force]
+        forces = [force if math.isfinite(force) else 0.0 for force in message.force]
+        full = message.force_max if limited else max(sum(forces), 1e-6)
+        shares = [round(force / full, 3) for force in forces]
         return shares, (_rounded(message.force_max, 3) if limited else None)
 
     def _estimator_error(self) -> float | None:
@@ -198,7 +218,11 @@ class WatchedVehicle:
         if true is not None:
             return true
         felt = self.view.latest.get("WIND_COV")
-        return None if felt is None else (felt.wind_x, felt.wind_y, felt.wind_z)
+        return None if felt is None or not self.view.armed else (felt.wind_x, felt.wind_y, felt.wind_z)
+
+
+def _moved(place: Sequence[float] | None, offset: Place) -> list[float] | None:
+    return None if place is None else _places([a + b for a, b in zip(place, offset, strict=True)])
 
 
 def _rounded(value: float | None, digits: int = 4) -> float | None:

@@ -119,7 +119,7 @@
   function showVehicles() {
     const box = byId("vehicles");
     box.hidden = page.vehicles.size < 2;
-    box.replaceChildren(...[...page.vehicles.keys()].map((id) => {
+    box.replaceChildren(...[...page.vehicles.keys()].sort((a, b) => a - b).map((id) => {
       const button = document.createElement("button");
       button.className = id === page.chosen ? "do main" : "do";
       button.textContent = `Vehicle ${id}`;
@@ -222,7 +222,7 @@
         shown.push({
           id: vehicle.id, position: state.position, attitude: state.attitude || [1, 0, 0, 0],
           rotors: state.armed ? state.rotors || [] : [], load: state.load, taut: state.taut, asked: state.asked,
-          layout: vehicle.layout, time: state.time });
+          layout: vehicle.layout, cableLength: state.cable, time: state.time });
       }
       if (shown.length) {
         const wind = chosen && chosen.state ? chosen.state.wind : null;

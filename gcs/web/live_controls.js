@@ -54,9 +54,10 @@
         const input = document.createElement("input");
         Object.assign(input, { type: "range", min: control.low, max: control.high, step: control.step, disabled: true });
         input.dataset.parameter = control.name;
+        if (control.default === null) input.dataset.relative = "yes";
         label.title = control.name;
         label.append(`${control.label} `, output, input);
-        const show = () => { output.textContent = `${Number(input.value)} ${control.unit}`; };
+        const show = () => { output.textContent = `${Number(Number(input.value).toFixed(3))} ${control.unit}`; };
         input.addEventListener("input", show);
         input.addEventListener("change", () => this.ask("set", { name: control.name, value: Number(input.value) }));
         byId("sliders").append(label);
@@ -81,6 +82,10 @@
         const value = parameters[name];
         input.disabled = value === undefined;
         if (value === undefined || document.activeElement === input && input.matches(":active")) continue;
+        if (input.dataset.relative) { // to what the vehicle has at first
+          Object.assign(input, { min: 0.2 * value, max: 2.5 * value, step: value / 20 });
+          delete input.dataset.relative;
+        }
         if (value > Number(input.max)) input.max = value;
         if (value < Number(input.min)) input.min = value;
         input.value = value;

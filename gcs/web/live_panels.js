@@ -1,6 +1,7 @@
 // What is known now, in words and numbers. Everything from a link is written as text, never as markup.
 "use strict";
 (() => {
+  const LEAST_WIND = 0.3; // m/s; an estimate is never quite still
   const MOST_TEXTS = 40;
   const SHOWN_TEXTS = 8;
   const WARNING = 4, ERROR = 3; // MAV_SEVERITY
@@ -131,7 +132,7 @@
     showWind(wind) {
       const box = byId("wind");
       const speed = wind ? Math.hypot(...wind) : 0;
-      box.hidden = speed < 0.05;
+      box.hidden = speed < LEAST_WIND;
       if (!box.hidden) put(box, `wind ${speed.toFixed(1)} m/s`);
     }
 

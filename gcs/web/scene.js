@@ -77,7 +77,8 @@
 
     /**
      * @param state {time (s), vehicles: [{id, position, attitude, rotors: [0 ... 1 of the limit],
-     *              load: {position, attached} or null, taut, asked: place or null}], wind: [N, E, D] m/s or null}
+     *              load: {position, attached} or null, taut, asked: place or null, cableLength and layout where they
+     *              are not those of the scene}], wind: [N, E, D] m/s or null}
      */
     show(state) {
       const told = new Set();

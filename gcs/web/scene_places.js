@@ -2,6 +2,7 @@
 "use strict";
 (() => {
   const WALL_M = 12; // of a fence that names no height
+  const LEAST_WIND = 0.3; // m/s; an estimate is never quite still
   const STREAKS = 46;
 
   function segments(points, colour, opacity) {
@@ -215,7 +216,7 @@
     /** Streaks that drift around `at`, and an arrow on the ground below it; `wind` in m/s or null. */
     showWind(wind, at, time) {
       const speed = wind ? Math.hypot(...wind) : 0;
-      this.windGroup.visible = speed > 0.05 && Boolean(at);
+      this.windGroup.visible = speed > LEAST_WIND && Boolean(at);
       if (!this.windGroup.visible) return;
       const dt = this.windTime === null ? 0 : Math.min(Math.max(time - this.windTime, 0), 0.1);
       this.windTime = time;
