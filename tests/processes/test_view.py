@@ -57,7 +57,9 @@ def page_of(program: Any) -> str:
 def test_a_flight_is_seen_and_led_by_hand(
     start: Callable[..., Any], browser: Browser, tmp_path: Path
 ) -> None:
-    flight = start("gcs", "fly", "square", "--view", "--speed", "2", "--out", str(tmp_path / "out"), "--quiet")
+    flight = start(
+        "gcs", "fly", "square", "--view", "--speed", "2", "--out", str(tmp_path / "out"), "--quiet"
+    )
     address = page_of(flight)
     browser.open(address)
     browser.wait(f"{FLYING} && {STATE}.load.position[2] < -0.5 && {STATE}.taut", 60.0)
