@@ -152,6 +152,14 @@ def open_address(address: Address) -> UdpSocket:
     return UdpSocket("0.0.0.0" if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
 
 
+def truth_socket() -> UdpSocket | None:
+    """Where a simulator that runs by itself tells what is true; None if another program listens there."""
+    try:
+        return UdpSocket(LOOPBACK, TRUTH_PORT)
+    except GcsError:
+        return None
+
+
 def wait(sockets: list[UdpSocket], timeout_s: float) -> None:
     """Until one of them has a datagram, or the time is over."""
     select.select(sockets, [], [], max(timeout_s, 0.0))

@@ -18,7 +18,16 @@ from gcs.clients.connection import Connection
 from gcs.errors import GcsError
 from gcs.shell.display import say
 from gcs.shell.feed import COMMAND, EVENT, TRUTH, FeedEnd, inherited
-from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, UdpSocket, monotonic_us, open_address, unix_us
+from gcs.shell.link import (
+    LOOPBACK,
+    TRUTH_PORT,
+    Address,
+    UdpSocket,
+    monotonic_us,
+    open_address,
+    truth_socket,
+    unix_us,
+)
 from gcs.shell.page_server import Pages, PageServer, Site
 from gcs.view.controls import ROTORS, SLIDERS
 from gcs.view.station import Station
@@ -63,7 +72,9 @@ class UdpLinks:
                 if not address.listen:
                     self._spoken.append(self._sockets[-1])
             if truth:
-                self._truth = _truth_socket()
+                self._truth = truth_socket()
+                if self._truth is None:
+                    say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes")
         except GcsError:
             self.close()
             raise
@@ -246,11 +257,3 @@ def open_browser(address: str) -> bool:
 
 def _texts() -> dict[str, bytes]:
     return {"": asset(LIVE_PAGE).encode(), **{name: asset(name).encode() for name in LIVE_FILES}}
-
-
-def _truth_socket() -> UdpSocket | None:
-    try:
-        return UdpSocket(LOOPBACK, TRUTH_PORT)
-    except GcsError:
-        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes")
-        return None
