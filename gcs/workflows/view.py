@@ -205,7 +205,7 @@ async def _serve(
         if feed is not None:
             feed.tell_event({"address": server.address})
         else:
-            _announce(server.address, options.opens)
+            _announce(server.address, options)
         next_state_s = loop.time()
         while not stopped.is_set():
             now_us = monotonic_us()
@@ -241,10 +241,17 @@ def _known(vehicle: str | None, settings: dict[str, float]) -> dict[str, float]:
     return {**known, "SIM_LOAD_MASS": sizes.load_mass_kg, **settings}
 
 
-def _announce(address: str, opens: bool) -> None:
+def _announce(address: str, options: ViewOptions) -> None:
     print(f"live page: {address}", flush=True)
-    if opens:
+    tell_if_open(options.host)
+    if options.opens:
         open_browser(address)
+
+
+def tell_if_open(host: str) -> None:
+    """Say so if others than this machine can reach the page."""
+    if host not in (LOOPBACK, "localhost", "::1"):
+        say("the page is served beyond this machine: whoever knows its whole address commands the vehicle")
 
 
 def open_browser(address: str) -> bool:
