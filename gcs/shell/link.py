@@ -84,15 +84,10 @@ class UdpSocket:
 
     def drain(self) -> list[bytes]:
         """All datagrams that are there, without waiting."""
-        datagrams: list[bytes] = []
-        while True:
-            try:
-                datagram, self._peer = self._socket.recvfrom(_DATAGRAM, socket.MSG_DONTWAIT)
-            except ConnectionError:  # the peer's port was closed when we last sent; it may come back
-                continue
-            except BlockingIOError:
-                return datagrams
-            datagrams.append(datagram)
+        found = self.drain_with_senders()
+        if found:
+            self._peer = found[-1][1]
+        return [datagram for datagram, _ in found]
 
     def drain_with_senders(self) -> list[tuple[bytes, tuple[str, int]]]:
         """As `drain`, each datagram with the address from which it came."""
@@ -131,11 +126,6 @@ class UdpSocket:
             return  # UDP: the protocols above ask again
         except OSError as error:
             raise GcsError(f"UDP to {peer[0]}:{peer[1]}: {error.strerror}") from None
-
-    @property
-    def peer(self) -> tuple[str, int] | None:
-        """Where `send` sends to."""
-        return self._peer
 
     def close(self) -> None:
         self._socket.close()
