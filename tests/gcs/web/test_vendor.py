@@ -1,4 +1,4 @@
-"""The libraries of others that pages carry: as their table says, under their licence, fit to stand within a page."""
+"""The libraries of others that pages carry: as their table says, licensed, fit to stand within a page."""
 
 from __future__ import annotations
 
