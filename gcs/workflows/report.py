@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.wire.tlog import dialect_log, is_of_dialect, read_tlog
+from autopilot.wire.tlog import read_tlog
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
 
@@ -43,9 +43,6 @@ def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, P
         raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
     if next(read_tlog(tlog), None) is None:
         raise GcsError(f"{tlog}: holds no telemetry; must be a .tlog, or a directory that holds {TLOG_FILE}")
-    beside = dialect_log(tlog)
-    if not beside.is_file() and not any(is_of_dialect(received.frame) for _, received in read_tlog(tlog)):
-        raise GcsError(f"{tlog}: says nothing of the load; {beside.name}, which does, must be beside it")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else tlog.with_suffix(""))
     return make_report(tlog, folder, None, quiet), folder
 
