@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from gcs.errors import GcsError
 
 DEFAULT_PORT = 14550
+API_PORT = 14540
+PAGE_PORT = 8090  # TCP, of the live page
 TRUTH_PORT = 14560  # where sitl sends what is true
 LOOPBACK = "127.0.0.1"
 _DATAGRAM = 65_535
@@ -82,15 +84,21 @@ class UdpSocket:
 
     def drain(self) -> list[bytes]:
         """All datagrams that are there, without waiting."""
-        datagrams: list[bytes] = []
+        found = self.drain_with_senders()
+        if found:
+            self._peer = found[-1][1]
+        return [datagram for datagram, _ in found]
+
+    def drain_with_senders(self) -> list[tuple[bytes, tuple[str, int]]]:
+        """As `drain`, each datagram with the address from which it came."""
+        found: list[tuple[bytes, tuple[str, int]]] = []
         while True:
             try:
-                datagram, self._peer = self._socket.recvfrom(_DATAGRAM, socket.MSG_DONTWAIT)
-            except ConnectionError:  # the peer's port was closed when we last sent; it may come back
+                found.append(self._socket.recvfrom(_DATAGRAM, socket.MSG_DONTWAIT))
+            except ConnectionError:
                 continue
             except BlockingIOError:
-                return datagrams
-            datagrams.append(datagram)
+                return found
 
     def wait(self, timeout_s: float) -> list[bytes]:
         """The next datagram, if one comes within the time; by one system call where `select` needs three."""
@@ -107,14 +115,17 @@ class UdpSocket:
 
     def send(self, datagram: bytes) -> None:
         """Send to the peer; nothing if there is none yet or it does not listen."""
-        if self._peer is None:
-            return
+        if self._peer is not None:
+            self.send_to(datagram, self._peer)
+
+    def send_to(self, datagram: bytes, peer: tuple[str, int]) -> None:
+        """Send to that address; nothing if nobody listens there."""
         try:
-            self._socket.sendto(datagram, socket.MSG_DONTWAIT, self._peer)
+            self._socket.sendto(datagram, socket.MSG_DONTWAIT, peer)
         except (ConnectionError, BlockingIOError):
             return  # UDP: the protocols above ask again
         except OSError as error:
-            raise GcsError(f"UDP to {self._peer[0]}:{self._peer[1]}: {error.strerror}") from None
+            raise GcsError(f"UDP to {peer[0]}:{peer[1]}: {error.strerror}") from None
 
     def close(self) -> None:
         self._socket.close()
@@ -129,6 +140,14 @@ def open_address(address: Address) -> UdpSocket:
     except OSError as error:
         raise GcsError(f"host {address.host!r}: {error.strerror or error}") from None
     return UdpSocket("0.0.0.0" if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
+
+
+def truth_socket() -> UdpSocket | None:
+    """Where a simulator that runs by itself tells what is true; None if another program listens there."""
+    try:
+        return UdpSocket(LOOPBACK, TRUTH_PORT)
+    except GcsError:
+        return None
 
 
 def wait(sockets: list[UdpSocket], timeout_s: float) -> None:

@@ -1,0 +1,60 @@
+"""gcs view"""
+
+from __future__ import annotations
+
+import click
+
+from gcs.commands.options import AddressType, page_options
+from gcs.shell.link import API_PORT, Address
+
+
+@click.command("view")
+@click.option(
+    "--connect",
+    "addresses",
+    type=AddressType(),
+    multiple=True,
+    default=(str(API_PORT),),
+    help="Where vehicles are met, as in the other commands; may be given again.  "
+    f"[default: {API_PORT}, which leaves 14550 to other ground stations]",
+)
+@page_options
+@click.option("--no-open", is_flag=True, help="Do not open the page in a browser.")
+@click.option(
+    "--no-truth",
+    is_flag=True,
+    help="Do not listen to the simulator (errors of the estimator, true places): another program wants to.",
+)
+@click.option("--feed", type=int, hidden=True, help="The descriptor at which gcs fly tells what it hears.")
+def view_command(
+    addresses: tuple[Address, ...],
+    port: int | None,
+    bind: str,
+    no_open: bool,
+    no_truth: bool,
+    feed: int | None,
+) -> None:
+    """Show running vehicles live in a browser.
+
+    A page on this machine shows vehicle, cable and load in 3-D with what is known of them, and commands
+    them. Its address is printed; whoever knows it may use the page. Several vehicles are told apart by their
+    system ids.
+
+    \b
+    gcs view
+    gcs view --connect 14550
+    gcs view --connect udpout:127.0.0.1:14555 --port 8095
+    """
+    from gcs.workflows.view import ViewOptions, serve_feed, view
+
+    options = ViewOptions(
+        connect=addresses,
+        host=bind,
+        port=port,
+        opens=not no_open,
+        truth=not no_truth,
+    )
+    if feed is not None:
+        serve_feed(feed, options)
+    else:
+        view(options)

@@ -1,0 +1,83 @@
+"""Fence, rally points and waypoints of a vehicle as the page draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import Any
+
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.axes import ned_from_enu
+from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem
+
+_POLYGONS = {
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: "inclusion",
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: "exclusion",
+}
+_PLACED = {
+    mavlink.MAV_CMD_NAV_TAKEOFF,
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LAND,
+}
+_HEIGHTS = {  # by frame: whether they are above home
+    mavlink.MAV_FRAME_GLOBAL: False,
+    mavlink.MAV_FRAME_GLOBAL_INT: False,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
+}
+_CIRCLES = {
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: "inclusion",
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: "exclusion",
+}
+
+
+def fence_record(
+    items: Sequence[WireItem], home: Home, parameters: Mapping[str, float]
+) -> dict[str, Any] | None:
+    """Zones, greatest distance and greatest height (m); None if there is no fence."""
+    zones: list[dict[str, Any]] = []
+    corners: list[list[float]] = []
+    for item in items:
+        if item.command in _POLYGONS:
+            corners.append(_spot(item, home))
+            if len(corners) == item.param1:
+                zones.append({"kind": _POLYGONS[item.command], "polygon": corners})
+                corners = []
+        elif item.command in _CIRCLES and 0.0 < item.param1 < inf:
+            zone = {
+                "kind": _CIRCLES[item.command],
+                "centre": _spot(item, home),
+                "radius": round(item.param1, 3),
+            }
+            zones.append(zone)
+    radius = parameters.get("GF_MAX_HOR_DIST", 0.0)
+    height = parameters.get("GF_MAX_VER_DIST", 0.0)
+    if not zones and radius <= 0.0 and height <= 0.0:
+        return None
+    return {"zones": zones, "radius": radius or None, "height": height or None}
+
+
+def rally_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
+    """Places on the ground: heights of rally points are not used."""
+    return [[*_spot(item, home), 0.0] for item in items if item.command == mavlink.MAV_CMD_NAV_RALLY_POINT]
+
+
+def waypoints_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
+    """The places that a mission names, one after the other; how it flies between them is not said here."""
+    places: list[list[float]] = [[0.0, 0.0, 0.0]]
+    for item in items:
+        if item.command not in _PLACED or item.frame not in _HEIGHTS or not -inf < item.z < inf:
+            continue
+        north, east = _spot(item, home) if item.x or item.y else places[-1][:2]
+        ground = 0.0 if _HEIGHTS[item.frame] else home.altitude_m
+        height = 0.0 if item.command == mavlink.MAV_CMD_NAV_LAND else item.z - ground
+        places.append([north, east, round(-height, 3)])
+    return places if len(places) > 1 else []
+
+
+def _spot(item: WireItem, home: Home) -> list[float]:
+    north, east, _ = ned_from_enu(enu_from_geodetic(round(item.x), round(item.y), 0, home))
+    return [round(north, 3), round(east, 3)]
