@@ -8,11 +8,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from functools import cache
+from typing import TYPE_CHECKING
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read as numpy is imported
 
 import pytest
 from hypothesis import settings
+
+if TYPE_CHECKING:
+    from tests.doubles.browser import Browser
 
 pytest.register_assert_rewrite("tests.doubles")
 
@@ -31,3 +35,14 @@ def shaped_once() -> Iterator[None]:
         patch.setattr(prepare, "shape", shape)
         patch.setattr(feasibility, "shape", shape)
         yield
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Headless Chromium; `open` a page in it."""
+    from tests.doubles import browser as browsers
+
+    if browsers.missing():
+        pytest.skip(browsers.missing())
+    with browsers.chromium(tmp_path_factory.mktemp("chromium")) as opened:
+        yield opened

@@ -1,0 +1,25 @@
+"""What the pages of Plumbline are made of: scripts and styles, ours and (in `vendor/`) those of others.
+
+All scripts are plain: a page may load them from a server or carry their text. Ours make one global,
+`Plumbline`.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+PLOT_SCRIPTS = ("vendor/uplot.min.js",)
+PLOT_STYLES = ("vendor/uplot.min.css",)
+SCENE_SCRIPTS = (  # in the order in which they are loaded
+    "vendor/three.min.js",
+    "scene_theme.js",
+    "scene_craft.js",
+    "scene_track.js",
+    "scene_places.js",
+    "scene.js",
+)
+
+
+def asset(name: str) -> str:
+    """The text of a file of this folder, e.g. "scene.js" or "vendor/three.min.js"."""
+    return files("gcs.web").joinpath(name).read_text(encoding="utf-8")
