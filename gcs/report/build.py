@@ -81,13 +81,16 @@ def build_report(
 
         from gcs.analysis.parquet import write_flight
         from gcs.report.html import render_page
+        from gcs.report.replay import replay_of
+        from gcs.report.settings import changed_settings
 
         # where the directory lies is no property of the flight
         about = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
         write_flight(out_dir / PARQUET_FILE, telemetry, samples, about)
         done(PARQUET_FILE)
+        replay = replay_of(telemetry, samples, meta)
         drawing.finish(lambda picture: done(picture.file))
-    page = render_page(record, meta, telemetry.texts, out_dir)
+    page = render_page(record, meta, replay, changed_settings(telemetry, meta), out_dir)
     (out_dir / PAGE_FILE).write_text(page, encoding="utf-8")
     done(PAGE_FILE)
     return record

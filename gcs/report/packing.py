@@ -1,6 +1,6 @@
 """Columns of numbers as short text for a page: whole steps, differences of differences, deflate, base64.
 
-`replay_data.js` is the other end. A flight at 125 Hz takes about a byte a number.
+`gcs/web/flight_data.js` is the other end. A flight at 125 Hz takes about a byte a number.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gcs.analysis.axes import Floats
 
 _MOST = float(2**30)  # steps from zero: whole numbers of 32 bits
+_BEYOND = 1e6  # such numbers are of a flight that is lost: none
 _LEVEL = 6
 
 
@@ -30,7 +31,8 @@ class Column(NamedTuple):
 def pack(columns: list[Column], count: int) -> dict[str, Any]:
     """JSON values: `count`, of each column its `name`, `step` and `gaps` ([first, last + 1] of each stretch
     of NaN), and `data`. Columns of NaN alone are left out."""
-    known = [column for column in columns if np.isfinite(column.values).any()]
+    meant = [column._replace(values=_meant(column.values)) for column in columns]
+    known = [column for column in meant if np.isfinite(column.values).any()]
     described, planes = [], []
     for name, values, least in known:
         finite = np.isfinite(values)
@@ -42,6 +44,10 @@ def pack(columns: list[Column], count: int) -> dict[str, Any]:
         planes.append(twice.astype("<i4").view(np.uint8).reshape(-1, 4).T.tobytes())
     squeezed = zlib.compress(b"".join(planes), _LEVEL, wbits=-zlib.MAX_WBITS)
     return {"count": count, "columns": described, "data": base64.b64encode(squeezed).decode("ascii")}
+
+
+def _meant(values: Floats) -> Floats:
+    return np.where(np.abs(values) < _BEYOND, values, np.nan)
 
 
 def _step(finite: Floats, least: float) -> float:

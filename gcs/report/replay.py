@@ -1,12 +1,11 @@
-"""What the page replays: the flight's samples and events as JSON values, for `replay.js`.
+"""What the page replays: the flight's samples and events as JSON values, for `flight_data.js`.
 
-World ENU from home, SI units; attitudes as the scene takes them, FRD in NED. Where the log is silent for longer than a
-report interpolates, a row without numbers stands in the gap, so that nothing is drawn across it.
+World ENU from home, SI units; attitudes as the scene takes them, FRD in NED. Where the log is silent for
+longer than a report interpolates, a row without numbers stands in the gap, so that nothing is drawn across.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -38,7 +37,7 @@ KINDS = {  # of phases: what the band behind a plot looks like
 }
 _USUAL = "bebop"  # drawn where nobody says which vehicle flew
 # steps to which numbers are rounded
-_PLACE_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S = 1e-6, 1e-4, 1e-5, 1e-3, 1e-6
+_PLACE_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S, _PSI = 1e-6, 1e-4, 1e-5, 1e-3, 1e-6, 1e-8
 
 Json = dict[str, Any]
 
@@ -75,12 +74,6 @@ def replay_of(telemetry: Telemetry, samples: Samples, meta: FlightMeta) -> Json:
     }
 
 
-def embedded(values: Json) -> str:
-    """JSON that is safe within a script element: no `<`, no character beyond ASCII."""
-    text = json.dumps(values, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
 def level_name(severity: int) -> str:
     """MAV_SEVERITY in words."""
     return LEVELS[severity] if 0 <= severity < len(LEVELS) else str(severity)
@@ -111,6 +104,7 @@ def layout_of(vehicle: str | None) -> Json:
         ],
         "arm": arm,
         "cable": flown.cable_length_m,
+        "load_radius": flown.load_radius_m,
         "rotor_max_n": flown.rotor_max_n if flown.limited else None,
     }
 
@@ -118,10 +112,11 @@ def layout_of(vehicle: str | None) -> Json:
 def worst_moment(samples: Samples) -> Json | None:
     """When the load was farthest from where it was asked to be, of what `load_error_max_m` counts over."""
     distance = np.where(samples.position_tracked, np.linalg.norm(samples.error_m, axis=1), np.nan)
-    if not np.isfinite(distance).any():
+    known = np.isfinite(distance)
+    if not known.any():
         return None
-    at = int(np.nanargmax(distance))
-    return {"time": float(samples.time_s[at]), "error_m": float(distance[at])}
+    at = int(np.argmax(np.where(known, distance, -1.0)))
+    return {"time": round(float(samples.time_s[at]), 6), "error_m": float(distance[at])}
 
 
 def _believed(telemetry: Telemetry) -> Telemetry:
@@ -179,8 +174,8 @@ def _columns(telemetry: Telemetry, samples: Samples) -> tuple[list[Column], int]
         Column("tension", np.where(samples.attached, truth.tension_n, np.nan), _FORCE_N),
         *_parts("rotor", "1234", as_of(rotors.time_s, rotors.force_n, t), _FORCE_N),
         *_parts("command", "1234", as_of(commanded.time_s, commanded.force_n, t), _FORCE_N),
-        Column("psi_R", linear(cascade.time_s, cascade.psi_R, t), _UNIT),
-        Column("psi_q", linear(cascade.time_s, cascade.psi_q, t), _UNIT),
+        Column("psi_R", linear(cascade.time_s, cascade.psi_R, t), _PSI),
+        Column("psi_q", linear(cascade.time_s, cascade.psi_q, t), _PSI),
         Column("taut", (truth.taut == 1).astype(np.float64), 1.0),
         Column("attached", samples.attached.astype(np.float64), 1.0),
         Column("scored", samples.position_tracked.astype(np.float64), 1.0),

@@ -41,18 +41,22 @@ def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
         found = located_steps(items, home)
     except MissionItemError:
         return [StepText(seq, seq, command_name(item.command)) for seq, item in enumerate(items)]
-    return [StepText(located.first, located.last, describe(located.step)) for located in found]
+    texts, alone = [], False
+    for first, last, step in found:
+        texts.append(StepText(first, last, describe(step, alone)))
+        alone = alone or isinstance(step, Release)
+    return texts
 
 
-def describe(step: Step) -> str:
-    """One step as a sentence without a full stop."""
+def describe(step: Step, alone: bool) -> str:
+    """One step as a sentence without a full stop; `alone`: the vehicle has let the load go."""
     match step:
         case Takeoff():
-            return f"Take off, lift the load to {_m(step.altitude_m)}"
+            return f"Take off{'' if alone else ', lift the load'} to {_m(step.altitude_m)}"
         case Waypoint():
             place = f"{_m(step.east_m)} east, {_m(step.north_m)} north, {_m(step.altitude_m)} up"
-            held = f", hold it for {step.hold_s:g} s" if step.hold_s > 0.0 else ""
-            return f"Carry the load to {place}{held}"
+            held = f", hold for {step.hold_s:g} s" if step.hold_s > 0.0 else ""
+            return f"{'Fly' if alone else 'Carry the load'} to {place}{held}"
         case Speed():
             return f"From here on at most {step.speed_m_s:g} m/s"
         case Delay():
@@ -60,7 +64,7 @@ def describe(step: Step) -> str:
         case ReturnHome():
             return "Return to home"
         case Land():
-            return "Set the load down and land"
+            return "Land" if alone else "Set the load down and land"
         case Release():
             return "Release the load"
         case Winch():
@@ -94,4 +98,4 @@ def _longer(length_m: float) -> str:
 
 
 def _m(value: float) -> str:
-    return f"{round(value, 3) + 0.0:g} m"
+    return f"{round(value, 2) + 0.0:g} m"

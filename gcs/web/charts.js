@@ -11,10 +11,11 @@
        group.setMarks(marks)       [{time, level}]: text messages; level "bad", "warn" or anything else
 
    chart = new Plumbline.Chart(element, {title, unit, series, time, bands, marks, sync, height, digits, least, zero})
-       series   [{name, values, dash: true|false, color: 0 ... 6 or "ink"|"faint", width}], values as `time`
+       series   [{name, values, dash: true|false, color: 0 ... 6 or "ink"|"faint", width, quiet}], values as `time`;
+                quiet: without a name and a value beside the title
        time     array of seconds, rising; NaN or null in values: a gap
        sync     a ChartGroup; without it the plot stands alone and bands and marks are its own
-       digits   decimals of the values beside the names
+       digits   decimals of the values beside the names; null: three digits, wherever the point is
        least    the vertical axis spans at least so much, so that rounding noise does not fill it
        zero     the vertical axis always shows zero
    chart.setData(time, [values, ...])   replaces everything
@@ -66,6 +67,9 @@
   const colour = (key) => (typeof key === "number" ? Theme.palette.lines[key % 7] : Theme.palette[key]);
   // uPlot knows gaps as null
   const gapped = (values) => Array.from(values, (v) => (v === null || Number.isNaN(v) ? null : v));
+
+  const plain = (value, digits) => (
+    digits === null ? String(Number(value.toPrecision(3))) : (Number(value.toFixed(digits)) + 0).toFixed(digits)); // no -0.00
 
   function element(kind, className, text) {
     const made = document.createElement(kind);
@@ -142,6 +146,7 @@
         key._swatch = element("i", one.dash ? "dashed" : "");
         key._value = element("output");
         key.append(key._swatch, element("span", "", one.name), key._value);
+        key.hidden = Boolean(one.quiet);
         key.addEventListener("click", () => this._toggle(i));
         this._head.append(key);
         return key;
@@ -214,7 +219,7 @@
         scales: { x: { time: false }, y: { range: (_, low, high) => this._range(low, high) } },
         axes: [
           Object.assign({}, axis, { size: 24, gap: 3, values: (_, ticks) => ticks.map((v) => `${+v.toFixed(3)} s`), space: 60 }),
-          Object.assign({}, axis, { size: 48, gap: 4, space: 26 }),
+          Object.assign({}, axis, { size: 48, gap: 4, space: 26, values: (_, ticks) => ticks.map((v) => String(Number(v.toPrecision(6)))) }),
         ],
         series: [{}, ...this._series.map((one, i) => ({
           stroke: colour(this._colourOf(i)), width: one.width || 1.5, dash: one.dash ? [5, 4] : undefined,
@@ -274,7 +279,7 @@
       const at = t === null || !time.length ? -1 : Plumbline.indexAt(time, t);
       this._keys.forEach((key, i) => {
         const value = at < 0 ? null : this._data[i + 1][at];
-        const text = value === null || value === undefined ? "–" : value.toFixed(this._options.digits);
+        const text = value === null || value === undefined ? "–" : plain(value, this._options.digits);
         if (key._value.textContent !== text) key._value.textContent = text;
       });
     }

@@ -65,8 +65,14 @@
       return vector && vector[0].map((_, i) => norm([vector[0][i], vector[1][i], vector[2][i]]));
     }
 
-    /** True load position minus the asked one; m. */
-    get error() { return this._error === undefined ? (this._error = this.difference("load", "asked")) : this._error; }
+    /** True load position minus the asked one; m. Not where the path leads into the ground, to find it: NaN. */
+    get error() {
+      if (this._error !== undefined) return this._error;
+      this._error = this.difference("load", "asked");
+      const height = this.column("asked_z"), least = this.layout.load_radius;
+      if (this._error) this._error = this._error.map((values) => values.map((v, i) => (height[i] < least ? NaN : v)));
+      return this._error;
+    }
 
     /** How far the load is from where the mission asks it to be; m. */
     get distance() {
@@ -134,11 +140,18 @@
           tension: attached ? this._between("tension", seen, 0) : NaN,
           swing: attached && taut ? Math.atan2(Math.hypot(cable[0], cable[1]), -cable[2]) * DEGREES : NaN,
           tilt: Math.acos(Math.min(Math.max(1 - 2 * (attitude[1] ** 2 + attitude[2] ** 2), -1), 1)) * DEGREES,
-          speed: norm(["x", "y", "z"].map((axis) => this._between(`velocity_${axis}`, seen, 0))),
+          speed: attached ? norm(["x", "y", "z"].map((axis) => this._between(`velocity_${axis}`, seen, 0))) : this._pace(seen),
           rotors: Math.max(...[1, 2, 3, 4].map((k) => this._between(`rotor_${k}`, seen, 0))) / this._most,
           attached, taut,
         },
       };
+    }
+
+    /** Speed of the vehicle, which flies alone; m/s. */
+    _pace(i) {
+      const before = Math.max(i - 1, 0), after = Math.min(i + 1, this.time.length - 1);
+      const way = ["x", "y", "z"].map((axis) => this.column(`vehicle_${axis}`)[after] - this.column(`vehicle_${axis}`)[before]);
+      return norm(way) / (this.time[after] - this.time[before]);
     }
 
     _flag(name, i) {
@@ -146,9 +159,31 @@
       return !values || values[i] !== 0;
     }
 
+    /** [{from, to}] of the stretches without telemetry. */
+    get gaps() {
+      const known = this.column("load_x"), found = [];
+      this.time.forEach((t, i) => {
+        if (!known || Number.isFinite(known[i]) || i === 0 || i + 1 >= this.time.length) return;
+        found.push({ from: this.time[i - 1], to: this.time[i + 1] });
+      });
+      return found;
+    }
+
+    /** Two places between which the vehicle was all the time, in NED. */
+    corners() {
+      const found = [[], []];
+      for (const [axis, sign] of [["y", 1], ["x", 1], ["z", -1]]) {
+        const values = Array.from(this.column(`vehicle_${axis}`) || []).filter(Number.isFinite);
+        found[0].push(sign * values.reduce((a, b) => Math.min(a, b), Infinity));
+        found[1].push(sign * values.reduce((a, b) => Math.max(a, b), -Infinity));
+      }
+      return found.flat().every(Number.isFinite) ? found : [];
+    }
+
     /** Where the load was carried, and the vehicle's way where it flew without: stretches that a line may join. */
     tracks() {
       const n = this.time.length, every = Math.max(1, Math.ceil(n / MOST_POINTS)), found = [];
+      const most = this.worst ? this.worst.error_m : Infinity; // a landing does not set the scale of the colours
       let open = null, kind = "";
       for (let i = 0; i < n; i++) {
         const attached = this._flag("attached", i);
@@ -160,7 +195,7 @@
         open.flown.push(...this._place(now, i, 0));
         const asked = this._place("asked", i, 0);
         if (asked) open.asked.push(...asked);
-        open.error.push(attached && this.distance ? this.distance[i] : NaN);
+        open.error.push(attached && this.distance ? Math.min(this.distance[i], most) : NaN);
       }
       return found.map(({ flown, asked, error }) => ({
         flown: new Float32Array(flown), asked: new Float32Array(asked), error: new Float32Array(error),

@@ -247,8 +247,8 @@
       this.lastFollowed = now;
     }
 
-    /** Brings all paths and vehicles into the picture. */
-    fit() {
+    /** Brings all paths and vehicles into the picture, and `also`: places that nothing is drawn at yet. */
+    fit(also = []) {
       const box = { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] };
       const take = (place) => place.forEach((value, axis) => {
         box.low[axis] = Math.min(box.low[axis], value);
@@ -263,6 +263,7 @@
         take(vehicle.position);
         if (vehicle.load && vehicle.load.position) take(vehicle.load.position);
       }
+      also.forEach(take);
       if (!Number.isFinite(box.low[0])) return;
       const centre = box.low.map((low, axis) => 0.5 * (low + box.high[axis]));
       const radius = 0.5 * Math.hypot(...box.low.map((low, axis) => box.high[axis] - low)) + this.layout.armLength;

@@ -129,7 +129,7 @@
       this.points = Array.from(points);
       this.errors = Array.from({ length: points.length / 3 }, (_, i) => (errors ? errors[i] : NaN));
       const most = this.errors.reduce((a, b) => (b > a ? b : a), 0);
-      this.full = most > 0 ? Plumbline.sceneTheme.niceAbove(most) : 0.1;
+      this.full = most > 0 ? Plumbline.sceneTheme.niceAbove(most) : 0.01;
       this.recolour();
     }
 

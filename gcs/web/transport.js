@@ -65,6 +65,7 @@
         row.append(jump);
       }
       host.append(line, row);
+      new ResizeObserver(() => this._nameBands(line)).observe(line);
       document.addEventListener("keydown", (event) => this._key(event));
       this._showPlaying();
     }
@@ -113,6 +114,14 @@
       made.title = band.name;
       if (band.kind !== "none") made.append(make("span", "", band.name));
       return made;
+    }
+
+    /** A name is shown where it fits. */
+    _nameBands(line) {
+      for (const name of line.querySelectorAll(".band span")) {
+        name.hidden = false;
+        name.hidden = name.offsetWidth > name.parentElement.clientWidth - 2;
+      }
     }
 
     _mark(mark) {
