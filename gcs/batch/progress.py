@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from rich.progress import ProgressColumn
 
 
+_FIRST_S = 2.0  # after which a person wonders
+
+
 class BatchDisplay(LiveBars):
     """A bar for all flights, and a line for each that runs and says where it is."""
 
@@ -38,15 +41,14 @@ class BatchDisplay(LiveBars):
         self._show(lambda: self._rows(running), plain, at_once=last)
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
-        from rich.progress import BarColumn, MofNCompleteColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, MofNCompleteColumn
 
-        bar = BarColumn(bar_width=32)
-        return (bar, MofNCompleteColumn(), "{task.description}", TimeRemainingColumn())
+        return (BarColumn(bar_width=32), MofNCompleteColumn(), "{task.description}")
 
     def _rows(self, running: Running) -> dict[str, Row]:
         rows: dict[str, Row] = {
             "": {
-                "description": self._figures(),
+                "description": f"{self._figures()}{self._remaining()}",
                 "completed": self._stored + self.flown,
                 "total": self._total,
             }
@@ -58,17 +60,21 @@ class BatchDisplay(LiveBars):
 
     def _figures(self) -> str:
         if not self.flown:
-            return "flights"
+            return "flights, the first are on their way" if self.elapsed_s > _FIRST_S else "flights"
         pace = self.flown / max(self.elapsed_s, 1e-3)
         return f"flights, {100.0 * self.completed / self.flown:.0f} % completed, {_pace(pace)}"
 
     def _line(self, running: Running) -> str:
         self._told = self.flown
-        left = self._total - self._stored - self.flown
-        minutes = left * self.elapsed_s / max(self.flown, 1) / 60.0
-        remaining = f", {minutes:.1f} min remaining" if left and self.flown else ""
         titles = f"; running: {'; '.join(title for title, _ in running)}" if running else ""
-        return f"{self._stored + self.flown} of {self._total} {self._figures()}{remaining}{titles}"
+        return f"{self._stored + self.flown} of {self._total} {self._figures()}{self._remaining()}{titles}"
+
+    def _remaining(self) -> str:
+        left = self._total - self._stored - self.flown
+        if not left or not self.flown:
+            return ""
+        minutes = left * self.elapsed_s / self.flown / 60.0
+        return f", {minutes:.1f} min remaining"
 
 
 def _pace(flights_per_s: float) -> str:

@@ -159,6 +159,6 @@ def fly_command(
         ),
         told,
     )
-    if not as_json:
+    if not (as_json or quiet):
         click.echo(f"report: {flight.out / 'report.html'}")
     return flight.exit_code

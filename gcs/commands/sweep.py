@@ -83,10 +83,10 @@ def sweep_command(
 ) -> int:
     """Fly a mission thousands of times under varied conditions.
 
-    The flights are those of gcs fly --lockstep, but for the wire, which is left out: some ten a second on
-    each core. Every parameter of the simulator and of the autopilot can be varied. The directory then holds
-    flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that was
-    stopped goes on when the same command is given again.
+    The flights are those of gcs fly --lockstep, but for the wire, which is left out: ten to twenty a second
+    on each core. Every parameter of the simulator and of the autopilot can be varied. The directory then
+    holds flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that
+    was stopped goes on when the same command is given again.
 
     \b
     gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5

@@ -18,6 +18,6 @@ def warmup_command(law: str, all_laws: bool, quiet: bool) -> None:
     The machine code is kept, for this version of the sources and this processor: later flights, and those of
     other checkouts of the same version, load it. gcs fly does the same when it has to.
     """
-    from gcs.workflows.warmup import warm_up
+    from gcs.workflows.warmup import flight_parts, warm_up
 
-    warm_up(LAWS if all_laws else (law,), quiet)
+    warm_up(flight_parts(LAWS if all_laws else (law,)), quiet)

@@ -90,22 +90,17 @@ def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, unit
             colour = LAW_COLOURS.get(flights.law, PURPLE)
             x = found.axes[0]
             left.plot(x, 100.0 * found.success, "o-", color=colour, markersize=4, label=flights.law)
-            right.plot(
-                x,
-                1e3 * found.error_median_m,
-                "o-",
-                color=colour,
-                markersize=4,
-                label=f"{flights.law}, median",
-            )
-            right.plot(x, 1e3 * found.error_worst_m, "--", color=colour, linewidth=1.0, label="worst")
+            right.plot(x, 1e3 * found.error_median_m, "o-", color=colour, markersize=4)
+            right.plot(x, 1e3 * found.error_worst_m, "--", color=colour, linewidth=1.0)
+        right.plot([], [], "o-", color=GREY, markersize=4, label="median")
+        right.plot([], [], "--", color=GREY, linewidth=1.0, label="worst")
         left.set_ylim(-4.0, 104.0)
         left.set_title("flights completed (%)")
         right.set_title("greatest load error (mm)")
         right.set_yscale("log")
         for ax in (left, right):
             ax.set_xlabel(_label(name, units))
-            key(ax, 2 * len(laws))
+            key(ax)
         figure.subplots_adjust(left=0.06, right=0.985, bottom=0.15, top=0.88, wspace=0.16)
         save(figure, path)
 

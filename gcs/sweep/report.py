@@ -74,6 +74,7 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
         for varied in plan.varied:
             parameter = _parameter(tables, varied.name)
             nominal, unit = parameter.default, parameter.unit
+            values = flights.values[varied.name]
             found = reach(flights, plan, varied.name, nominal)
             least, most = min(*varied.values, nominal), max(*varied.values, nominal)
             limits = (max(parameter.low, least), min(parameter.high, most))
@@ -85,7 +86,7 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
                     "nominal": f"{nominal:.4g}",
                     "every": _range(found.all_from, found.all_to),
                     "some": _range(found.some_from, found.some_to),
-                    "flown": _range(min(varied.values), max(varied.values)),
+                    "flown": _range(float(values.min()), float(values.max())),
                     "linear": linear_range(plan, flights.law, varied.name, nominal, limits),
                 }
             )

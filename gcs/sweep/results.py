@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -117,23 +118,30 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
 
 
 def reach(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> Reach:
-    """How far a parameter may go from `nominal` (or the value flown that is nearest to it)."""
+    """How far a parameter may go from `nominal` (or the value flown that is nearest to it).
+
+    What has not been flown yet holds nowhere: a value counts when all its flights were flown, a setting when
+    all its seeds were.
+    """
     centres = levels(plan, name)
-    level = _nearest(flights.values[name], centres)
-    rest = [other.name for other in plan.varied if other.name != name]
-    settings = (
-        np.stack([flights.values[other] for other in rest], axis=1) if rest else np.zeros((len(level), 1))
-    )
-    every = np.array(
-        [flights.completed[level == i].all() and (level == i).any() for i in range(len(centres))]
-    )
-    some = np.zeros(len(centres), dtype=np.bool_)
-    for i in range(len(centres)):
-        here = level == i
-        lost = {tuple(row) for row in settings[here & ~flights.completed].tolist()}
-        some[i] = any(tuple(row) not in lost for row in settings[here].tolist())
+    names = [varied.name for varied in plan.varied]
+    planned = np.array([case.varied for case in plan.cases() if case.law == flights.law])
+    flown = np.stack([flights.values[other] for other in names], axis=1)[flights.completed]
+    asked, good = (_settings(rows, names.index(name), centres) for rows in (planned, flown))
+    every = np.array([bool(a) and a == g for a, g in zip(asked, good, strict=True)])
+    some = np.array([any(g[rest] == n for rest, n in a.items()) for a, g in zip(asked, good, strict=True)])
     start = int(np.argmin(np.abs(centres - nominal)))
     return Reach(name, nominal, *_span(centres, every, start), *_span(centres, some, start))
+
+
+def _settings(values: Floats, column: int, centres: Floats) -> list[Counter[tuple[float, ...]]]:
+    """For each of the values `centres` of the parameter in `column`: the settings of all other parameters in
+    the rows of `values` that are next to it, and how often each occurs."""
+    found: list[Counter[tuple[float, ...]]] = [Counter() for _ in centres]
+    rest = np.delete(values, column, axis=1)
+    for level, setting in zip(_nearest(values[:, column], centres), rest.tolist(), strict=True):
+        found[level][tuple(setting)] += 1
+    return found
 
 
 def _span(centres: Floats, holds: NDArray[np.bool_], start: int) -> tuple[float, float]:

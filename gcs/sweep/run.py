@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from autopilot.shell.compiling import Part
 from gcs.batch.pool import PoolCrew
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running, fly_all
-from gcs.shell.display import say
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import PLAN_FILE, store_plan, sweep_origin
 from gcs.sweep.results import COMPLETED
@@ -47,8 +47,13 @@ def sweep(
     stopped: Callable[[], bool],
     quiet: bool,
     fresh: bool,
+    warm: Callable[[Iterable[Part]], None] = lambda _: None,
 ) -> Swept:
-    """Fly what is missing of the plan and store all of it; `stopped` says whether somebody asked to stop."""
+    """Fly what is missing of the plan and store all of it.
+
+    `stopped` says whether somebody asked to stop; `warm` compiles parts of the flight software beforehand,
+    which are otherwise compiled where they are first needed.
+    """
     store = Store(directory, plan)
     if fresh:
         store.clear()
@@ -58,7 +63,7 @@ def sweep(
     missing = [case for case in plan.cases() if case.index not in stored]
     whole, flown, wall_s = True, 0, 0.0
     if missing:
-        work = prepare(plan, (lambda _: None) if quiet else say)
+        work = prepare(plan, warm)
         with workers as (executor, count), BatchDisplay(len(stored), plan.flights, quiet) as display:
 
             def told(rows: Sequence[Row], running: Running) -> None:

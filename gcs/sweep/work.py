@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
 
 from autopilot.geometry.lane_numbers import LANES
-from autopilot.geometry.machine_code import is_ready, mark_ready
+from autopilot.shell.compiling import Part
 from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
 from gcs.sweep.flight import Boarding, Flown, SweptFlight, boarding, fly
 from gcs.sweep.group import FEWEST, Group, suits
 from gcs.sweep.plan import Case, PlanError, SweepPlan
 from gcs.sweep.store import Row, row_of
+from gcs.sweep.warmup import lanes_part, sweep_parts
 from missions.fileformat import load_mission
 from missions.model import Mission
 
@@ -34,12 +34,14 @@ class Work:
     in_lanes: frozenset[str] = frozenset()  # laws of which eight flights are flown at once
 
 
-def prepare(plan: SweepPlan, tell: Callable[[str], None]) -> Work:
-    """The work of a plan; flies the beginning of one flight for each law, which also compiles its kernels.
+def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None]) -> Work:
+    """The work of a plan; flies the beginning of one flight for each law.
 
-    The instants of arming and starting are those of the settings that all flights share. A vehicle that is
-    not ready at them, under what is varied, is asked again. `tell` is told what takes long.
+    `warm` compiles what is not compiled yet of some parts of the flight software. The instants of arming and
+    starting are those of the settings that all flights share. A vehicle that is not ready at them, under what
+    is varied, is asked again.
     """
+    warm(sweep_parts(plan.laws))
     mission = load_mission(plan.mission)
     cases = {law: Case(0, law, plan.seeds[0], ()) for law in plan.laws}
     bare = SweepPlan(plan.mission, plan.vehicle, plan.sensors, plan.laws, plan.seeds, (), plan.settings)
@@ -50,24 +52,11 @@ def prepare(plan: SweepPlan, tell: Callable[[str], None]) -> Work:
             boardings[law] = boarding(mission, conditions)
         except ValueError as error:
             raise PlanError(f"law {law}: {error}") from None
-        if _lanes_pay(plan, law):
-            flights = [
-                SweptFlight(cell_of(mission, conditions), seed, boardings[law]) for seed in range(FEWEST)
-            ]
-            if suits(flights[0]):
-                if not _lanes_ready(law):
-                    tell(f"compiling eight flights at once for the law {law}, once; it takes a minute or two")
-                Group(flights).compile()
-                mark_ready(_LANES, (law,))
-                in_lanes.add(law)
+        one = SweptFlight(cell_of(mission, conditions), case.seed, boardings[law])
+        if _lanes_pay(plan, law) and suits(one):
+            warm([lanes_part(law)])
+            in_lanes.add(law)
     return Work(plan, mission, boardings, frozenset(in_lanes))
-
-
-_LANES = Path(lane_kernel.__file__)
-
-
-def _lanes_ready(law: str) -> bool:
-    return is_ready(_LANES, (law,))
 
 
 def _lanes_pay(plan: SweepPlan, law: str) -> bool:
@@ -75,7 +64,7 @@ def _lanes_pay(plan: SweepPlan, law: str) -> bool:
     is not done yet."""
     compiled = hasattr(lane_kernel.fly_lanes, "overloads")
     enough = plan.points * len(plan.seeds) >= LANES_PAY
-    return compiled and len(plan.seeds) >= FEWEST and (enough or _lanes_ready(law))
+    return compiled and len(plan.seeds) >= FEWEST and (enough or lanes_part(law).ready)
 
 
 def fly_cases(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row]:

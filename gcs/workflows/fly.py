@@ -30,7 +30,7 @@ from gcs.workflows.mission_file import load
 from gcs.workflows.own_vehicle import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
 from gcs.workflows.report import TLOG_FILE, make_report
 from gcs.workflows.stopwatch import Stopwatch
-from gcs.workflows.warmup import warm_up
+from gcs.workflows.warmup import flight_parts, warm_up
 from missions.model import Mission
 from sitl.sensors.shipped import PROFILES
 
@@ -77,7 +77,7 @@ def fly(options: FlightOptions, told: Told) -> Flight:
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with _Folder(out, options.overwrite) as folder:
         if options.connect is None:
-            warm_up((options.law,), options.quiet)
+            warm_up(flight_parts((options.law,)), options.quiet)
         with StopRequest("stopping; Ctrl-C again abandons the report") as stop:
             watch = Stopwatch()
             tlog = out / TLOG_FILE

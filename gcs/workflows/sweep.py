@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from gcs.batch.pool import dask_cluster, own_processes
@@ -14,6 +15,7 @@ from gcs.sweep.plan import make_plan, read_varied
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.workflows.flight_options import setting_of
+from gcs.workflows.warmup import warm_up
 
 STOPPING = "stopping; completed flights are stored, run the same command again to continue"
 
@@ -83,7 +85,14 @@ def run_sweep(options: SweepOptions) -> Sweep:
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
     with StopRequest(STOPPING) as stop:
         done = sweep(
-            plan, directory, options.command, workers, lambda: bool(stop), options.quiet, options.fresh
+            plan,
+            directory,
+            options.command,
+            workers,
+            lambda: bool(stop),
+            options.quiet,
+            options.fresh,
+            partial(warm_up, quiet=options.quiet),
         )
         page = write_report(directory, plan)
     return Sweep(done, plan.flights, directory, page)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from autopilot.geometry.machine_code import ROOT
@@ -26,16 +26,15 @@ _CHECK = Part(
 _REPORT = Part("the report", "gcs.report.warm", (), ROOT / "gcs" / "report" / "style.py", "report", 3.0)
 
 
-def parts_left(laws: Sequence[str]) -> list[Part]:
-    """What is not compiled yet of what flights with these laws need, the longest first."""
+def flight_parts(laws: Sequence[str]) -> list[Part]:
+    """What `gcs fly` needs for flights with these laws."""
     parts = {part.mark: part for law in laws for part in autopilot_parts(law)}
-    left = [part for part in (*parts.values(), SIMULATOR, _CHECK, _REPORT) if not part.ready]
-    return sorted(left, key=lambda part: -part.cost_s)
+    return [*parts.values(), SIMULATOR, _CHECK, _REPORT]
 
 
-def warm_up(laws: Sequence[str], quiet: bool = False) -> None:
-    """Compile what is left to be compiled for flights with these laws."""
-    waiting = parts_left(laws)
+def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
+    """Compile what is left to be compiled of these parts, the longest first."""
+    waiting = sorted((part for part in parts if not part.ready), key=lambda part: -part.cost_s)
     if not waiting:
         return
     total = len(waiting)

@@ -9,8 +9,8 @@ import pytest
 from autopilot.shell.compiling import Part
 from gcs.errors import GcsError
 from gcs.shell.display import CompileDisplay
-from gcs.workflows import warmup
-from gcs.workflows.warmup import parts_left, warm_up
+from gcs.sweep.warmup import sweep_parts
+from gcs.workflows.warmup import flight_parts, warm_up
 
 SOURCE = Path(__file__)
 
@@ -27,25 +27,35 @@ def nothing_compiled(tmp_path, monkeypatch):
     monkeypatch.setattr("autopilot.geometry.machine_code.CHOSEN_BY_USER", "")
 
 
-def test_a_flight_needs_its_law_alone_and_the_longest_part_comes_first():
-    marks = [part.mark for part in parts_left(["lqr"])]
+def test_a_flight_needs_its_law_alone():
+    marks = [part.mark for part in flight_parts(["lqr"])]
     assert set(marks) == {"tick-lqr", "messages", "paths", "world", "check", "report"}
-    assert marks[0] == "tick-lqr"
-    both = [part.mark for part in parts_left(["lqr", "thesis"])]
+    both = [part.mark for part in flight_parts(["lqr", "thesis"])]
     assert sorted(both) == sorted({*marks, "tick-thesis"})
 
 
-def test_what_is_compiled_is_not_compiled_again():
-    for one in parts_left(["lqr"]):
-        one.done()
-    assert parts_left(["lqr"]) == []
-    assert {one.mark for one in parts_left(["thesis"])} == {"tick-thesis"}
+def test_a_sweep_needs_no_report_but_flights_of_its_own():
+    marks = [part.mark for part in sweep_parts(["lqr", "thesis"])]
+    fly = {"tick-lqr", "tick-thesis", "messages", "paths", "world"}
+    assert sorted(marks) == sorted({*fly, "alone-lqr", "alone-thesis"})
 
 
-def test_all_parts_run_and_are_marked(monkeypatch, tmp_path, capsys):
+def test_what_is_compiled_is_not_compiled_again_and_the_longest_part_comes_first(tmp_path):
+    marks = tmp_path / "compiled"
+    parts = [
+        part(name, f"open({str(marks)!r}, 'a').write('{name} ')", cost_s)
+        for name, cost_s in (("paths", 1.0), ("tick", 9.0), ("world", 3.0))
+    ]
+    parts[2].done()
+    warm_up(parts, quiet=True)
+    assert sorted(marks.read_text().split()) == ["paths", "tick"]
+    warm_up(parts, quiet=True)
+    assert len(marks.read_text().split()) == 2
+
+
+def test_all_parts_run_and_are_marked(tmp_path, capsys):
     parts = [part(name, f"open({str(tmp_path / name)!r}, 'w')") for name in ("first", "second", "third")]
-    monkeypatch.setattr(warmup, "parts_left", lambda laws: list(parts))
-    warm_up(("plumbline",))
+    warm_up(parts)
     assert all((tmp_path / name).exists() for name in ("first", "second", "third"))
     assert all(one.ready for one in parts)
     said = capsys.readouterr().err.splitlines()
@@ -53,18 +63,16 @@ def test_all_parts_run_and_are_marked(monkeypatch, tmp_path, capsys):
     assert said[1].endswith("3 of 3 parts remain")
 
 
-def test_nothing_is_said_where_nothing_is_to_be_done(monkeypatch, capsys):
-    monkeypatch.setattr(warmup, "parts_left", lambda laws: [])
-    warm_up(("plumbline",))
+def test_nothing_is_said_where_nothing_is_to_be_done(capsys):
+    warm_up([])
     assert capsys.readouterr().err == ""
 
 
-def test_a_part_that_fails_is_told_with_its_last_words_and_not_marked(monkeypatch, tmp_path):
+def test_a_part_that_fails_is_told_with_its_last_words_and_not_marked():
     good = part("good", "pass")
     bad = part("bad", "raise SystemExit('no compiler')")
-    monkeypatch.setattr(warmup, "parts_left", lambda laws: [bad, good])
     with pytest.raises(GcsError, match=r"the bad cannot be compiled: .*no compiler"):
-        warm_up(("plumbline",), quiet=True)
+        warm_up([bad, good], quiet=True)
     assert not bad.ready
 
 

@@ -53,6 +53,11 @@ def test_losses_on_the_ground_link_do_not_lose_the_flight(gcs: Gcs, tmp_path: Pa
     assert json.loads(flown.stdout)["outcome"] == "completed"
 
 
+def test_a_quiet_flight_says_one_line(gcs: Gcs, tmp_path: Path) -> None:
+    flown = gcs("fly", "hover", "--sensors", "ideal", "--out", str(tmp_path / "out"), "--quiet")
+    assert (flown.returncode, flown.stdout, flown.stderr) == (0, "", "gcs: hover: completed\n")
+
+
 def test_rates_that_do_not_divide_are_refused_with_both_numbers(gcs: Gcs, tmp_path: Path) -> None:
     flown = gcs("fly", "hover", "--set", "CTL_RATE_HZ=400", "--out", str(tmp_path / "out"), "--quiet")
     assert flown.returncode == 1

@@ -105,6 +105,13 @@ def test_a_mission_without_end_goes_on_until_it_is_told_otherwise() -> None:
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
 
 
+def test_arming_an_armed_vehicle_is_accepted_and_changes_nothing() -> None:
+    sky = Sky().airborne()
+    before = sky.flight
+    assert sky.ask(Arm(True, False)).result == ACCEPTED
+    assert sky.flight == before
+
+
 def test_a_mission_that_ends_with_a_return_lands() -> None:
     sky = start(Takeoff(2.0), Waypoint(1.0, 0.0, 2.0), model.ReturnHome())
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)

@@ -54,10 +54,8 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
             return flight, denied("Disarming denied: in the air")
         after = happen(flight, Event.DISARM, view, settings)
         return (after, ACCEPTED) if after else (flight, denied("Disarming denied"))
-    if flight.phase == Phase.ARMED:
-        return flight, ACCEPTED
     if flight.phase != Phase.DISARMED:
-        return flight, denied("Arming denied: in the air")
+        return flight, ACCEPTED  # it is armed, as PX4 and ArduPilot answer who asks again
     complaints = arming_complaints(flight, view, settings)
     if complaints and not request.force:
         return flight, denied(f"Arming denied: {complaints[0]}")

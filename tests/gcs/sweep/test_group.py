@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -10,6 +10,7 @@ from itertools import count
 import pytest
 from numba.core import config
 
+from autopilot.shell.compiling import Part
 from gcs.closed_loop import Conditions
 from gcs.sweep import work
 from gcs.sweep.cell import cell_of
@@ -23,6 +24,10 @@ pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="lanes are mach
 
 PLUMBLINE = 2.0  # the two other laws are flown in lanes by benchmarks/yardstick.py
 EIGHT = range(1, 9)
+
+
+def as_needed(_: Iterable[Part]) -> None:
+    """Compile nothing beforehand."""
 
 
 def both_ways(
@@ -98,8 +103,7 @@ def test_a_sweep_finds_the_same_with_lanes_and_without(short: str) -> None:
     """Five seeds of two settings, of which one loses readings."""
     lost = Varied("SIM_DROP_PCT", (0.0, 5.0), False)
     plan = SweepPlan(short, "bebop", "lab", ("plumbline",), (1, 2, 3, 4, 5), (lost,), ())
-    said: list[str] = []
-    prepared = work.prepare(plan, said.append)
+    prepared = work.prepare(plan, as_needed)
     cases, clock = list(plan.cases()), partial(next, count(1.0))
     without = fly_cases(replace(prepared, in_lanes=frozenset()), cases, clock)
     lanes: Work = replace(prepared, in_lanes=frozenset({"plumbline"}))
@@ -112,16 +116,18 @@ def test_lanes_are_compiled_where_many_flights_differ_by_their_seeds(
     short: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = SweepPlan(short, "bebop", "lab", ("plumbline",), tuple(range(1, 21)), (), ())
-    marks: set[str] = set()
-    monkeypatch.setattr(work, "is_ready", lambda _, parts: set(parts) <= marks)
-    monkeypatch.setattr(work, "mark_ready", lambda _, parts: marks.update(parts))
-    said: list[str] = []
-    assert work.prepare(plan, said.append).in_lanes == frozenset() and not said
+    compiled: list[str] = []
+
+    def warm(parts: Iterable[Part]) -> None:
+        compiled.extend(part.mark for part in parts)
+
+    monkeypatch.setattr(Part, "ready", property(lambda part: part.mark in compiled))
+    assert work.prepare(plan, warm).in_lanes == frozenset()
+    assert "alone-plumbline" in compiled and "lanes-plumbline" not in compiled
     monkeypatch.setattr(work, "LANES_PAY", 20)
-    assert work.prepare(plan, said.append).in_lanes == {"plumbline"}
-    assert len(said) == 1 and "plumbline" in said[0]
+    assert work.prepare(plan, warm).in_lanes == {"plumbline"}
+    assert compiled.count("lanes-plumbline") == 1
     # from then on fewer flights suffice, of which there are seeds enough
     monkeypatch.setattr(work, "LANES_PAY", 1000)
-    assert work.prepare(plan, said.append).in_lanes == {"plumbline"}
-    assert work.prepare(replace(plan, seeds=(1, 2)), said.append).in_lanes == frozenset()
-    assert len(said) == 1
+    assert work.prepare(plan, warm).in_lanes == {"plumbline"}
+    assert work.prepare(replace(plan, seeds=(1, 2)), warm).in_lanes == frozenset()

@@ -16,7 +16,7 @@ from gcs.batch import pool
 from gcs.cli import gcs
 from gcs.sweep import run
 from gcs.sweep.plan import SweepPlan
-from gcs.sweep.plan_file import load_plan
+from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, flights_of, reach
 from gcs.sweep.store import Store, columns
@@ -115,6 +115,24 @@ def test_shares_and_reach(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
     assert found.error_worst_m[2] != found.error_worst_m[2]
     reached = reach(flights, plan, "SIM_ACT_DELAY_MS", 0.0)
     assert (reached.all_from, reached.all_to) == (reached.some_from, reached.some_to) == (0.0, 4.0)
+
+
+def test_no_range_is_claimed_of_what_was_not_flown(
+    whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path
+) -> None:
+    """Stopped after the first of two seeds at 4 ms, with nothing flown at 60 ms."""
+    plan, complete, _ = whole
+    rows = pq.read_table(complete / "flights.parquet").to_pylist()
+    store = Store(tmp_path, plan)
+    store.add(rows[:3])
+    store.merge()
+    (flights,) = flights_of(store.read(), plan)
+    reached = reach(flights, plan, "SIM_ACT_DELAY_MS", 0.0)
+    assert (reached.all_from, reached.all_to) == (reached.some_from, reached.some_to) == (0.0, 0.0)
+    store_plan(tmp_path, plan, "gcs sweep", sweep_origin(plan))
+    page = write_report(tmp_path, plan).read_text(encoding="utf-8")
+    assert "Not finished: 6 are planned." in page
+    assert "<td>0 … 4</td><td>0</td><td>0</td>" in page, "flown, all complete, all seeds complete"
 
 
 def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:

@@ -1,0 +1,470 @@
+"""Hostile datagrams by the million: nothing that a stranger says changes a bit of a flight, or of what is
+stored.
+
+    python benchmarks/hostile.py --in-process 10000000
+    python benchmarks/hostile.py --sockets 1000000
+
+In process a mission is flown twice in step, once in peace and once under fire, and the two worlds are
+compared bit by bit at every tick: first by a vehicle with a signing key, to which everything is said that is
+not signed with it (commands, uploads, parameters, replayed frames of the true ground station), then by one
+without a key, to which everything is said that is no message, is not for it, or asks for what is refused; and
+requests for files that leave their root, or make no sense. Over sockets the real programs fly, on every port
+of theirs, and are killed and started again at the end. What fails is an assertion.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import random
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.snapshot import Options
+from autopilot.services.files import MemoryCard
+from autopilot.services.ftp import Op, Packet, payload_of
+from autopilot.services.identity import identity_of
+from autopilot.services.mission_store import StoredMission
+from autopilot.services.records import TimesyncAnswered
+from autopilot.supervisor.state import Phase
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.items import encode_mission
+from autopilot.wire.signing import Signing, timestamp_of
+from gcs.closed_loop import Conditions, build_simulator
+from missions.fileformat import load_mission
+
+HOME = Home()
+KEY, OTHER_KEY = bytes(range(1, 33)), bytes(range(2, 34))
+LINKS = ("gcs", "api", "stranger", "noise")
+MISSION = "delivery"  # waypoints, a release, and a flight home
+TICKS = 50_000  # over which the datagrams are spread
+RATE = 20_000  # of datagrams over sockets, a second
+ORDERS = {  # of the true ground station, by tick
+    250: m.MAVLink_command_long_message(1, 1, m.MAV_CMD_MISSION_START, 0, *((0.0,) * 7)),
+    260: m.MAVLink_command_long_message(1, 1, m.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *((0.0,) * 6)),
+}
+Make = Callable[[random.Random], bytes]
+
+
+# ---- what strangers say
+
+
+def any_bytes(rng: random.Random) -> bytes:
+    """Random, or one byte again and again, most often a magic one."""
+    if rng.random() < 0.5:
+        return rng.randbytes(rng.randrange(60))
+    return bytes((rng.choice((0xFE, 0xFD, 0, 0xFF)),)) * rng.randrange(1, 300)
+
+
+def _random_message(rng: random.Random, kind: Any, system: int) -> Any:
+    """A message with random numbers, to this system if it is to any."""
+    values = list(kind.unpacker.unpack(rng.randbytes(kind.unpacker.size)))
+    fields: dict[str, Any] = {}
+    for name, length in zip(kind.ordered_fieldnames, kind.array_lengths, strict=True):
+        text = kind.fieldtypes[kind.fieldnames.index(name)] == "char"
+        several = length > 0 and not text
+        fields[name] = [values.pop(0) for _ in range(length)] if several else values.pop(0)
+    for name in {"target_system", "target"} & fields.keys():
+        fields[name] = system
+    if "target_component" in fields:
+        fields["target_component"] = 1
+    return kind(**fields)
+
+
+def random_frames(rng: random.Random, count: int, system: int) -> list[bytes]:
+    """Whole frames of messages of every kind of the dialect, with random numbers."""
+    writer, kinds = FrameWriter(255, 190), list(m.mavlink_map.values())
+    return [writer.frame(_random_message(rng, rng.choice(kinds), system)) for _ in range(count)]
+
+
+def tempting_frames(rng: random.Random, count: int, key: bytes | None = None) -> list[bytes]:
+    """Whole frames of commands, parameters and uploads that would do harm, signed with a key or not."""
+    writer = FrameWriter(255, 190)
+    sign = None if key is None else Signing(key, 10**13).signer(1)
+    return [writer.frame(message, sign) for _ in range(count // 8) for message in _tempting(rng)]
+
+
+def _tempting(rng: random.Random) -> Iterator[Any]:
+    """What would do harm."""
+    yield m.MAVLink_command_long_message(
+        1, 1, rng.choice((400, 176, 20, 21, 22, 185, 246, 245, 179, 300, 211, 420, 42600)), 0,
+        *(rng.choice((0.0, 1.0, 2.0, 21196.0, float("nan"), float("inf"), -1e9)) for _ in range(7)),
+    )  # fmt: skip
+    name = rng.choice((b"SIM_LOSS_PCT", b"MIS_SPEED", b"CTL_LAW", b"VEH_LOAD_MASS", b"MAV_SYS_ID"))
+    yield m.MAVLink_param_set_message(1, 1, name, rng.choice((0.0, 1.0, 100.0)), 9)
+    yield m.MAVLink_mission_clear_all_message(1, 1, rng.choice((0, 1, 2, 255)))
+    yield m.MAVLink_mission_count_message(1, 1, rng.randrange(4), rng.choice((0, 1, 2)))
+    yield m.MAVLink_set_mode_message(1, rng.randrange(256), rng.getrandbits(32))
+    yield m.MAVLink_setup_signing_message(1, 1, list(rng.randbytes(32)), rng.getrandbits(48))
+    yield m.MAVLink_manual_control_message(1, 1000, -1000, 1000, -1000, 0xFFFF)
+    yield m.MAVLink_mission_set_current_message(1, 1, rng.randrange(9))
+
+
+def refused(rng: random.Random) -> Iterator[Any]:
+    """Requests that a vehicle without a key hears and must refuse."""
+    odd = rng.choice((float("nan"), float("inf"), -float("inf"), 1e30))
+    yield m.MAVLink_param_set_message(1, 1, rng.choice((b"MIS_SPEED", b"NO_SUCH", b"\xff\xfe", b"")), odd, 9)
+    yield m.MAVLink_command_long_message(1, 1, rng.choice((31999, 65535)), 0, *((odd,) * 7))
+    yield m.MAVLink_mission_item_int_message(1, 1, 0, 3, 16, 0, 1, odd, odd, odd, odd, 1, 1, odd, 0)
+    yield m.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0xDC7, odd, odd, odd, *((0.0,) * 8))
+    yield m.MAVLink_set_attitude_target_message(0, 1, 1, 0, [odd] * 4, odd, odd, odd, odd)
+    yield m.MAVLink_log_request_data_message(1, 1, rng.randrange(9), rng.getrandbits(32), rng.getrandbits(32))
+
+
+def file_request(rng: random.Random) -> Any:
+    """A FILE_TRANSFER_PROTOCOL request of any operation, mostly on paths that are not, or must not be."""
+    name = rng.choice(
+        (b"../../etc/passwd", b"/..", b"a/" * 100, b"\0", b"\xff" * 200, b"@MISSION/mission.json", b"", b"/",
+         b"log", b"x" * 239, b"a", b"a/b", b"a\0b", b"@SYS/../a", b"@PARAM/param.pck", rng.randbytes(20))
+    )  # fmt: skip
+    packet = Packet(
+        rng.getrandbits(16), rng.randrange(4), rng.choice((*Op, rng.randrange(256))), len(name), 0, 0,
+        rng.choice((0, 1, 2**31, 2**32 - 1)), name,
+    )  # fmt: skip
+    payload = payload_of(packet)
+    if rng.random() < 0.2:  # a size that its data do not have
+        payload = payload[:4] + bytes((rng.randrange(256),)) + payload[5:]
+    return m.MAVLink_file_transfer_protocol_message(0, 1, 1, list(payload))
+
+
+def broken(rng: random.Random, frames: list[bytes]) -> bytes:
+    """A frame with a flipped bit, or cut, or with a piece of another behind it; no message any more."""
+    while True:
+        frame = bytearray(rng.choice(frames))
+        if rng.random() < 0.3:
+            return bytes(frame[: rng.randrange(1, len(frame))])
+        if rng.random() < 0.2:
+            frame += rng.choice(frames)[: rng.randrange(1, 20)]
+        frame[rng.randrange(1, len(frame))] ^= 1 << rng.randrange(8)
+        found = bytes(frame)
+        if not decode(found)[0]:  # of 65,536 changed headers one fits the checksum
+            return found
+
+
+def one_of(frames: list[bytes]) -> Make:
+    """One of these."""
+    return lambda rng: rng.choice(frames)
+
+
+def for_a_vehicle_with_a_key(rng: random.Random) -> dict[str, Make]:
+    """All that is not signed with its key."""
+    forged = tempting_frames(rng, 8000)
+    whole = [*random_frames(rng, 20_000, 1), *forged]
+    writer = FrameWriter(255, 190)
+    return {
+        "bytes": any_bytes,
+        "unsigned messages": one_of(whole),
+        "forged commands": one_of(forged),
+        "signed with another key": one_of(tempting_frames(rng, 8000, OTHER_KEY)),
+        "broken": lambda rng: broken(rng, whole),
+        "requests for files": lambda rng: writer.frame(file_request(rng)),
+    }
+
+
+def for_a_vehicle_without(rng: random.Random) -> dict[str, Make]:
+    """All that is no message, not for it, or to be refused; and requests for files."""
+    whole = [*random_frames(rng, 20_000, 1), *tempting_frames(rng, 8000)]
+    writer = FrameWriter(255, 190)
+    return {
+        "bytes": any_bytes,
+        "broken": lambda rng: broken(rng, whole),
+        "for another vehicle": one_of(random_frames(rng, 20_000, 9)),
+        "to be refused": one_of([writer.frame(x) for _ in range(2000) for x in refused(rng)]),
+        "requests for files": lambda rng: writer.frame(file_request(rng)),
+    }
+
+
+# ---- in process
+
+
+class Twin:
+    """An autopilot in its world."""
+
+    def __init__(self, key: bytes | None) -> None:
+        table = autopilot_parameters(load_vehicle("bebop"))
+        table.freeze()
+        mission = StoredMission(tuple(encode_mission(load_mission(MISSION), HOME)))
+        self.card = MemoryCard()
+        signing = None if key is None else Signing(key)
+        self.onboard = Onboard(table, identity_of(table), Options(HOME, 0), mission, self.card, signing)
+        self.simulator = build_simulator(Conditions(), HOME)
+        self.onboard.add_link("gcs")
+        self.onboard.add_link("api")
+        self.writer = FrameWriter(255, 190)
+        self.sign = None if key is None else Signing(key, 10**12).signer(0)
+        self.said: list[bytes] = []
+        self.texts: list[str] = []
+
+    def say(self, message: Any) -> None:
+        """A word of the true ground station."""
+        frame = self.writer.frame(message, self.sign)
+        self.said.append(frame)
+        self.onboard.receive_ground(frame, "gcs")
+
+    def tick(self) -> None:
+        answer = self.onboard.receive_sensors(self.simulator.sensor_datagram())
+        assert answer is not None
+        for _, datagram in self.onboard.ground_datagrams():
+            if b"Internal error" in datagram:
+                raise AssertionError(datagram)
+        self.simulator.receive(answer)
+        self.simulator.advance()
+
+    @property
+    def kept(self) -> Any:
+        """What outlives the flight."""
+        endpoint = self.onboard.endpoint
+        return repr((endpoint.mission, endpoint.areas, self.onboard.parameters.values()))
+
+
+def fly_under_fire(name: str, key: bytes | None, hostile: dict[str, Make], count: int, each: int) -> None:
+    """Missions in peace and under fire, tick by tick, `each` datagrams a tick, until so many have come."""
+    rng = random.Random(count)
+    kinds, phases = Counter[str](), Counter[str]()
+    spent_s = 0.0
+    while kinds.total() < count:
+        peace, fire = Twin(key), Twin(key)
+        makers = list(hostile.items())
+        if key is not None:
+            makers.append(("replayed", lambda rng, said=fire.said: rng.choice(said) if said else b""))
+        flown = False
+        while kinds.total() < count and not (flown and peace.onboard.phase == Phase.DISARMED):
+            for twin in (peace, fire):
+                if twin.onboard.tick in ORDERS:
+                    twin.say(ORDERS[twin.onboard.tick])
+            for _ in range(each):
+                kind, make = rng.choice(makers)
+                datagram, link = make(rng), rng.choice(LINKS)
+                began = time.perf_counter()
+                events = fire.onboard.receive_ground(datagram, link)
+                spent_s += time.perf_counter() - began
+                events = [event for event in events if not isinstance(event, TimesyncAnswered)]
+                assert not events, (kind, datagram.hex(), events)
+                kinds[kind] += 1
+            phases[fire.onboard.phase.name.lower()] += each
+            peace.tick()
+            fire.tick()
+            worlds = [twin.simulator.core.rows.world for twin in (peace, fire)]
+            assert np.array_equal(*worlds, equal_nan=True), (
+                f"the flights part at tick {fire.onboard.tick}: {peace.onboard.phase}, {fire.onboard.phase}"
+            )
+            flown = flown or peace.onboard.phase == Phase.MISSION
+        assert fire.kept == peace.kept
+    print(f"{name}: {kinds.total()} datagrams, {1e6 * spent_s / kinds.total():.1f} us each; nothing changed")
+    for counts in (kinds, phases):
+        print("  " + ", ".join(f"{word} {n}" for word, n in counts.most_common()))
+
+
+# ---- over sockets
+
+
+def ports_of(pid: int) -> list[int]:
+    """The UDP ports that a process has open."""
+    inodes = set()
+    for link in Path(f"/proc/{pid}/fd").iterdir():
+        with suppress(OSError):
+            inodes.update(re.findall(r"socket:\[(\d+)\]", str(link.readlink())))
+    rows = [line.split() for line in Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]]
+    return [int(row[1].split(":")[1], 16) for row in rows if row[9] in inodes]
+
+
+def processor_s(pid: int) -> float:
+    """Processor time that a process has used, its own threads included."""
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def fire_at(ports: list[int], tcp: int, count: int, seed: int, done: Any) -> None:
+    """Send so many datagrams to these ports of this machine, a tenth of them by TCP; `done` counts them."""
+    rng = random.Random(seed)
+    makers = list(for_a_vehicle_with_a_key(rng).values())
+    sensors = [
+        FrameWriter(1, 200).frame(message)
+        for kind in (m.MAVLink_hil_sensor_message, m.MAVLink_hil_actuator_controls_message)
+        for message in (_random_message(rng, kind, 1) for _ in range(500))
+    ]
+    makers.append(one_of(sensors))
+    socks = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(8)]
+    stream: socket.socket | None = None
+    begun = time.monotonic()
+    for sent in range(count):
+        datagram = rng.choice(makers)(rng)
+        if rng.random() < 0.1:  # by TCP
+            try:
+                if stream is None:
+                    stream = socket.create_connection(("127.0.0.1", tcp), 1.0)
+                    stream.settimeout(1.0)
+                stream.sendall(datagram)
+                if rng.random() < 0.001:
+                    stream.close()
+                    stream = None
+            except OSError:
+                stream = None
+        else:
+            with suppress(OSError):
+                rng.choice(socks).sendto(datagram, ("127.0.0.1", rng.choice(ports)))
+        done.value = sent + 1
+        ahead_s = sent / RATE - (time.monotonic() - begun)
+        if ahead_s > 0.01:
+            time.sleep(ahead_s)
+
+
+class Watched:
+    """The true API client: knows the key, starts the flights, and notes what the vehicle says of itself."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", port))
+        self._socket.settimeout(20.0)
+        self._writer, self._signing = (
+            FrameWriter(255, 191),
+            Signing(KEY, timestamp_of(time.time_ns() // 1000)),
+        )
+        self._vehicle: Any = None
+        self.boot_ms, self.armed, self.flights = 0, False, 0
+        self.texts: list[str] = []
+
+    def say(self, message: Any) -> None:
+        self._signing.advance(timestamp_of(time.time_ns() // 1000))
+        self._socket.sendto(self._writer.frame(message, self._signing.signer(2)), self._vehicle)
+
+    def hear(self) -> None:
+        """One datagram of the vehicle; it falls silent for no longer than 20 s."""
+        datagram, self._vehicle = self._socket.recvfrom(65535)
+        for received in decode(datagram)[0]:
+            message = received.message
+            if message.get_type() == "HEARTBEAT" and message.get_srcComponent() in (0, 1):
+                self.armed = bool(message.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED)
+            elif message.get_type() == "ATTITUDE":
+                self.boot_ms = message.time_boot_ms
+            elif message.get_type() == "STATUSTEXT":
+                self.texts.append(message.text)
+
+    def fly(self, until: Callable[[], bool]) -> None:
+        """Missions, one after another, until the last is over and it is enough."""
+        asked_ms = -10_000
+        flying = False
+        while not (until() and not flying):
+            self.hear()
+            flying = flying or self.armed
+            if flying and not self.armed:
+                flying = False
+                self.flights += 1
+            if not flying and not until() and self.boot_ms - asked_ms > 3000:
+                asked_ms = self.boot_ms
+                for order in ORDERS.values():
+                    self.say(order)
+
+
+def state_of(gcs: Callable[..., str], folder: Path) -> tuple[str, str]:
+    """Parameters and mission, as a ground station reads them from the vehicle."""
+    values = folder / "values.params"
+    values.unlink(missing_ok=True)
+    gcs("param", "save", str(values))
+    return values.read_text(encoding="utf-8"), gcs("download", "--json")
+
+
+def over_sockets(count: int, base: int) -> None:
+    """The real programs, on every port of theirs."""
+    listen, truth, ground, api, tcp = (f"127.0.0.1:{base + i}" for i in range(5))
+    with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
+        folder = Path(name)
+        key_file = folder / "key"
+        key_file.touch(mode=0o600)
+        key_file.write_text(KEY.hex(), encoding="ascii")
+
+        def start(*arguments: str) -> subprocess.Popen[bytes]:
+            log = stack.enter_context((folder / f"{arguments[0]}.log").open("ab"))
+            program = subprocess.Popen([sys.executable, "-m", *arguments], stdout=log, stderr=log)
+            stack.callback(program.wait)
+            stack.callback(program.kill)
+            return program
+
+        def gcs(*arguments: str) -> str:
+            command = [sys.executable, "-m", "gcs", "--signing-key", str(key_file), *arguments]
+            return subprocess.run(
+                [*command, "--connect", str(base + 2)], check=True, capture_output=True, text=True
+            ).stdout
+
+        def start_autopilot() -> subprocess.Popen[bytes]:
+            return start(
+                *("autopilot", "--sim", listen, "--gcs", ground, "--api", api, "--tcp", tcp),
+                *("--storage", str(folder / "storage"), "--signing-key", str(key_file)),
+            )
+
+        sitl = start("sitl", "--listen", listen, "--truth", truth, "--speed", "4")
+        watched = Watched(base + 3)
+        autopilot = start_autopilot()
+        watched.hear()
+        gcs("upload", MISSION)
+        gcs("param", "set", "MIS_SPEED", "1.25")
+        before = state_of(gcs, folder)
+
+        def cost_s(until: Callable[[], bool]) -> float:
+            """Processor seconds of the autopilot per tick of 4 ms."""
+            begun_s, begun_ms = processor_s(autopilot.pid), watched.boot_ms
+            watched.fly(until)
+            return (processor_s(autopilot.pid) - begun_s) / max(watched.boot_ms - begun_ms, 1) * 4.0
+
+        peace_s = cost_s(lambda: watched.flights >= 1)
+        done = multiprocessing.Value("l", 0)
+        ports = [*ports_of(sitl.pid), *ports_of(autopilot.pid)]
+        fire = multiprocessing.Process(target=fire_at, args=(ports, base + 4, count, 1, done), daemon=True)
+        began = time.monotonic()
+        fire.start()
+        fire_s = cost_s(lambda: done.value >= count)
+        wall_s = time.monotonic() - began
+        fire.join()
+        assert sitl.poll() is None and autopilot.poll() is None, "a program ended"
+        after = state_of(gcs, folder)
+        autopilot.kill()
+        autopilot.wait()
+        autopilot = start_autopilot()
+        restarted = state_of(gcs, folder)
+        logs = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.log"))
+    assert before == after == restarted, "parameters or mission are others"
+    bad = [text for text in watched.texts if re.search("Internal|failsafe|denied|lost", text, re.IGNORECASE)]
+    assert not bad, watched.texts
+    assert "Traceback" not in logs, logs
+    print(f"over sockets: {count} datagrams to {len(ports)} ports and by TCP in {wall_s:.0f} s;")
+    print(f"  {watched.flights} flights of {MISSION} ended as they should; a restart finds everything")
+    print(
+        f"  autopilot {1e6 * peace_s:.0f} us of processor time a tick in peace, {1e6 * fire_s:.0f} under fire"
+    )
+
+
+def main() -> None:
+    """As many datagrams as asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--in-process", type=int, default=0, metavar="N", help="so many datagrams in process")
+    parser.add_argument("--sockets", type=int, default=0, metavar="N", help="so many over sockets")
+    parser.add_argument("--port", type=int, default=14600, help="the first of five ports to use")
+    arguments = parser.parse_args()
+    if arguments.in_process:
+        half = arguments.in_process // 2
+        each = max(1, half // TICKS)
+        fly_under_fire("with a signing key", KEY, for_a_vehicle_with_a_key(random.Random(1)), half, each)
+        fly_under_fire("without one", None, for_a_vehicle_without(random.Random(2)), half, each)
+    if arguments.sockets:
+        over_sockets(arguments.sockets, arguments.port)
+
+
+if __name__ == "__main__":
+    main()

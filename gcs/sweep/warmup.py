@@ -1,0 +1,52 @@
+"""Compiles what only sweeps fly with: python -m gcs.sweep.warmup alone|lanes LAW."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from autopilot.geometry.machine_code import ROOT
+from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts, name_what_is_compiled
+
+_MODULE = "gcs.sweep.warmup"
+
+
+def sweep_parts(laws: Sequence[str]) -> list[Part]:
+    """What a sweep with these laws needs to fly one flight after another."""
+    source = ROOT / "gcs" / "sweep" / "flight.py"
+    parts = {part.mark: part for law in laws for part in autopilot_parts(law)}
+    alone = [
+        Part(f"the sweep's {law} flight", _MODULE, ("alone", law), source, f"alone-{law}", 25.0)
+        for law in laws
+    ]
+    return [*parts.values(), SIMULATOR, *alone]
+
+
+def lanes_part(law: str) -> Part:
+    """What a sweep with this law needs to fly eight flights at once."""
+    source = ROOT / "gcs" / "sweep" / "lane_kernel.py"
+    return Part(f"eight {law} flights at once", _MODULE, ("lanes", law), source, f"lanes-{law}", 70.0)
+
+
+def main(part: str, law: str) -> None:
+    """Compile it, or find it compiled; prints the names of the kernels that it compiles."""
+    name_what_is_compiled()
+    # only now: the import itself compiles the first ones
+    from autopilot.vehicle.parameters import LAWS
+    from gcs.closed_loop import Conditions
+    from gcs.sweep.cell import cell_of
+    from gcs.sweep.flight import Boarding, SweptFlight
+    from gcs.sweep.group import FEWEST, Group
+    from missions.fileformat import load_mission
+
+    conditions = Conditions(settings={"CTL_LAW": float(LAWS.index(law))})
+    cell = cell_of(load_mission("hover"), conditions)
+    flights = [SweptFlight(cell, seed, Boarding(0, 0)) for seed in range(FEWEST)]
+    if part == "lanes":
+        Group(flights).compile()
+    else:
+        flights[0].turn(1)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,21 @@
+"""What strangers say changes no bit of a flight; benchmarks/hostile.py says it by the million."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from benchmarks import hostile
+
+COUNT, EACH = 20_000, 8  # datagrams, and how many a tick: ten seconds of flight
+
+
+@pytest.mark.parametrize(
+    ("key", "strangers"),
+    [(hostile.KEY, hostile.for_a_vehicle_with_a_key), (None, hostile.for_a_vehicle_without)],
+    ids=["with a signing key", "without"],
+)
+def test_a_flight_under_fire_is_the_flight_in_peace(key, strangers, capsys):
+    hostile.fly_under_fire("flight", key, strangers(random.Random(1)), COUNT, EACH)
+    assert f"{COUNT} datagrams" in capsys.readouterr().out
