@@ -6,6 +6,7 @@ longer than a report interpolates, a row without numbers stands in the gap, so t
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -42,8 +43,13 @@ _PLACE_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S, _PSI = 1e-6, 1e-4, 1e-5, 1e-3, 1
 Json = dict[str, Any]
 
 
-def replay_of(telemetry: Telemetry, samples: Samples, meta: FlightMeta) -> Json:
-    """Everything that the page draws; without the truth, as the vehicle believed it to be."""
+def replay_of(
+    telemetry: Telemetry, samples: Samples, meta: FlightMeta, columns: Collection[str] | None = None
+) -> Json:
+    """Everything that a page draws; without the truth, as the vehicle believed it to be.
+
+    `columns` names those that are wanted by the word before the underscore; None: all.
+    """
     true = bool(len(samples.time_s))
     if not true:
         telemetry = _believed(telemetry)
@@ -70,7 +76,7 @@ def replay_of(telemetry: Telemetry, samples: Samples, meta: FlightMeta) -> Json:
         "steps": _steps(telemetry),
         "worst": worst_moment(samples),
         "wind": _wind(telemetry),
-        "samples": pack(*_columns(telemetry, samples)),
+        "samples": pack(*_columns(telemetry, samples, columns)),
     }
 
 
@@ -157,7 +163,9 @@ def _wind(telemetry: Telemetry) -> list[list[float]]:
     return [[float(t), *map(float, row)] for t, row in zip(wind.time_s[changed], total[changed], strict=True)]
 
 
-def _columns(telemetry: Telemetry, samples: Samples) -> tuple[list[Column], int]:
+def _columns(
+    telemetry: Telemetry, samples: Samples, wanted: Collection[str] | None
+) -> tuple[list[Column], int]:
     """The columns, a row without numbers within each gap, and how many rows there are."""
     t, truth = samples.time_s, telemetry.load_truth
     rotors, commanded, cascade = telemetry.rotors_truth, telemetry.rotors_commanded, telemetry.cascade
@@ -183,7 +191,11 @@ def _columns(telemetry: Telemetry, samples: Samples) -> tuple[list[Column], int]
     gaps = np.flatnonzero(np.diff(t) > MAX_GAP_S)
     columns = [
         Column("time", np.insert(t, gaps + 1, 0.5 * (t[gaps] + t[gaps + 1])), _TIME_S),
-        *(Column(name, np.insert(values, gaps + 1, np.nan), step) for name, values, step in found),
+        *(
+            Column(name, np.insert(values, gaps + 1, np.nan), step)
+            for name, values, step in found
+            if wanted is None or name.partition("_")[0] in wanted
+        ),
     ]
     return columns, len(t) + len(gaps)
 

@@ -106,12 +106,13 @@
     }
 
     /**
-     * Puts whole paths in place: arrays N, E, D, N, ...; `error` has one number (m) a point of `flown`.
+     * Puts whole paths in place: arrays N, E, D, N, ...; `error` has one number (m) a point of `flown`,
+     * which colours it; with `colour` (of CSS) all of it has that one.
      * @param id of the vehicle, where there are several
      */
     setTrack(track, id = 1) {
       const { flown, asked } = this.trackOf(id);
-      flown.set(track.flown || [], track.error || null);
+      flown.set(track.flown || [], track.error || null, track.colour || null);
       asked.set(track.asked || []);
       this.levelScale();
     }

@@ -36,13 +36,19 @@ def make_report(
             raise GcsError(f"{error.filename or out}: {error.strerror}") from None
 
 
-def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, Path]:
-    """The report of a log, or of the directory that holds it, made again; the record and its directory."""
+def find_log(source: Path) -> Path:
+    """The log that is named, or that lies in the directory that is named."""
     tlog = source / TLOG_FILE if source.is_dir() else source
     if not tlog.is_file():
         raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
     if next(read_tlog(tlog), None) is None:
         raise GcsError(f"{tlog}: holds no telemetry; must be a .tlog, or a directory that holds {TLOG_FILE}")
+    return tlog
+
+
+def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, Path]:
+    """The report of a log, or of the directory that holds it, made again; the record and its directory."""
+    tlog = find_log(source)
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else tlog.with_suffix(""))
     return make_report(tlog, folder, None, quiet), folder
 
