@@ -53,6 +53,18 @@ def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, P
     return make_report(tlog, folder, None, quiet), folder
 
 
+def make_mcap(source: Path, folder: Path) -> Path:
+    """flight.mcap of a log, in the directory of its report."""
+    from gcs.report.build import ReportError, build_mcap
+
+    try:
+        return build_mcap(find_log(source), folder)
+    except ReportError as error:
+        raise GcsError(str(error)) from None
+    except OSError as error:
+        raise GcsError(f"{error.filename or folder}: {error.strerror}") from None
+
+
 def print_record(record: Record) -> None:
     """The record as a table on stdout."""
     from rich.console import Console
