@@ -27,6 +27,7 @@ COMMANDS = {
         "Repeat published experiments beside their printed results.",
     ),
     "sweep": ("sweep", "Fly a mission thousands of times under varied conditions."),
+    "view": ("view", "Show running vehicles live in a browser."),
     "warmup": ("warmup", "Compile the flight software before the first flight."),
     "status": ("status", "Show what the vehicle says of itself."),
     "capture": ("capture", "Capture telemetry until Ctrl-C."),

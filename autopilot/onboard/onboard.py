@@ -66,6 +66,7 @@ from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
 GROUND_WINDOW_US = 20_000
 # that asks whether the ground has caught up: no log has its messages, and their numbers would be missed
+SIMULATOR_SYSTEM = 1  # our number for the simulator, whatever MAV_SYS_ID ground stations see
 LOCKSTEP_COMPONENT = mavlink.MAV_COMP_ID_SYSTEM_CONTROL
 _TIMESYNC = layout_of(mavlink.MAVLink_timesync_message)
 _REBOOT = mavlink.MAVLink_command_long_message(
@@ -141,7 +142,7 @@ class Onboard:
         self.tick = -1
         self.fault = ""  # why the vehicle cannot be flown at all
         self._options = options
-        self._writer = FrameWriter(identity.system, AUTOPILOT_COMPONENT)
+        self._writer = FrameWriter(SIMULATOR_SYSTEM, AUTOPILOT_COMPONENT)
         self._answer = b""
         self._sensed = False  # the inertial sample of this tick is sane
         self._health = packed(Condition())

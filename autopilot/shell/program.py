@@ -14,7 +14,7 @@ from pathlib import Path
 import click
 from platformdirs import user_state_path
 
-from autopilot.onboard.onboard import GROUND_WINDOW_US, Onboard
+from autopilot.onboard.onboard import GROUND_WINDOW_US, SIMULATOR_SYSTEM, Onboard
 from autopilot.onboard.snapshot import Options
 from autopilot.services.identity import AUTOPILOT_COMPONENT, identity_of
 from autopilot.services.mission_store import StoredMission
@@ -287,7 +287,7 @@ class Program:
             mavlink_version=3,
         )
         self._aside = Aside()
-        self._greeting = FrameWriter(1, AUTOPILOT_COMPONENT).frame(greeting)
+        self._greeting = FrameWriter(SIMULATOR_SYSTEM, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
         if isinstance(ground, GroundStations):  # our clock does not wait for paths
             self._aside.start(self.onboard.rehearsal)

@@ -65,11 +65,36 @@ class CommandOperation:
             return []
         confirmation = self._retry.sent
         self._retry.asked(now_us)
-        return [
-            mavlink.MAVLink_command_long_message(
-                *self._target, self._command, confirmation, *self._parameters
-            )
-        ]
+        return [self._message(confirmation)]
+
+    def _message(self, confirmation: int) -> Any:
+        return mavlink.MAVLink_command_long_message(
+            *self._target, self._command, confirmation, *self._parameters
+        )
+
+
+class RepositionOperation(CommandOperation):
+    """Take the load to a place: COMMAND_INT, because a float32 knows degrees to a metre only."""
+
+    def __init__(self, target: Target, latitude_degE7: int, longitude_degE7: int, height_m: float) -> None:
+        super().__init__(target, "reposition", mavlink.MAV_CMD_DO_REPOSITION)
+        self._latitude_degE7 = latitude_degE7
+        self._longitude_degE7 = longitude_degE7
+        self._height_m = height_m
+
+    def _message(self, confirmation: int) -> Any:
+        speed, change_mode, radius = -1.0, 1.0, 0.0
+        return mavlink.MAVLink_command_int_message(
+            *self._target,
+            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+            self._command,
+            0,
+            0,
+            *(speed, change_mode, radius, UNUSED),
+            self._latitude_degE7,
+            self._longitude_degE7,
+            self._height_m,
+        )
 
 
 def arm(target: Target, force: bool = False) -> CommandOperation:
@@ -108,6 +133,13 @@ def takeoff(target: Target, altitude_amsl_m: float = UNUSED) -> CommandOperation
 def land(target: Target) -> CommandOperation:
     """Set the load down where it hangs, and the vehicle beside it."""
     return CommandOperation(target, "land", mavlink.MAV_CMD_NAV_LAND, (UNUSED,) * 7)
+
+
+def reposition(
+    target: Target, latitude_degE7: int, longitude_degE7: int, height_m: float
+) -> RepositionOperation:
+    """Take the load there and hold it, `height_m` above home."""
+    return RepositionOperation(target, latitude_degE7, longitude_degE7, height_m)
 
 
 def set_mode(target: Target, name: str, main: int, sub: int, armed: bool) -> CommandOperation:

@@ -15,6 +15,7 @@ Time limits run on the vehicle's clock once it flies, so that they hold at any s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -164,6 +165,10 @@ class FlightClient:
     def silent_until_us(self) -> int:
         """Until when, by our clock, `poll` sends nothing, whatever is received; 0: that is not known."""
         return self.connection.next_heartbeat_us if self.stage is Stage.FLY else 0
+
+    def fly_on(self) -> None:
+        """Somebody leads the flight by hand: it may take as long as it likes."""
+        self._limit_s = math.inf
 
     def interrupt(self, reason: str = "stopped by the user") -> None:
         """End the flight from outside, if it is not over."""

@@ -133,7 +133,7 @@ class MissionDownload:
     def __init__(self, target: Target, kind: int = _MISSION) -> None:
         self.result: Result | None = None
         self.items: list[WireItem] = []
-        self._kind = kind  # MAV_MISSION_TYPE
+        self.kind = kind  # MAV_MISSION_TYPE
         self._target = target
         self._count: int | None = None
         self._retry = Retry(RETRY_US, SENDS)
@@ -144,7 +144,7 @@ class MissionDownload:
         return len(self.items), self._count or 0
 
     def receive(self, message: Any, now_us: int) -> None:
-        if self.result is not None or not self._retry.sent or not _ours(message, self._kind):
+        if self.result is not None or not self._retry.sent or not _ours(message, self.kind):
             return
         kind = message.get_msgId()
         if kind == mavlink.MAVLINK_MSG_ID_MISSION_COUNT and self._count is None:
@@ -182,7 +182,7 @@ class MissionDownload:
         if self._acknowledge:
             self._acknowledge = False
             return [
-                mavlink.MAVLink_mission_ack_message(*self._target, mavlink.MAV_MISSION_ACCEPTED, self._kind)
+                mavlink.MAVLink_mission_ack_message(*self._target, mavlink.MAV_MISSION_ACCEPTED, self.kind)
             ]
         if self.result is not None or not self._retry.due(now_us):
             return []
@@ -192,8 +192,8 @@ class MissionDownload:
             return []
         self._retry.asked(now_us)
         if self._count is None:
-            return [mavlink.MAVLink_mission_request_list_message(*self._target, self._kind)]
-        return [mavlink.MAVLink_mission_request_int_message(*self._target, len(self.items), self._kind)]
+            return [mavlink.MAVLink_mission_request_list_message(*self._target, self.kind)]
+        return [mavlink.MAVLink_mission_request_int_message(*self._target, len(self.items), self.kind)]
 
 
 class MissionClear:

@@ -14,6 +14,7 @@ from gcs.commands.options import (
     SettingType,
     json_option,
     law_option,
+    page_options,
     print_json,
     sensors_option,
     vehicle_option,
@@ -80,6 +81,8 @@ _OWN = (
 )
 @click.option("--force", is_flag=True, help="Fly even what the vehicle cannot do.")
 @click.option("--overwrite", is_flag=True, help="Even if --out holds an earlier flight: it is lost.")
+@click.option("--view", is_flag=True, help="Show the flight live in a browser; see gcs view.")
+@page_options
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress and no table, only the outcome.")
 @click.pass_context
@@ -99,6 +102,9 @@ def fly_command(
     limit_s: float | None,
     force: bool,
     overwrite: bool,
+    view: bool,
+    port: int | None,
+    bind: str,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -113,6 +119,7 @@ def fly_command(
     gcs fly case-a --vehicle thesis --sensors ideal
     gcs fly square --set SIM_WIND_E=3 --seed 7 --out windy
     gcs fly hover --speed 1
+    gcs fly square --view --speed 1
     """
     if lockstep and (speed is not None or real_time):
         other = "--speed" if speed is not None else "--real-time"
@@ -128,6 +135,13 @@ def fly_command(
                 ctx,
             )
 
+    page = None
+    if view:
+        from gcs.workflows.flight_page import PageOptions
+
+        page = PageOptions(bind, port)
+    elif port is not None:
+        raise click.UsageError("--port is that of the page: add --view", ctx)
     from gcs.workflows.flight_options import FlightOptions
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record
@@ -158,6 +172,7 @@ def fly_command(
             limit_s=limit_s,
         ),
         told,
+        page,
     )
     if not (as_json or quiet):
         click.echo(f"report: {flight.out / 'report.html'}")

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from gcs.shell.link import DEFAULT_PORT, Address, AddressError, parse_address
+from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -77,6 +77,22 @@ def connect_option(function: F) -> F:
         show_default=True,
         help="Where the vehicle is met: PORT or HOST:PORT to wait there, udpout:HOST:PORT to speak first.",
     )(function)
+
+
+def page_options(function: F) -> F:
+    """--port and --bind of every command that serves a page."""
+    port = click.option(
+        "--port",
+        type=click.IntRange(1, 65535),
+        help=f"TCP port of the live page.  [default: {PAGE_PORT}, or one that is free]",
+    )
+    bind = click.option(
+        "--bind",
+        default=LOOPBACK,
+        show_default=True,
+        help="Address of this machine at which the page is served; beyond the loopback others can reach it.",
+    )
+    return port(bind(function))
 
 
 def vehicle_option(what: str = "What flies, in truth and by belief") -> Callable[[F], F]:

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from gcs.errors import GcsError
 
 DEFAULT_PORT = 14550
+API_PORT = 14540
+PAGE_PORT = 8090  # TCP, of the live page
 TRUTH_PORT = 14560  # where sitl sends what is true
 LOOPBACK = "127.0.0.1"
 _DATAGRAM = 65_535
@@ -92,6 +94,17 @@ class UdpSocket:
                 return datagrams
             datagrams.append(datagram)
 
+    def drain_with_senders(self) -> list[tuple[bytes, tuple[str, int]]]:
+        """As `drain`, each datagram with the address from which it came."""
+        found: list[tuple[bytes, tuple[str, int]]] = []
+        while True:
+            try:
+                found.append(self._socket.recvfrom(_DATAGRAM, socket.MSG_DONTWAIT))
+            except ConnectionError:
+                continue
+            except BlockingIOError:
+                return found
+
     def wait(self, timeout_s: float) -> list[bytes]:
         """The next datagram, if one comes within the time; by one system call where `select` needs three."""
         if timeout_s != self._waits_s:
@@ -107,14 +120,22 @@ class UdpSocket:
 
     def send(self, datagram: bytes) -> None:
         """Send to the peer; nothing if there is none yet or it does not listen."""
-        if self._peer is None:
-            return
+        if self._peer is not None:
+            self.send_to(datagram, self._peer)
+
+    def send_to(self, datagram: bytes, peer: tuple[str, int]) -> None:
+        """Send to that address; nothing if nobody listens there."""
         try:
-            self._socket.sendto(datagram, socket.MSG_DONTWAIT, self._peer)
+            self._socket.sendto(datagram, socket.MSG_DONTWAIT, peer)
         except (ConnectionError, BlockingIOError):
             return  # UDP: the protocols above ask again
         except OSError as error:
-            raise GcsError(f"UDP to {self._peer[0]}:{self._peer[1]}: {error.strerror}") from None
+            raise GcsError(f"UDP to {peer[0]}:{peer[1]}: {error.strerror}") from None
+
+    @property
+    def peer(self) -> tuple[str, int] | None:
+        """Where `send` sends to."""
+        return self._peer
 
     def close(self) -> None:
         self._socket.close()

@@ -26,7 +26,7 @@ _LAST_LINE = 4096  # bytes of the log in which the last line is looked for
 class Child:
     """One running program."""
 
-    def __init__(self, name: str, arguments: Sequence[str], log: Path) -> None:
+    def __init__(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> None:
         self.name = name
         self.log = log
         self.exit_code: int | None = None
@@ -37,6 +37,7 @@ class Child:
                 stdout=stderr,
                 stderr=subprocess.STDOUT,
                 process_group=0,
+                pass_fds=inherits,
                 preexec_fn=_die_with_parent(),  # noqa: PLW1509, there are no threads
             )
 
@@ -93,10 +94,10 @@ class Processes:
         self._children: list[Child] = []
         self._cpus_before: set[int] | None = None
 
-    def start(self, name: str, arguments: Sequence[str], log: Path) -> Child:
-        """Start `python -m NAME ARGUMENTS` with its output in `log`."""
+    def start(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> Child:
+        """Start `python -m NAME ARGUMENTS` with its output in `log`; it inherits these open descriptors."""
         try:
-            child = Child(name, arguments, log)
+            child = Child(name, arguments, log, inherits)
         except OSError as error:
             raise GcsError(f"{name} cannot be started: {error}") from None
         self._children.append(child)

@@ -18,6 +18,17 @@ SCENE_SCRIPTS = (  # in the order in which they are loaded
     "scene_places.js",
     "scene.js",
 )
+LIVE_PAGE = "live.html"
+LIVE_FILES = (  # what the live page asks its server for
+    *PLOT_STYLES,
+    "live.css",
+    *PLOT_SCRIPTS,
+    *SCENE_SCRIPTS,
+    "live_plots.js",
+    "live_panels.js",
+    "live_controls.js",
+    "live.js",
+)
 
 
 def asset(name: str) -> str:

@@ -3,7 +3,8 @@
 "use strict";
 (() => {
   const GROUND_D = 0;
-  const DEFAULT_ROTORS = [[1, 1, 1], [-1, -1, 1], [1, -1, -1], [-1, 1, -1]];
+  // a plus frame as the mixer counts it: rotor 1 behind, 2 right, 3 in front, 4 left
+  const PLUS_FRAME = [[-1, 0, -1], [0, 1, 1], [1, 0, -1], [0, -1, 1]];
   const CLICK_PX = 4; // a pointer that moved further turns the camera and picks nothing
   // x east, y up, z south are the axes of three.js
   const NED_TO_SCENE = new THREE.Matrix4().set(0, 1, 0, 0, 0, 0, -1, 0, -1, 0, 0, 0, 0, 0, 0, 1);
@@ -17,12 +18,11 @@
      */
     constructor(canvas, options = {}) {
       this.canvas = canvas;
-      const arm = options.armLength || 0.18;
+      const arm = options.armLength || 0.126;
       this.layout = {
         armLength: arm,
         cableLength: options.cableLength || 0.7,
-        rotors: options.rotors || DEFAULT_ROTORS.map(([x, y, spin]) => (
-          { position: [x * arm * Math.SQRT1_2, y * arm * Math.SQRT1_2, 0], spin })),
+        rotors: options.rotors || Plumbline.plusFrame(arm),
       };
       this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
       this.scene = new THREE.Scene();
@@ -55,7 +55,7 @@
       this.listen();
       this.applyTheme();
       this.mode = "orbit";
-      this.look([0, 0, -0.6], 4 * (this.layout.cableLength + arm));
+      this.look([0, 0, -0.6], 3.6 * (this.layout.cableLength + arm));
     }
 
     listen() {
@@ -65,20 +65,20 @@
       this.down = null;
       this.onDown = (event) => { this.down = [event.clientX, event.clientY]; };
       this.onUp = (event) => {
-        if (!this.down || event.button !== 0) return;
+        if (!this.down) return;
         const moved = Math.hypot(event.clientX - this.down[0], event.clientY - this.down[1]);
-        this.down = null;
         if (moved <= CLICK_PX) this.pick(event);
       };
       this.canvas.addEventListener("pointerdown", this.onDown);
-      this.canvas.addEventListener("pointerup", this.onUp);
+      this.canvas.addEventListener("click", this.onUp);
     }
 
     // ---- what is shown
 
     /**
      * @param state {time (s), vehicles: [{id, position, attitude, rotors: [0 ... 1 of the limit],
-     *              load: {position, attached} or null, taut, asked: place or null}], wind: [N, E, D] m/s or null}
+     *              load: {position, attached} or null, taut, asked: place or null, cableLength and layout where they
+     *              are not those of the scene}], wind: [N, E, D] m/s or null}
      */
     show(state) {
       const told = new Set();
@@ -278,7 +278,10 @@
 
     // ---- places and pixels
 
-    /** Calls back with ([N, E, D] at the height of the load, [N, E, 0] on the ground) where the reader clicks. */
+    /**
+     * Calls back with ([N, E, D] at the height of the load, [N, E, 0] on the ground or null, number of clicks) where
+     * the reader clicks.
+     */
     onPick(callback) {
       this.picked.push(callback);
     }
@@ -294,7 +297,7 @@
       const ground = meet(ray.ray, 0);
       const level = meet(ray.ray, Math.max(height, 0)) || ground;
       if (!level) return;
-      for (const callback of this.picked) callback(level, ground);
+      for (const callback of this.picked) callback(level, ground, event.detail);
     }
 
     /** Where a place is seen: [x, y] in CSS pixels of the canvas, or null behind the eye. */
@@ -330,7 +333,7 @@
     dispose() {
       this.media.removeEventListener("change", this.onMedia);
       this.canvas.removeEventListener("pointerdown", this.onDown);
-      this.canvas.removeEventListener("pointerup", this.onUp);
+      this.canvas.removeEventListener("click", this.onUp);
       this.controls.dispose();
       for (const craft of this.crafts.values()) craft.dispose();
       for (const { flown, asked } of this.tracks.values()) {
@@ -342,6 +345,9 @@
       this.renderer.dispose();
     }
   }
+
+  /** The rotors of a vehicle whose arms are that long (m). */
+  Plumbline.plusFrame = (arm) => PLUS_FRAME.map(([x, y, spin]) => ({ position: [x * arm, y * arm, 0], spin }));
 
   function toScene([n, e, d]) {
     return new THREE.Vector3(e, -d, -n);

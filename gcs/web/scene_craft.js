@@ -152,7 +152,7 @@
     hang(vehicle, ground) {
       const a = vehicle.position, b = vehicle.load.position;
       const slack = vehicle.taut === false;
-      this.bend(a, b, slack ? sagOf(a, b, this.layout.cableLength) : [0, 0, 0], ground - 0.006);
+      this.bend(a, b, slack ? sagOf(a, b, vehicle.cableLength || this.layout.cableLength) : [0, 0, 0], ground - 0.006);
       this.cable.geometry.setPositions(this.points);
       this.cable.material.color.set(slack ? this.theme.slack : this.theme.cable);
     }

@@ -2,6 +2,7 @@
 "use strict";
 (() => {
   const WALL_M = 12; // of a fence that names no height
+  const LEAST_WIND = 0.3; // m/s; an estimate is never quite still
   const STREAKS = 46;
 
   function segments(points, colour, opacity) {
@@ -83,6 +84,7 @@
       this.fence = null;
       this.rally = [];
       this.goal = null;
+      this.arrowSize = 1;
       this.setTheme(theme);
     }
 
@@ -123,6 +125,7 @@
     /** Keeps the ground under what is looked at: `target` in the axes of the scene, `distance` of the eye. */
     spreadGround(target, distance) {
       const reach = 12 * distance + 15;
+      this.arrowSize = Math.min(Math.max(distance / 9, 0.25), 6); // as large to the eye from near and far
       this.ground.position.set(-target.z, target.x, 0);
       this.ground.scale.set(2 * reach, 2 * reach, 1);
       this.ground.material.uniforms.centre.value.set(target.x, target.z);
@@ -213,7 +216,7 @@
     /** Streaks that drift around `at`, and an arrow on the ground below it; `wind` in m/s or null. */
     showWind(wind, at, time) {
       const speed = wind ? Math.hypot(...wind) : 0;
-      this.windGroup.visible = speed > 0.05 && Boolean(at);
+      this.windGroup.visible = speed > LEAST_WIND && Boolean(at);
       if (!this.windGroup.visible) return;
       const dt = this.windTime === null ? 0 : Math.min(Math.max(time - this.windTime, 0), 0.1);
       this.windTime = time;
@@ -236,14 +239,16 @@
 
     point(wind, at, speed) {
       const along = new THREE.Vector3(wind[0], wind[1], 0).normalize();
-      const length = 0.25 + 0.18 * speed;
+      const size = this.arrowSize;
+      const length = size * (0.25 + 0.1 * Math.min(speed, 15));
       const start = new THREE.Vector3(at[0], at[1], -0.03);
       const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), along);
       this.shaft.quaternion.copy(turn);
       this.tip.quaternion.copy(turn);
-      this.shaft.scale.set(1, length, 1);
+      this.shaft.scale.set(size, length, size);
+      this.tip.scale.setScalar(size);
       this.shaft.position.copy(start).addScaledVector(along, length / 2);
-      this.tip.position.copy(start).addScaledVector(along, length + 0.1);
+      this.tip.position.copy(start).addScaledVector(along, length + 0.1 * size);
     }
 
     dispose() {

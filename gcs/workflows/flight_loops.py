@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient
@@ -12,6 +13,9 @@ from gcs.errors import NoVehicleError
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import UdpSocket, monotonic_us
 from gcs.shell.stopping import StopRequest
+
+if TYPE_CHECKING:
+    from gcs.workflows.flight_page import FlightPage
 
 _WAIT_S = 0.2
 _TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to those who must be punctual
@@ -30,6 +34,7 @@ def run_lockstep(
     display: FlightDisplay,
     stop: StopRequest,
     first_word: Callable[[], None],
+    page: FlightPage | None = None,
 ) -> None:
     """Fly until the client has its outcome. `first_word` is called when the vehicle is heard at first.
 
@@ -72,8 +77,12 @@ def run_lockstep(
             pending.append(datagram)
             now_us = question_ns // 1000
             truth_queue.put(truth.drain())
-            for sent in ground_turn(client, capture, truth_queue.until(now_us), pending, now_us):
+            told = truth_queue.until(now_us)
+            for sent in ground_turn(client, capture, told, pending, now_us):
                 vehicle.send(sent)
+            if page is not None:
+                for sent in page.turn(client, capture, told, pending, now_us, now_us >= promised_us):
+                    vehicle.send(sent)
             pending.clear()
             promised_us = max(promised_us, client.silent_until_us)
             vehicle.send(turns.answer(question_ns, client.silent_until_us))
@@ -107,15 +116,19 @@ def run_wall_clock(
     display: FlightDisplay,
     stop: StopRequest,
     first_word: Callable[[], None],
+    page: FlightPage | None = None,
 ) -> None:
     """Fly until the client has its outcome. Log records bear the vehicle's clock once it is known."""
     started = False
     while client.outcome is None:
         time.sleep(_TICK_S)
         now_us = monotonic_us()
-        told = truth.drain() if truth else []
-        for sent in ground_turn(client, capture, told, vehicle.drain(), now_us):
+        told, heard = truth.drain() if truth else [], vehicle.drain()
+        for sent in ground_turn(client, capture, told, heard, now_us):
             vehicle.send(sent)
+        if page is not None:
+            for sent in page.turn(client, capture, told, heard, now_us, may_speak=True):
+                vehicle.send(sent)
         capture.flush(client.view.time_us or 0)
         if not started and client.connection.target is not None:
             started = True

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -37,6 +38,7 @@ from sitl.sensors.shipped import PROFILES
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
     from gcs.clients.flight import FlightClient, Outcome
+    from gcs.workflows.flight_page import FlightPage, PageOptions
 
 _EXIT = {
     "completed": EXIT_DONE,
@@ -66,9 +68,9 @@ class Flight:
         return EXIT_INTERRUPTED if self.stopped else _EXIT[self.outcome.name]
 
 
-def fly(options: FlightOptions, told: Told) -> Flight:
+def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> Flight:
     """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
-    the report are drawn."""
+    the report are drawn. With `view` a page shows it, and stays."""
     if options.connect is None and not _as_shipped(options):
         from gcs.workflows.flight_inputs import check_flight_inputs
 
@@ -78,16 +80,40 @@ def fly(options: FlightOptions, told: Told) -> Flight:
     with _Folder(out, options.overwrite) as folder:
         if options.connect is None:
             warm_up(flight_parts((options.law,)), options.quiet)
-        with StopRequest("stopping; Ctrl-C again abandons the report") as stop:
+        with (
+            StopRequest("stopping; Ctrl-C again abandons the report") as stop,
+            _page(mission, options, view, stop) as page,
+        ):
             watch = Stopwatch()
             tlog = out / TLOG_FILE
             with tlog.open("wb") as file:
                 log = TlogWriter(file)
                 if options.connect is None:
-                    client = _fly_own(mission, options, log, out, stop, watch)
+                    client = _fly_own(mission, options, log, out, stop, watch, page)
                 else:
-                    client = _fly_running(mission, options, options.connect, log, stop, watch)
-            return _end(mission, options, client, watch.stop(), out, folder, stop, told)
+                    client = _fly_running(mission, options, options.connect, log, stop, watch, page)
+            flight = _end(mission, options, client, watch.stop(), out, folder, stop, told)
+            if page is not None:
+                page.tell(
+                    outcome=flight.outcome.name, reason=flight.outcome.reason, report=str(out.resolve())
+                )
+                page.stay(stop)
+            return flight
+
+
+@contextmanager
+def _page(
+    mission: Mission, options: FlightOptions, view: PageOptions | None, stop: StopRequest
+) -> Iterator[FlightPage | None]:
+    """The live page, with somebody before it where there is a screen; None if it is not asked for."""
+    if view is None:
+        yield None
+        return
+    from gcs.workflows.flight_page import flight_page
+
+    with flight_page(mission, options, view) as page:
+        page.await_reader(stop)
+        yield page
 
 
 def _as_shipped(options: FlightOptions) -> bool:
@@ -98,7 +124,13 @@ def _as_shipped(options: FlightOptions) -> bool:
 
 
 def _fly_own(
-    mission: Mission, options: FlightOptions, log: TlogWriter, out: Path, stop: StopRequest, watch: Stopwatch
+    mission: Mission,
+    options: FlightOptions,
+    log: TlogWriter,
+    out: Path,
+    stop: StopRequest,
+    watch: Stopwatch,
+    page: FlightPage | None,
 ) -> FlightClient:
     with own_vehicle(options, out) as own:
         from gcs.workflows.own_flight import fly_own  # while they load
@@ -108,7 +140,7 @@ def _fly_own(
             from gcs.report.warm import load as load_report
 
             load_report(lambda: own.vehicle.waiting)  # there is a core to spare until the vehicle speaks
-        return fly_own(mission, options, log, own, stop, watch)
+        return fly_own(mission, options, log, own, stop, watch, page)
 
 
 def _fly_running(
@@ -118,11 +150,12 @@ def _fly_running(
     log: TlogWriter,
     stop: StopRequest,
     watch: Stopwatch,
+    page: FlightPage | None,
 ) -> FlightClient:
     from gcs.workflows.running_flight import fly_running
 
     _check(mission, options)
-    return fly_running(mission, options, address, log, stop, watch)
+    return fly_running(mission, options, address, log, stop, watch, page)
 
 
 def _check(mission: Mission, options: FlightOptions) -> None:

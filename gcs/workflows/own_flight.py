@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_mission
@@ -17,6 +19,9 @@ from gcs.workflows.flight_options import FlightOptions
 from gcs.workflows.own_vehicle import OwnVehicle
 from gcs.workflows.stopwatch import Stopwatch
 from missions.model import Mission
+
+if TYPE_CHECKING:
+    from gcs.workflows.flight_page import FlightPage
 
 
 def flight_client(mission: Mission, options: FlightOptions, home: Home) -> FlightClient:
@@ -37,6 +42,7 @@ def fly_own(
     own: OwnVehicle,
     stop: StopRequest,
     watch: Stopwatch,
+    page: FlightPage | None = None,
 ) -> FlightClient:
     """Fly with the simulator and the autopilot that were started for it."""
     client = flight_client(mission, options, Home())
@@ -47,7 +53,7 @@ def fly_own(
             own.processes.share_one_core()
 
     with FlightDisplay(mission.name, options.quiet) as display:
-        link = own.vehicle, own.truth, own.processes.ended, display, stop, begun
+        link = own.vehicle, own.truth, own.processes.ended, display, stop, begun, page
         if options.speed is None:
             run_lockstep(client, Capture(log, LOCKSTEP_BOOT_UNIX_US), *link)
         else:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing, timestamp_of
@@ -20,6 +22,9 @@ from gcs.workflows.own_flight import flight_client
 from gcs.workflows.stopwatch import Stopwatch
 from missions.model import Mission
 
+if TYPE_CHECKING:
+    from gcs.workflows.flight_page import FlightPage
+
 
 def fly_running(
     mission: Mission,
@@ -28,6 +33,7 @@ def fly_running(
     log: TlogWriter,
     stop: StopRequest,
     watch: Stopwatch,
+    page: FlightPage | None = None,
 ) -> FlightClient:
     """Fly with the vehicle at `address`; if the flight is stopped early, it is told to hold."""
     with Session(address) as session:
@@ -40,7 +46,7 @@ def fly_running(
     try:
         with FlightDisplay(mission.name, options.quiet) as display:
             capture = Capture(log, unix_us())
-            run_wall_clock(client, capture, vehicle, truth, lambda: "", display, stop, watch.start)
+            run_wall_clock(client, capture, vehicle, truth, lambda: "", display, stop, watch.start, page)
         watch.stop()
     finally:
         vehicle.close()

@@ -150,6 +150,12 @@ class ScriptedVehicle:
                 )
         self.send(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, 255, 190))
 
+    def on_command_int(self, message: Any) -> None:
+        self.commands.append(message)
+        self.send(
+            mavlink.MAVLink_command_ack_message(message.command, mavlink.MAV_RESULT_ACCEPTED, 0, 0, 255, 190)
+        )
+
     def on_param_request_list(self, message: Any) -> None:
         for index, name in enumerate(self.parameters):
             if index not in self.lost_list_indices:

@@ -59,6 +59,12 @@ def test_a_new_tick_is_answered_with_its_own_time() -> None:
     assert autopilot.tick == 2
 
 
+def test_the_simulator_knows_the_vehicle_by_one_number_whatever_ground_stations_call_it() -> None:
+    answer = onboard(MAV_SYS_ID=7).receive_sensors(sensors(0))
+    assert answer is not None
+    assert decode(answer)[0][0].system == 1
+
+
 def test_a_repeated_tick_gets_the_same_bytes_and_no_second_step() -> None:
     autopilot = onboard()
     autopilot.receive_sensors(sensors(0))

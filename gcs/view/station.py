@@ -1,0 +1,319 @@
+"""The ground station behind the page: hears vehicles, carries out what the page asks, and tells what is new.
+
+    datagrams of vehicles and of the world  ->  Station  ->  records for pages
+                          requests of pages  ->          ->  datagrams for vehicles
+
+A station that only looks on (`speaks` False) is fed by another ground station: it has no heartbeat, asks for
+nothing by itself, and says a word to a vehicle only where a person asked for it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from autopilot.wire.codec import Received
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import Signing
+from gcs.clients import command
+from gcs.clients.connection import Connection
+from gcs.clients.datagrams import messages
+from gcs.clients.missions import MissionDownload
+from gcs.clients.operation import Operation, Status, Target
+from gcs.clients.parameter_transfer import ParameterGet
+from gcs.view.actions import ActionError, operations_of
+from gcs.view.controls import READ, SLIDERS
+from gcs.view.history import History
+from gcs.view.places import fence_record, rally_record
+from gcs.view.vehicle import WatchedVehicle
+
+INTERVAL_US = 20_000
+FAST_MESSAGES = (
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE,
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS,
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE,
+)
+MOST_REQUESTS = 32  # that wait; a page that asks for more is told no
+_REASON_US = 300_000  # a refusal is explained by a STATUSTEXT that may come a little later
+_TEXTS = 60  # kept for pages that open later
+
+
+class Outgoing(NamedTuple):
+    """A datagram for a vehicle."""
+
+    system: int
+    datagram: bytes
+
+
+class _Task:
+    """Exchanges with one vehicle, one after the other; `request` is who asked, None for ourselves."""
+
+    def __init__(self, request: tuple[Any, Any] | None, name: str, operations: list[Operation]) -> None:
+        self.request = request
+        self.name = name
+        self.operations = deque(operations)
+        self.texts_before: int | None = None
+        self.refused_us: int | None = None
+        self.said: list[str] = []
+
+
+class Station:
+    """All vehicles that are heard."""
+
+    def __init__(self, speaks: bool = True, signing: Signing | None = None) -> None:
+        self.vehicles: dict[int, WatchedVehicle] = {}
+        self.known_parameters: dict[str, float] = {}  # of vehicles that must not be asked
+        self._histories: dict[int, History] = {}
+        self._fresh: dict[str, list[list[Any]]] = {}  # samples that pages have not been told of
+        self._speaks = speaks
+        self._signing = signing
+        self._tasks: dict[int, deque[_Task]] = {}
+        self._news: list[dict[str, Any]] = []
+        self._texts: deque[dict[str, Any]] = deque(maxlen=_TEXTS)
+
+    # ---- what comes in
+
+    def receive(self, datagram: bytes, now_us: int) -> list[int]:
+        """Take a datagram of a vehicle in; the systems that were heard in it."""
+        for one in messages(datagram)[0]:
+            if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.system not in self.vehicles:
+                self._meet(one, datagram, now_us)
+        heard: list[int] = []
+        for system, vehicle in self.vehicles.items():
+            for one in vehicle.connection.receive(datagram, now_us):
+                if not heard or heard[-1] != system:
+                    heard.append(system)
+                vehicle.receive(one, now_us)
+                self._listen(vehicle, one, now_us)
+                if self._speaks and one.id == mavlink.MAVLINK_MSG_ID_MISSION_CURRENT:
+                    self._fetch_plans(vehicle, (one.message.fence_id, one.message.rally_points_id))
+        return heard
+
+    def receive_truth(self, datagram: bytes) -> None:
+        """Take a datagram of the simulated world in; whose it is can be told only where one vehicle is."""
+        if len(self.vehicles) != 1:
+            return
+        (vehicle,) = self.vehicles.values()
+        for one in messages(datagram)[0]:
+            vehicle.truth.put(one)
+
+    def ask(self, page: Any, request: Any) -> None:
+        """Begin what a page asks for; what becomes of it is told by `news`."""
+        if not isinstance(request, dict):
+            return
+        number = request.get("request")
+        who = (page, number if isinstance(number, int) else None)
+        system = request.get("vehicle")
+        vehicle = self.vehicles.get(system) if isinstance(system, int) else None
+        name = request.get("action")
+        if vehicle is None:
+            self._answer(who, str(name), False, "there is no such vehicle")
+            return
+        tasks = self._tasks[vehicle.target.system]
+        if len(tasks) >= MOST_REQUESTS:
+            self._answer(who, str(name), False, "too much was asked for at once")
+            return
+        try:
+            operations = operations_of(vehicle, name, request.get("arguments", {}))
+        except ActionError as error:
+            self._answer(who, str(name), False, str(error))
+            return
+        tasks.append(_Task(who, str(name), operations))
+
+    # ---- what goes out
+
+    def poll(self, now_us: int) -> Iterator[Outgoing]:
+        """The datagrams to send now."""
+        for system, vehicle in self.vehicles.items():
+            connection = vehicle.connection
+            if self._speaks:
+                for datagram in connection.poll(now_us):
+                    yield Outgoing(system, datagram)
+            task = self._present(vehicle, now_us)
+            if task is not None and task.operations:
+                for message in task.operations[0].poll(now_us):
+                    yield Outgoing(system, connection.frame(message))
+                self._advance(vehicle, task, now_us)
+
+    def sample(self, now_us: int) -> None:
+        """Take a sample of each vehicle for which one is due."""
+        origin = next((vehicle.home for vehicle in self.vehicles.values()), None)
+        for system, vehicle in self.vehicles.items():
+            vehicle.origin = origin  # all are shown in one picture
+            time_us = vehicle.time_us
+            history = self._histories[system]
+            if time_us is not None and history.due(time_us * 1e-6):
+                sample = history.take(vehicle.state(now_us))
+                self._fresh.setdefault(str(system), []).append(sample)
+
+    def state(self, now_us: int) -> dict[str, Any]:
+        """What is known now of all vehicles, and the samples that were taken since the last time."""
+        self.sample(now_us)
+        fresh, self._fresh = self._fresh, {}
+        states = [vehicle.state(now_us) for vehicle in self.vehicles.values()]
+        return {"type": "state", "vehicles": states, "samples": fresh}
+
+    def forget_samples(self) -> None:
+        """No page is there to be told of what is new: one that opens is given all."""
+        self._fresh.clear()
+
+    def news(self) -> list[dict[str, Any]]:
+        """What is new since the last time; a record with "page" is for that page alone."""
+        news = self._news
+        self._news = []
+        for vehicle in self.vehicles.values():
+            if vehicle.changed_parameters:
+                vehicle.changed_parameters = {}
+                news.append(self._vehicle_record(vehicle))
+            texts = vehicle.view.texts
+            for text in texts[vehicle.told_texts :]:
+                time_s = None if vehicle.time_us is None else round(vehicle.time_us * 1e-6, 2)
+                record = {"type": "text", "vehicle": vehicle.target.system, "time": time_s}
+                self._texts.append({**record, "severity": text.severity, "text": text.text})
+                news.append(self._texts[-1])
+            vehicle.told_texts = len(texts)
+        return news
+
+    def greeting(self) -> list[dict[str, Any]]:
+        """What a page that has just opened must know."""
+        vehicles = [self._vehicle_record(vehicle) for vehicle in self.vehicles.values()]
+        histories = [
+            {"type": "history", "vehicle": system, "samples": history.samples}
+            for system, history in self._histories.items()
+        ]
+        return [*vehicles, *histories, *self._texts]
+
+    def samples(self, system: int) -> list[list[Any]]:
+        """Those taken of a vehicle so far."""
+        return self._histories[system].samples
+
+    # ---- vehicles
+
+    def _meet(self, one: Received, datagram: bytes, now_us: int) -> None:
+        connection = Connection()
+        if self._signing is not None:
+            connection.sign_with(self._signing)
+        connection.receive(one.frame, now_us)
+        if connection.target is None:
+            return
+        vehicle = WatchedVehicle(Target(*connection.target), connection)
+        for name, value in self.known_parameters.items():
+            vehicle.set_parameter(name, value)
+        system = vehicle.target.system
+        self.vehicles[system] = vehicle
+        self._histories[system] = History()
+        self._tasks[system] = deque()
+        self._news.append(self._vehicle_record(vehicle))
+        if self._speaks:
+            self._tasks[system].extend(
+                _Task(None, "", [operation]) for operation in _first_questions(vehicle)
+            )
+
+    def _fetch_plans(self, vehicle: WatchedVehicle, ids: tuple[int, int]) -> None:
+        """Fetch the fence and the rally points that have changed."""
+        before = vehicle.plan_ids or (None, None)
+        vehicle.plan_ids = ids
+        for kind, now, then in zip(_PLANS, ids, before, strict=True):
+            if now != then:
+                download = MissionDownload(vehicle.target, kind)
+                self._tasks[vehicle.target.system].append(_Task(None, "", [download]))
+
+    def _vehicle_record(self, vehicle: WatchedVehicle) -> dict[str, Any]:
+        shown = {slider.name for slider in SLIDERS} | set(READ)
+        return {
+            "type": "vehicle",
+            "id": vehicle.target.system,
+            "layout": vehicle.layout(),
+            "parameters": {name: value for name, value in vehicle.parameters.items() if name in shown},
+            "fence": vehicle.fence,
+            "rally": vehicle.rally,
+        }
+
+    # ---- exchanges
+
+    def _present(self, vehicle: WatchedVehicle, now_us: int) -> _Task | None:
+        """What is being asked of the vehicle; what people ask goes before what we ask by ourselves."""
+        tasks = self._tasks[vehicle.target.system]
+        if not tasks:
+            return None
+        if tasks[0].request is None and not _begun(tasks[0]):
+            asked = next((task for task in tasks if task.request is not None), None)
+            if asked is not None:
+                tasks.remove(asked)
+                tasks.appendleft(asked)
+        task = tasks[0]
+        if task.texts_before is None:
+            task.texts_before = len(vehicle.view.texts)
+        if task.refused_us is not None and now_us - task.refused_us >= _REASON_US:
+            reasons = vehicle.view.complaints_since(task.texts_before)
+            self._close(vehicle, task, False, "; ".join([*task.said, *reasons]))
+            return None
+        return task
+
+    def _listen(self, vehicle: WatchedVehicle, one: Received, now_us: int) -> None:
+        tasks = self._tasks[vehicle.target.system]
+        if tasks and tasks[0].operations and tasks[0].texts_before is not None:
+            tasks[0].operations[0].receive(one.message, now_us)
+            self._advance(vehicle, tasks[0], now_us)
+
+    def _advance(self, vehicle: WatchedVehicle, task: _Task, now_us: int) -> None:
+        operation = task.operations[0]
+        result = operation.result
+        if result is None:
+            return
+        task.operations.popleft()
+        task.said.append(result.text)
+        self._take(vehicle, operation)
+        if result.status is Status.REFUSED and task.request is not None:
+            task.operations.clear()
+            task.refused_us = now_us
+        elif not result.done:
+            self._close(vehicle, task, False, result.text)
+        elif not task.operations:
+            self._close(vehicle, task, True, task.said[-1])
+
+    def _close(self, vehicle: WatchedVehicle, task: _Task, done: bool, text: str) -> None:
+        self._tasks[vehicle.target.system].remove(task)
+        if task.request is not None:
+            self._answer(task.request, task.name, done, text)
+
+    def _answer(self, who: tuple[Any, Any], action: str, done: bool, text: str) -> None:
+        page, number = who
+        record = {"type": "result", "page": page, "request": number, "action": action[:40]}
+        self._news.append({**record, "ok": done, "text": text})
+
+    def _take(self, vehicle: WatchedVehicle, operation: Operation) -> None:
+        """What an exchange of ours has brought."""
+        if (
+            not isinstance(operation, MissionDownload)
+            or operation.result is None
+            or not operation.result.done
+        ):
+            return
+        home = vehicle.origin or vehicle.home
+        if operation.kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            vehicle.fence = fence_record(operation.items, home, vehicle.parameters)
+        elif operation.kind == mavlink.MAV_MISSION_TYPE_RALLY:
+            vehicle.rally = [(n, e, d) for n, e, d in rally_record(operation.items, home)]
+        self._news.append(self._vehicle_record(vehicle))
+
+
+def _begun(task: _Task) -> bool:
+    return task.texts_before is not None
+
+
+def _first_questions(vehicle: WatchedVehicle) -> list[Operation]:
+    """What we must know of a vehicle that was met."""
+    target = vehicle.target
+    streams = [command.message_interval(target, message, INTERVAL_US) for message in FAST_MESSAGES]
+    home = command.request_message(target, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+    names = (*READ, *(slider.name for slider in SLIDERS))
+    parameters = [ParameterGet(target, name) for name in names]
+    return [*streams, home, *parameters]
+
+
+_PLANS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)

@@ -1,0 +1,74 @@
+"""What is true of a simulated vehicle, at the times of which the autopilot speaks."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import deque
+from typing import Any
+
+from autopilot.wire.codec import Received
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.axes import ned_from_enu
+from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.dialect import plumbline as mavlink
+
+Place = tuple[float, float, float]  # NED, m
+
+_KEPT = 80  # positions of the load: half a second of the fastest truth
+
+
+class Truth:
+    """The newest of each kind, and where the load was a little while ago."""
+
+    def __init__(self) -> None:
+        self.newest: dict[int, Received] = {}
+        self._times_us: deque[int] = deque(maxlen=_KEPT)
+        self._places: deque[Place] = deque(maxlen=_KEPT)
+
+    def put(self, one: Received) -> None:
+        """Take one message of the simulated world in."""
+        self.newest[one.id] = one
+        if one.id != mavlink.MAVLINK_MSG_ID_LOAD_STATE:
+            return
+        message = one.message
+        if self._times_us and message.time_usec <= self._times_us[-1]:  # the world began anew
+            self._times_us.clear()
+            self._places.clear()
+        self._times_us.append(message.time_usec)
+        self._places.append((message.x, message.y, message.z))
+
+    def message(self, message_id: int) -> Any:
+        """The newest of that id, or None."""
+        received = self.newest.get(message_id)
+        return None if received is None else received.message
+
+    def load_at(self, time_us: int) -> Place | None:
+        """Where the load was at that time, between two messages; None outside of what is known."""
+        if not self._times_us or not self._times_us[0] <= time_us <= self._times_us[-1]:
+            return None
+        after = bisect_left(self._times_us, time_us)
+        if self._times_us[after] == time_us:
+            return self._places[after]
+        first, last = self._times_us[after - 1], self._times_us[after]
+        share = (time_us - first) / (last - first)
+        x, y, z = (
+            a + share * (b - a) for a, b in zip(self._places[after - 1], self._places[after], strict=True)
+        )
+        return x, y, z
+
+    @property
+    def wind(self) -> Place | None:
+        """Mean wind and gust pulse, m/s, NED."""
+        message = self.message(mavlink.MAVLINK_MSG_ID_WIND_STATE)
+        if message is None:
+            return None
+        north, east, down = (w + g for w, g in zip(message.wind, message.gust, strict=True))
+        return north, east, down
+
+    def pose(self, home: Home) -> tuple[Place, tuple[float, ...]] | None:
+        """Position and attitude quaternion (w, x, y, z) of the vehicle; the position is rounded to 11 mm."""
+        message = self.message(mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION)
+        if message is None:
+            return None
+        position = ned_from_enu(enu_from_geodetic(message.lat, message.lon, message.alt, home))
+        return position, tuple(message.attitude_quaternion)

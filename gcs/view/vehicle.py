@@ -1,0 +1,235 @@
+"""One vehicle as the page shows it: all that is known now, in one record of plain numbers."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+from autopilot.wire.codec import Received
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.axes import ned_from_enu
+from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.parameter_encoding import from_the_wire
+from autopilot.wire.parameter_table import decimal_from_float32
+from gcs.clients.connection import Connection
+from gcs.clients.operation import Target
+from gcs.clients.vehicle_view import VehicleView
+from gcs.view.link_quality import LinkQuality
+from gcs.view.truth import Place, Truth
+
+_LONGEST_SHOWN = 1.25  # of its cable: a load that is further from its vehicle has left it
+_ESTIMATES = 8  # that wait for the truth of their time
+_NOT_CARRIED = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
+
+
+class WatchedVehicle:
+    """What one vehicle has told, and its link."""
+
+    def __init__(self, target: Target, connection: Connection) -> None:
+        self.target = target
+        self.connection = connection
+        self.origin: Home | None = None  # of the picture
+        self._home: Home | None = None
+        self._cable: float | None = None
+        self.view = VehicleView()
+        self.truth = Truth()
+        self.link = LinkQuality()
+        self.parameters: dict[str, float] = {}
+        self.changed_parameters: dict[str, float] = {}  # since the page was told
+        self.fence: dict[str, Any] | None = None
+        self.rally: list[Place] = []
+        self._believed: deque[tuple[int, Place]] = deque(maxlen=_ESTIMATES)  # places of the load by time
+        self.plan_ids: tuple[int, int] | None = None  # versions of fence and rally points
+        self.told_texts = 0  # of view.texts
+
+    def receive(self, one: Received, now_us: int) -> None:
+        """Take one message of the vehicle in."""
+        if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and one.component != self.target.component:
+            return
+        self.link.heard(one, now_us)
+        if one.id == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN or (
+            one.id == mavlink.MAVLINK_MSG_ID_HOME_POSITION and self._home is None
+        ):
+            place = one.message
+            self._home = Home(place.latitude * 1e-7, place.longitude * 1e-7, place.altitude * 1e-3)
+        self.view.update(one, now_us)
+        if one.id == mavlink.MAVLINK_MSG_ID_LOAD_STATE:
+            load = one.message
+            self._believed.append((load.time_usec, (load.x, load.y, load.z)))
+        if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
+            message = one.message
+            value = from_the_wire(message.param_value, message.param_type)
+            self.set_parameter(message.param_id, decimal_from_float32(value))
+        time_us = self.time_us
+        if time_us is not None:
+            self.link.clock(time_us, now_us)
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Note what a parameter is."""
+        if math.isfinite(value):
+            self.parameters[name] = self.changed_parameters[name] = value
+
+    @property
+    def time_us(self) -> int | None:
+        """The vehicle's clock."""
+        return self.view.time_us
+
+    @property
+    def home(self) -> Home:
+        """Where its places are counted from; a home that is set later does not move them."""
+        return self._home or Home()
+
+    @property
+    def offset(self) -> Place:
+        """Where that is in the picture, whose origin is `origin`, NED."""
+        if self.origin is None or self.home == self.origin:
+            return 0.0, 0.0, 0.0
+        spot = round(self.home.latitude_deg * 1e7), round(self.home.longitude_deg * 1e7)
+        return ned_from_enu(enu_from_geodetic(*spot, round(self.home.altitude_m * 1e3), self.origin))
+
+    def layout(self) -> dict[str, float]:
+        """Sizes in m: what the picture needs of the vehicle."""
+        return {
+            "arm": self.parameters.get("VEH_ARM_LEN", 0.126),
+            "cable": self.parameters.get("VEH_CABLE_LEN", 0.7),
+        }
+
+    def state(self, now_us: int) -> dict[str, Any]:
+        """All that is known at this moment; what is not known is None. Places are NED in m, angles deg."""
+        view = self.view
+        offset = self.offset
+        load, taut = self._load(offset)
+        position, attitude = self._pose()
+        rotors, force_max = self._rotors()
+        return {
+            "id": self.target.system,
+            "time": None if self.time_us is None else round(self.time_us * 1e-6, 4),
+            "armed": view.armed,
+            "ready": view.ready_to_arm,
+            "mode": view.mode,
+            "phase": view.phase_name,
+            "mission": view.mission_state,
+            "item": self._of("MISSION_CURRENT", "seq"),
+            "items": self._of("MISSION_CURRENT", "total"),
+            "position": _moved(position, offset),
+            "attitude": _places(attitude, 5),
+            "velocity": self._velocity(),
+            "load": load,
+            "taut": taut,
+            "cable": round(self.cable, 3),
+            "asked": self._asked(offset),
+            "error": _rounded(view.load_error_m),
+            "tension": self._tension(),
+            "swing": self._swing(),
+            "rotors": rotors,
+            "force_max": force_max,
+            "estimator_error": self._estimator_error(),
+            "wind": _places(self._wind()),
+            "link": self.link.record(now_us),
+        }
+
+    def _of(self, message: str, field: str) -> Any:
+        found = self.view.latest.get(message)
+        return None if found is None else getattr(found, field)
+
+    def _load_message(self) -> Any:
+        """LOAD_STATE: the truth if it is known, else the estimate."""
+        true = self.truth.message(mavlink.MAVLINK_MSG_ID_LOAD_STATE)
+        return true if true is not None else self.view.latest.get("LOAD_STATE")
+
+    def _load(self, offset: Place) -> tuple[dict[str, Any] | None, bool | None]:
+        message = self._load_message()
+        if message is None or not math.isfinite(message.x):
+            return None, None
+        taut = bool(message.taut)
+        if taut and math.isfinite(message.distance):
+            self._cable = message.distance
+        attached = taut or not message.distance > _LONGEST_SHOWN * self.cable
+        return {"position": _moved((message.x, message.y, message.z), offset), "attached": attached}, taut
+
+    @property
+    def cable(self) -> float:
+        """How long the cable was when it was taut last; a winch may have changed it since take-off."""
+        return self._cable or self.layout()["cable"]
+
+    def _pose(self) -> tuple[Sequence[float] | None, Sequence[float] | None]:
+        true = self.truth.pose(self.home)
+        load = self.truth.message(mavlink.MAVLINK_MSG_ID_LOAD_STATE)
+        if true is not None:
+            position = true[0]
+            if load is not None and load.taut and math.isfinite(load.qx):
+                # the cable is straight: its upper end is known to the millimetre
+                ends = zip((load.x, load.y, load.z), (load.qx, load.qy, load.qz), strict=True)
+                north, east, down = (at - load.distance * along for at, along in ends)
+                position = north, east, down
+            return position, true[1]
+        place = self.view.latest.get("LOCAL_POSITION_NED")
+        attitude = self.view.latest.get("ATTITUDE_QUATERNION")
+        return (
+            None if place is None else (place.x, place.y, place.z),
+            None if attitude is None else (attitude.q1, attitude.q2, attitude.q3, attitude.q4),
+        )
+
+    def _velocity(self) -> float | None:
+        message = self._load_message()
+        return None if message is None else _rounded(math.hypot(message.vx, message.vy, message.vz), 3)
+
+    def _asked(self, offset: Place) -> list[float] | None:
+        message = self.view.latest.get("LOAD_SETPOINT")
+        if message is None or message.phase in _NOT_CARRIED:
+            return None
+        return _moved((message.x, message.y, message.z), offset)
+
+    def _tension(self) -> float | None:
+        message = self._load_message()
+        return None if message is None else _rounded(message.tension, 3)
+
+    def _swing(self) -> float | None:
+        """Off the plumb line."""
+        message = self._load_message()
+        if message is None or not message.taut or not math.isfinite(message.qz):
+            return None
+        return _rounded(math.degrees(math.acos(max(-1.0, min(1.0, message.qz)))), 2)
+
+    def _rotors(self) -> tuple[list[float] | None, float | None]:
+        """Share of the greatest force of each, and that force; without limits the shares of the thrust."""
+        message = self.view.latest.get("ROTOR_STATE")
+        if message is None:
+            return None, None
+        limited = math.isfinite(message.force_max) and message.force_max > 0.0
+        forces = [force if math.isfinite(force) else 0.0 for force in message.force]
+        full = message.force_max if limited else max(sum(forces), 1e-6)
+        shares = [round(force / full, 3) for force in forces]
+        return shares, (_rounded(message.force_max, 3) if limited else None)
+
+    def _estimator_error(self) -> float | None:
+        """Between where the load is believed to be and where it was at that time."""
+        for time_us, believed in reversed(self._believed):  # the newest may be ahead of the truth
+            true = self.truth.load_at(time_us)
+            if true is not None:
+                return _rounded(math.dist(true, believed))
+        return None
+
+    def _wind(self) -> Sequence[float] | None:
+        true = self.truth.wind
+        if true is not None:
+            return true
+        felt = self.view.latest.get("WIND_COV")
+        return None if felt is None or not self.view.armed else (felt.wind_x, felt.wind_y, felt.wind_z)
+
+
+def _moved(place: Sequence[float] | None, offset: Place) -> list[float] | None:
+    return None if place is None else _places([a + b for a, b in zip(place, offset, strict=True)])
+
+
+def _rounded(value: float | None, digits: int = 4) -> float | None:
+    return round(value, digits) if value is not None and math.isfinite(value) else None
+
+
+def _places(values: Sequence[float] | None, digits: int = 4) -> list[float] | None:
+    if values is None or not all(map(math.isfinite, values)):
+        return None
+    return [round(float(value), digits) for value in values]

@@ -1,0 +1,265 @@
+// The live page: takes records from its server, and brings scene, panels, plots and controls up to them.
+"use strict";
+(() => {
+  const AT = Plumbline.SAMPLE_AT;
+  const PANELS_MS = 100;
+  const PLOTS_MS = 150;
+  const MOST_SAMPLES = 12000;
+  const RETRY_MS = 1000;
+  const byId = (id) => document.getElementById(id);
+
+  const page = {
+    session: {}, vehicles: new Map(), chosen: null, requests: 0, socket: null,
+    frames: 0, // drawn so far
+  };
+  let scene = null;
+  try {
+    scene = new Plumbline.Scene(byId("scene"), { theme: "auto" });
+    scene.camera("follow");
+  } catch (error) {
+    byId("hint").textContent = "This browser offers no WebGL: the numbers and plots work without the picture.";
+  }
+  const panels = new Plumbline.LivePanels();
+  const plots = new Plumbline.LivePlots(byId("signals"), byId("strips"));
+  const controls = new Plumbline.LiveControls(ask);
+
+  function vehicleOf(id) {
+    if (!page.vehicles.has(id)) {
+      page.vehicles.set(id, { id, record: null, state: null, before: null, samples: [], at: 0, every: 20 });
+      if (page.chosen === null) page.chosen = id;
+      showVehicles();
+    }
+    return page.vehicles.get(id);
+  }
+
+  // ---- the server's records
+
+  const TAKE = {
+    hello(record) {
+      controls.offer(record.controls, record.rotors);
+      controls.enable(false);
+    },
+    session(record) {
+      page.session = record;
+      panels.setSession(record);
+      if (record.outcome) {
+        panels.showBanner(null);
+        const chosen = page.vehicles.get(page.chosen);
+        if (chosen && chosen.state) panels.show(chosen.state);
+        if (scene) {
+          scene.camera("orbit");
+          pressCamera("orbit");
+          scene.fit();
+        }
+        plots.showAll();
+      }
+      enable();
+    },
+    vehicle(record) {
+      const vehicle = vehicleOf(record.id);
+      vehicle.record = record;
+      vehicle.layout = {
+        armLength: record.layout.arm, cableLength: record.layout.cable,
+        rotors: Plumbline.plusFrame(record.layout.arm) };
+      if (record.id === page.chosen) choose(record.id);
+    },
+    history(record) {
+      const vehicle = vehicleOf(record.vehicle);
+      vehicle.samples = [];
+      if (scene) scene.clearTrack(record.vehicle);
+      addSamples(vehicle, record.samples);
+    },
+    state(record) {
+      const now = performance.now();
+      for (const state of record.vehicles) {
+        const vehicle = vehicleOf(state.id);
+        if (vehicle.state && state.time !== vehicle.state.time) {
+          vehicle.every = 0.8 * vehicle.every + 0.2 * Math.min(now - vehicle.at, 200);
+          vehicle.before = vehicle.state;
+          vehicle.at = now;
+        }
+        vehicle.state = state;
+      }
+      for (const [id, samples] of Object.entries(record.samples)) addSamples(vehicleOf(Number(id)), samples);
+      enable();
+    },
+    text(record) {
+      if (record.vehicle === page.chosen || page.chosen === null) panels.addText(record);
+    },
+    result(record) {
+      controls.showAnswer(record);
+      if (!record.ok && record.action === "goto" && scene) scene.setGoal(null);
+      const vehicle = page.vehicles.get(page.chosen);
+      if (!record.ok && vehicle && vehicle.record) controls.setParameters(vehicle.record.parameters);
+    },
+  };
+
+  function addSamples(vehicle, samples) {
+    for (const sample of samples) {
+      const last = vehicle.samples[vehicle.samples.length - 1];
+      if (last && sample[AT.time] <= last[AT.time] && sample[AT.time] > last[AT.time] - 1) continue; // known already
+      if (last && sample[AT.time] < last[AT.time]) { // the vehicle began anew
+        vehicle.samples = [];
+        if (scene) scene.clearTrack(vehicle.id);
+      }
+      vehicle.samples.push(sample);
+      if (scene && moved(last, sample)) scene.extendTrack(vehicle.id, sample[AT.load], sample[AT.error], sample[AT.asked]);
+    }
+    if (vehicle.samples.length > MOST_SAMPLES) vehicle.samples.splice(0, MOST_SAMPLES / 4);
+  }
+
+  /** Whether the path goes on: a load that stands still adds no points. */
+  function moved(last, sample) {
+    if (!sample[AT.load]) return false;
+    if (!last || !last[AT.load]) return true;
+    return Math.hypot(...sample[AT.load].map((value, axis) => value - last[AT.load][axis])) > 1e-4
+      || sample[AT.error] !== last[AT.error];
+  }
+
+  function showVehicles() {
+    const box = byId("vehicles");
+    box.hidden = page.vehicles.size < 2;
+    box.replaceChildren(...[...page.vehicles.keys()].sort((a, b) => a - b).map((id) => {
+      const button = document.createElement("button");
+      button.className = id === page.chosen ? "do main" : "do";
+      button.textContent = `Vehicle ${id}`;
+      button.addEventListener("click", () => choose(id));
+      return button;
+    }));
+  }
+
+  function choose(id) {
+    page.chosen = id;
+    const { record } = vehicleOf(id);
+    showVehicles();
+    if (scene && scene.followed !== id) scene.camera(scene.mode, id);
+    if (!record) return;
+    if (scene) {
+      scene.setFence(record.fence);
+      scene.setRally(record.rally);
+    }
+    controls.setParameters(record.parameters);
+    enable();
+  }
+
+  // ---- hands on
+
+  function ask(action, words) {
+    if (!page.socket || page.socket.readyState !== WebSocket.OPEN || page.chosen === null) return;
+    page.requests += 1;
+    page.socket.send(JSON.stringify({ vehicle: page.chosen, request: page.requests, action, arguments: words }));
+  }
+
+  function enable() {
+    const vehicle = page.vehicles.get(page.chosen);
+    const some = Boolean(vehicle && vehicle.state && !page.session.outcome);
+    if (some === page.enabled) return;
+    page.enabled = some;
+    controls.enable(some);
+    if (some && vehicle.record) controls.setParameters(vehicle.record.parameters);
+    byId("hint").textContent = some && scene ? "Double-click: take the load there. Drag: turn. Wheel: zoom." : "";
+  }
+
+  if (scene) {
+    scene.onPick((place, ground, clicks) => {
+      const vehicle = page.vehicles.get(page.chosen);
+      if (clicks !== 2 || !vehicle || !vehicle.state || page.session.outcome) return;
+      const goal = place.map((value) => Math.round(value * 1000) / 1000);
+      scene.setGoal(goal);
+      ask("goto", { place: goal });
+    });
+  }
+
+  function pressCamera(mode) {
+    for (const button of document.querySelectorAll("#cameras [aria-pressed]")) {
+      button.setAttribute("aria-pressed", String(button.dataset.camera === mode));
+    }
+  }
+
+  for (const button of document.querySelectorAll("#cameras button")) {
+    button.addEventListener("click", () => {
+      const mode = button.dataset.camera;
+      if (!scene) return;
+      if (mode === "fit") {
+        if (scene.mode === "follow") scene.camera("orbit");
+        scene.fit();
+        pressCamera(scene.mode);
+        return;
+      }
+      scene.camera(mode);
+      pressCamera(mode);
+    });
+  }
+
+  // ---- frames
+
+  /** The state between the last two that came, so that the picture moves evenly. */
+  function between(vehicle, now) {
+    const { state, before } = vehicle;
+    if (!before || !before.position || !state.position || !before.load || !state.load) return state;
+    const share = Math.min(Math.max((now - vehicle.at) / Math.max(vehicle.every, 1), 0), 1);
+    const mix = (a, b) => (a && b ? b.map((value, i) => a[i] + share * (value - a[i])) : b);
+    const attitude = mix(before.attitude, state.attitude);
+    const norm = attitude ? Math.hypot(...attitude) : 1;
+    return {
+      ...state, time: before.time + share * (state.time - before.time),
+      position: mix(before.position, state.position),
+      attitude: attitude && norm > 0.5 ? attitude.map((value) => value / norm) : state.attitude,
+      load: { ...state.load, position: mix(before.load.position, state.load.position) },
+      asked: mix(before.asked, state.asked),
+    };
+  }
+
+  let panelsAt = 0, plotsAt = 0;
+  function frame(now) {
+    requestAnimationFrame(frame);
+    const chosen = page.vehicles.get(page.chosen);
+    if (scene) {
+      const shown = [];
+      for (const vehicle of page.vehicles.values()) {
+        if (!vehicle.state || !vehicle.state.position) continue;
+        const state = between(vehicle, now);
+        shown.push({
+          id: vehicle.id, position: state.position, attitude: state.attitude || [1, 0, 0, 0],
+          rotors: state.armed ? state.rotors || [] : [], load: state.load, taut: state.taut, asked: state.asked,
+          layout: vehicle.layout, cableLength: state.cable, time: state.time });
+      }
+      if (shown.length) {
+        const wind = chosen && chosen.state ? chosen.state.wind : null;
+        scene.show({ time: shown[0].time || 0, vehicles: shown, wind });
+      }
+      scene.render();
+    }
+    if (now - panelsAt > PANELS_MS && chosen && chosen.state) {
+      panelsAt = now;
+      panels.show(chosen.state);
+    }
+    if (now - plotsAt > PLOTS_MS && chosen) {
+      plotsAt = now;
+      plots.setSamples(chosen.samples);
+    }
+    page.frames += 1;
+  }
+
+  function connect() {
+    const socket = new WebSocket(new URL("socket", location.href.replace(/^http/, "ws")));
+    page.socket = socket;
+    socket.addEventListener("message", (event) => {
+      const record = JSON.parse(event.data);
+      if (TAKE[record.type]) TAKE[record.type](record);
+    });
+    socket.addEventListener("close", () => {
+      controls.enable(false);
+      page.enabled = false;
+      if (!page.session.outcome) {
+        byId("phase").textContent = "the server of this page has ended";
+        byId("phase").className = "chip bad";
+      }
+      setTimeout(connect, RETRY_MS);
+    });
+  }
+
+  Plumbline.live = { page, scene, panels, plots, ask };
+  connect();
+  requestAnimationFrame(frame);
+})();

@@ -1,0 +1,156 @@
+"""The live page of one `gcs fly`: a process of its own that is told what the ground station hears.
+
+The flight never waits for it. What a person asks on the page comes back as frames, and is said to the vehicle
+as a word of the ground station's own, in lockstep at its turn.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gcs.clients.capture import Capture
+from gcs.clients.datagrams import messages
+from gcs.clients.flight import FlightClient
+from gcs.errors import GcsError
+from gcs.shell.display import say
+from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, pipe
+from gcs.shell.processes import Processes
+from gcs.shell.stopping import StopRequest
+from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.view import open_browser
+from missions.model import Mission
+
+_BEGIN_S = 20.0  # for the page's process to say its address
+_READER_S = 15.0  # for the browser that we have opened
+_RELOAD_S = 3.0  # between a page that is closed and the same one opened again
+_WAIT_S = 0.1
+
+
+@dataclass(frozen=True)
+class PageOptions:
+    """Where the page of a flight is served."""
+
+    host: str
+    port: int | None  # None: any that is free
+
+
+class FlightPage:
+    """Our end of it."""
+
+    def __init__(self, feed: FeedEnd) -> None:
+        self.address = ""
+        self._feed = feed
+        self._readers = 0
+        self._had_readers = False
+        self._stage = ""
+        self._asked: list[bytes] = []
+
+    # ---- in flight
+
+    def turn(
+        self,
+        client: FlightClient,
+        capture: Capture,
+        truth: list[bytes],
+        vehicle: list[bytes],
+        now_us: int,
+        may_speak: bool,
+    ) -> list[bytes]:
+        """Tell the page what was heard; the datagrams for the vehicle that somebody asked for there.
+
+        They wait for a turn at which we may speak.
+        """
+        self._feed.tell(TRUTH, now_us, truth)
+        self._feed.tell(VEHICLE, now_us, vehicle)
+        if client.stage.value != self._stage:
+            self._stage = client.stage.value
+            self.tell(stage=self._stage)
+        self._hear()
+        if not may_speak or not self._asked or client.outcome is not None:
+            return []
+        asked, self._asked = self._asked, []
+        sent = [client.connection.frame(one.message) for frame in asked for one in messages(frame)[0]]
+        client.fly_on()
+        for datagram in sent:
+            capture.on_sent(datagram)
+        return sent
+
+    def tell(self, **record: Any) -> None:
+        """News of the flight as a whole."""
+        self._feed.tell_event(record)
+
+    # ---- before and after it
+
+    def await_address(self) -> None:
+        """Wait until the page is served; GcsError if it cannot be."""
+        self._wait(_BEGIN_S, lambda: bool(self.address))
+        if not self.address:
+            raise GcsError("the process of the live page does not start")
+
+    def await_reader(self, stop: StopRequest) -> None:
+        """Open a browser and wait until it shows the page; without a screen nobody is waited for."""
+        say(f"live page: {self.address}")
+        if open_browser(self.address):
+            self._wait(_READER_S, lambda: bool(self._readers or stop))
+
+    def stay(self, stop: StopRequest) -> None:
+        """Let people look until the last page is closed, or until Ctrl-C."""
+        if stop:
+            return
+        say("the page stays until it is closed or Ctrl-C ends it")
+        gone_s = 0.0
+        while not stop and gone_s < _RELOAD_S and not self._feed.closed:
+            select.select([self._feed], [], [], _WAIT_S)
+            self._hear()
+            gone_s = gone_s + _WAIT_S if self._had_readers and not self._readers else 0.0
+
+    def _wait(self, limit_s: float, done: Any) -> None:
+        waited_s = 0.0
+        while not done() and waited_s < limit_s and not self._feed.closed:
+            if not select.select([self._feed], [], [], _WAIT_S)[0]:
+                waited_s += _WAIT_S
+            self._hear()
+
+    def _hear(self) -> None:
+        for piece in self._feed.read():
+            if piece.kind == COMMAND:
+                self._asked.append(piece.body)
+            elif piece.kind == EVENT:
+                event = piece.event
+                if "trouble" in event:
+                    raise GcsError(event["trouble"])
+                self.address = event.get("address", self.address)
+                self._readers = event.get("readers", self._readers)
+                self._had_readers = self._had_readers or self._readers > 0
+
+
+@contextmanager
+def flight_page(mission: Mission, options: FlightOptions, page: PageOptions) -> Iterator[FlightPage]:
+    """The page of a flight; afterwards it is gone."""
+    ours, theirs = pipe()
+    with closing(ours), Processes() as processes:
+        with closing(theirs):
+            arguments = ["view", "--feed", str(theirs.fileno()), "--bind", page.host]
+            if page.port is not None:
+                arguments += ["--port", str(page.port)]
+            processes.start("gcs", arguments, Path(os.devnull), (theirs.fileno(),))
+        shown = FlightPage(ours)
+        shown.await_address()
+        shown.tell(**_about(mission, options))
+        yield shown
+
+
+def _about(mission: Mission, options: FlightOptions) -> dict[str, Any]:
+    own = options.connect is None
+    record: dict[str, Any] = {"kind": "fly", "mission": mission.name, "title": mission.title}
+    if own:
+        record |= {"law": options.law, "sensors": options.sensors, "vehicle_name": options.vehicle}
+        record |= {"seed": options.seed, "speed": options.speed}
+        record["settings"] = dict(setting_of(setting) for setting in options.settings)
+    return record

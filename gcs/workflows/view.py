@@ -1,0 +1,256 @@
+"""The live page of running vehicles: `gcs view`, and the process behind `gcs fly --view`."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from autopilot.vehicle.file import load_vehicle
+from autopilot.wire.signing import Signing, timestamp_of
+from gcs.clients.connection import Connection
+from gcs.errors import GcsError
+from gcs.shell.display import say
+from gcs.shell.feed import COMMAND, EVENT, TRUTH, FeedEnd, inherited
+from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, UdpSocket, monotonic_us, open_address, unix_us
+from gcs.shell.page_server import Pages, PageServer, Site
+from gcs.view.controls import ROTORS, SLIDERS
+from gcs.view.station import Station
+from gcs.web import LIVE_FILES, LIVE_PAGE, asset
+
+STATE_S = 0.02  # between two records of the state
+_TICK_S = 0.01
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """Options of `gcs view`."""
+
+    connect: tuple[Address, ...]
+    host: str = LOOPBACK
+    port: int | None = None  # None: PAGE_PORT, or any that is free
+    opens: bool = True  # a browser, where there is one
+    truth: bool = True  # listen to the simulated world
+
+
+class Links(Protocol):
+    """Where datagrams of vehicles come from and go to."""
+
+    def poll(self, station: Station, now_us: int) -> None:
+        """Hand all that came to the station, and send what it says."""
+
+    def close(self) -> None:
+        """Let all go."""
+
+
+class UdpLinks:
+    """Vehicles that run by themselves, met at one address or several."""
+
+    def __init__(self, addresses: tuple[Address, ...], truth: bool) -> None:
+        self._sockets: list[UdpSocket] = []
+        self._ways: dict[int, tuple[UdpSocket, tuple[str, int]]] = {}  # to a system
+        self._spoken: list[UdpSocket] = []  # of `udpout:`: the vehicle waits for our first word
+        self._truth: UdpSocket | None = None
+        try:
+            for address in addresses:
+                self._sockets.append(open_address(address))
+                if not address.listen:
+                    self._spoken.append(self._sockets[-1])
+            if truth:
+                self._truth = _truth_socket()
+        except GcsError:
+            self.close()
+            raise
+        self._hello = Connection()
+
+    def poll(self, station: Station, now_us: int) -> None:
+        for link in self._sockets:
+            for datagram, sender in link.drain_with_senders():
+                for system in station.receive(datagram, now_us):
+                    self._ways[system] = (link, sender)
+        for datagram in self._truth.drain() if self._truth else ():
+            station.receive_truth(datagram)
+        for out in station.poll(now_us):
+            way = self._ways.get(out.system)
+            if way is not None:
+                way[0].send_to(out.datagram, way[1])
+        if not self._ways:
+            for datagram in self._hello.poll(now_us) if self._spoken else ():
+                for link in self._spoken:
+                    link.send(datagram)
+
+    def close(self) -> None:
+        for link in (*self._sockets, *((self._truth,) if self._truth else ())):
+            link.close()
+
+
+class FedLinks:
+    """The vehicle of `gcs fly`, which tells us what it hears and sends what a person asks for."""
+
+    def __init__(self, feed: FeedEnd, told: Callable[[dict[str, Any]], None]) -> None:
+        self._feed = feed
+        self._told = told
+
+    def poll(self, station: Station, now_us: int) -> None:
+        for piece in self._feed.read():
+            if piece.kind == EVENT:
+                self._told(piece.event)
+            elif piece.kind == TRUTH:
+                station.receive_truth(piece.body)
+            else:
+                station.receive(piece.body, now_us)
+                station.sample(now_us)  # a flight in lockstep outruns the clock
+        for out in station.poll(now_us):
+            self._feed.tell(COMMAND, 0, [out.datagram])
+
+    @property
+    def ended(self) -> bool:
+        """Whether `gcs fly` is gone."""
+        return self._feed.closed
+
+    def close(self) -> None:
+        self._feed.close()
+
+
+@dataclass
+class _Session:
+    """What the page is told of the flight as a whole; of `gcs view` there is none."""
+
+    record: dict[str, Any] = field(default_factory=lambda: {"type": "session", "kind": "view"})
+
+
+def view(options: ViewOptions) -> None:
+    """Serve the page until Ctrl-C."""
+    key = next((address.signing_key for address in options.connect if address.signing_key), None)
+    signing = None if key is None else Signing(key, timestamp_of(unix_us()))
+    links = UdpLinks(options.connect, options.truth)
+    station = Station(signing=signing)
+    try:
+        asyncio.run(_serve(station, links, options, _Session(), Site(_texts()), None))
+    finally:
+        links.close()
+
+
+def serve_feed(descriptor: int, options: ViewOptions) -> None:
+    """Serve the page of a flight that our parent flies, until it ends us."""
+    feed = inherited(descriptor)
+    station = Station(speaks=False)
+    session, site = _Session(), Site(_texts())
+    servers: list[PageServer] = []
+
+    def told(event: dict[str, Any]) -> None:
+        if "report" in event:
+            site.report = Path(event.pop("report"))
+            event["report"] = "report/report.html"
+        if "kind" in event:
+            station.known_parameters.update(_known(event.get("vehicle_name"), event.pop("settings", {})))
+        session.record = {**session.record, **event}
+        for server in servers:
+            server.tell_all(session.record)
+
+    links = FedLinks(feed, told)
+    try:
+        asyncio.run(_serve(station, links, options, session, site, feed, servers))
+    except GcsError as error:
+        feed.tell_event({"trouble": str(error)})
+    finally:
+        links.close()
+
+
+async def _serve(
+    station: Station,
+    links: UdpLinks | FedLinks,
+    options: ViewOptions,
+    session: _Session,
+    site: Site,
+    feed: FeedEnd | None,
+    servers: list[PageServer] | None = None,
+) -> None:
+    stopped = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stopped.set)
+
+    def opened() -> list[dict[str, Any]]:
+        controls = [slider.record() for slider in SLIDERS]
+        hello = {"type": "hello", "controls": controls, "rotors": ROTORS}
+        return [hello, *station.greeting(), session.record]
+
+    def count_changed(count: int) -> None:
+        if feed is not None:
+            feed.tell_event({"readers": count})
+
+    async with PageServer(
+        site, Pages(opened, station.ask, count_changed), options.host, options.port
+    ) as server:
+        if servers is not None:
+            servers.append(server)
+        if feed is not None:
+            feed.tell_event({"address": server.address})
+        else:
+            _announce(server.address, options.opens)
+        next_state_s = loop.time()
+        while not stopped.is_set():
+            now_us = monotonic_us()
+            links.poll(station, now_us)
+            for record in station.news():
+                page = record.pop("page", None)
+                if page is None:
+                    server.tell_all(record)
+                else:
+                    server.tell(page, record)
+            if loop.time() >= next_state_s:
+                next_state_s = max(next_state_s + STATE_S, loop.time())
+                if station.vehicles and server.readers:
+                    server.tell_all(station.state(now_us))
+                else:
+                    station.sample(now_us)
+                    station.forget_samples()
+            if isinstance(links, FedLinks) and links.ended:
+                return
+            try:
+                await asyncio.wait_for(stopped.wait(), _TICK_S)
+            except TimeoutError:
+                continue
+
+
+def _known(vehicle: str | None, settings: dict[str, float]) -> dict[str, float]:
+    """Parameters of a flight's own vehicle before anybody turns them."""
+    if vehicle is None:
+        return {}
+    sizes = load_vehicle(vehicle)
+    known = {slider.name: slider.default for slider in SLIDERS if slider.default is not None}
+    known |= {"VEH_ARM_LEN": sizes.arm_m, "VEH_CABLE_LEN": sizes.cable_length_m}
+    return {**known, "SIM_LOAD_MASS": sizes.load_mass_kg, **settings}
+
+
+def _announce(address: str, opens: bool) -> None:
+    print(f"live page: {address}", flush=True)
+    if opens:
+        open_browser(address)
+
+
+def open_browser(address: str) -> bool:
+    """Show the page where there is a screen to show it on; whether there is."""
+    has_screen = sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    return has_screen and webbrowser.open(address)
+
+
+def _texts() -> dict[str, bytes]:
+    return {"": asset(LIVE_PAGE).encode(), **{name: asset(name).encode() for name in LIVE_FILES}}
+
+
+def _truth_socket() -> UdpSocket | None:
+    try:
+        return UdpSocket(LOOPBACK, TRUTH_PORT)
+    except GcsError:
+        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes")
+        return None
