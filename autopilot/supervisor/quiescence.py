@@ -27,7 +27,13 @@ from autopilot.supervisor.watches.fence import NO_ACTION
 from autopilot.supervisor.watches.idle import FAILSAFE_DISARM_US, IDLE_DISARM_US
 from autopilot.supervisor.watches.slack import LEAST_GAP, LIFT_OFF_US
 from autopilot.supervisor.watches.tautening import ASTRAY, TAUT_LATEST
-from autopilot.supervisor.watches.touchdown import LOAD_SUNK, STILL_SPEED, STILL_US, VEHICLE_SUNK
+from autopilot.supervisor.watches.touchdown import (
+    LOAD_SUNK,
+    STANDS,
+    STILL_SPEED,
+    STILL_US,
+    VEHICLE_SUNK,
+)
 
 RESTING = 0  # no rotor is controlled, beside the control modes of the legs
 FOREVER_US = 2**52  # later than any flight lasts
@@ -219,6 +225,7 @@ def may_decide(
     if at.watch == LOAD_DOWN:
         return (state.x_load[2] - target[2] > at.level) != at.still
     if at.watch == VEHICLE_DOWN:
-        down = state.x_quad[2] - target[2] > at.level and abs(state.v_quad[2]) < STILL_SPEED
+        sunk = state.x_quad[2] - target[2]
+        down = sunk > at.level and (sunk > STANDS or abs(state.v_quad[2]) < STILL_SPEED)
         return down != at.still
     return False

@@ -32,3 +32,13 @@ def test_a_load_that_lags_is_not_taken_for_one_on_the_ground() -> None:
             noted.append(height)
     assert len(noted) == 1
     assert noted[0] == pytest.approx(load_truth("thesis").load_radius, abs=RESTING)
+
+
+@pytest.mark.parametrize("seed", [2, 7])
+def test_a_vehicle_that_trembles_on_the_ground_stands(seed: int) -> None:
+    """With 36 ms of delay and rotors without lag the loop never comes to rest between ground and gear."""
+    mission = Mission("down", "Down", "", (), (Takeoff(0.3), Land()))
+    settings = {"CTL_LAW": 2.0, "SIM_ACT_DELAY_MS": 36.0, "SIM_ROTOR_TAU_MS": 0.0}
+    log = io.BytesIO()
+    outcome = fly(mission, Conditions(seed=seed, settings=settings), TlogWriter(log))
+    assert (outcome.name, outcome.reason) == ("completed", "")

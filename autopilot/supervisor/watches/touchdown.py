@@ -11,6 +11,7 @@ from autopilot.supervisor.state import INFO, Event, Flight, Phase, View, leg_tim
 from autopilot.supervisor.watches.watched import Watched
 
 LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
+STANDS = 2.0  # m, ten seconds of sinking: then nothing but the ground holds it up, however it trembles
 STILL_SPEED, STILL_US = 0.05, 200_000
 
 
@@ -41,8 +42,9 @@ def _note_stop(flight: Flight, view: View, settings: Settings) -> Flight:
     """Note since when the thing that is set down no longer follows its sinking setpoint.
 
     A load that still sinks keeps behind the setpoint by what it sinks in the lag of the law.
-    The vehicle must stand still as well: a gust may hold it up. The load's velocity says nothing once the
-    cable is slack.
+    The vehicle must stand still as well: a gust may hold it up. But a loop with a long delay may never come
+    to rest on the ground: a setpoint far below says enough. The load's velocity says nothing once the cable
+    is slack.
     """
     leg = flight.legs[0]
     if isinstance(leg, Creep):
@@ -50,7 +52,8 @@ def _note_stop(flight: Flight, view: View, settings: Settings) -> Flight:
         if leg.control_mode == LOAD_POSITION:
             down = view.x_load[2] - target > LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED
         else:
-            down = view.x_quad[2] - target > VEHICLE_SUNK and abs(view.v_quad[2]) < STILL_SPEED
+            sunk = view.x_quad[2] - target
+            down = sunk > VEHICLE_SUNK and (sunk > STANDS or abs(view.v_quad[2]) < STILL_SPEED)
         if down:
             return flight if flight.still_since_us >= 0 else replace(flight, still_since_us=view.now_us)
     return flight if flight.still_since_us < 0 else replace(flight, still_since_us=-1)
