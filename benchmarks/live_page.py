@@ -105,8 +105,9 @@ def picture(browser: Browser, folder: Path, path: Path, theme: str) -> None:
         browser.open(address, 1440, 860, theme)
         browser.wait(IN_MISSION, WAIT_S)
         browser.wait("Plumbline.live.plots.samples.at(-1)[0] > 37", WAIT_S)
-        browser.run("Plumbline.live.ask('push', {north: 0, east: 12, seconds: 0.6})")
-        browser.wait("Plumbline.live.plots.samples.at(-1)[0] > 41", WAIT_S)
+        browser.run("Plumbline.live.ask('push', {north: 2, east: 7, seconds: 0.6})")
+        browser.run("Plumbline.live.scene.look(Plumbline.live.scene.vehicles.get(1).position, 3.8)")
+        browser.wait("Plumbline.live.plots.samples.at(-1)[0] > 39.3", WAIT_S)
         path.parent.mkdir(parents=True, exist_ok=True)
         browser.screenshot(path)
 

@@ -14,21 +14,25 @@ from gcs.shell.link import API_PORT, Address
     "addresses",
     type=AddressType(),
     multiple=True,
+    default=(str(API_PORT),),
     help="Where vehicles are met, as in the other commands; may be given again.  "
     f"[default: {API_PORT}, which leaves 14550 to other ground stations]",
 )
 @page_options
+@click.option("--no-open", is_flag=True, help="Do not open the page in a browser.")
 @click.option(
-    "--open/--no-open", "opens", default=True, help="Open the page in a browser, where there is a screen."
+    "--no-truth",
+    is_flag=True,
+    help="Do not listen to the simulator (errors of the estimator, true places): another program wants to.",
 )
-@click.option(
-    "--truth/--no-truth",
-    default=True,
-    help="Listen to the simulator too: errors of the estimator, true places. Another program may want to.",
-)
-@click.option("--feed", type=int, hidden=True)
+@click.option("--feed", type=int, hidden=True, help="The descriptor at which gcs fly tells what it hears.")
 def view_command(
-    addresses: tuple[Address, ...], port: int | None, bind: str, opens: bool, truth: bool, feed: int | None
+    addresses: tuple[Address, ...],
+    port: int | None,
+    bind: str,
+    no_open: bool,
+    no_truth: bool,
+    feed: int | None,
 ) -> None:
     """Show running vehicles live in a browser.
 
@@ -44,7 +48,11 @@ def view_command(
     from gcs.workflows.view import ViewOptions, serve_feed, view
 
     options = ViewOptions(
-        connect=addresses or (Address("127.0.0.1", API_PORT),), host=bind, port=port, opens=opens, truth=truth
+        connect=addresses,
+        host=bind,
+        port=port,
+        opens=not no_open,
+        truth=not no_truth,
     )
     if feed is not None:
         serve_feed(feed, options)

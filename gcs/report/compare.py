@@ -78,8 +78,9 @@ def differences(runs: Sequence[Run]) -> list[Difference]:
     """What is known of how they were flown and is not the same in all."""
     rows: dict[str, list[str]] = {name: [_shown(run.record[name]) for run in runs] for name in _WAYS}
     settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
+    unnamed = ["default" if run.meta.command or run.telemetry.parameters else UNKNOWN for run in runs]
     for name in sorted(set().union(*settings)):
-        rows[name] = [found.get(name, "default") for found in settings]
+        rows[name] = [found.get(name, other) for found, other in zip(settings, unnamed, strict=True)]
     rows["mission items"] = [_steps(run) for run in runs]
     rows["version"] = [_shown(run.meta.version) for run in runs]
     return [Difference(name, tuple(values)) for name, values in rows.items() if len(set(values)) > 1]

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.vehicle.file import VehicleFileError, load_vehicle
 from autopilot.vehicle.model import Vehicle
@@ -36,6 +37,7 @@ KINDS = {  # of phases: what the band behind a plot looks like
     mavlink.PLUMBLINE_PHASE_FAILSAFE: "alarm",
     mavlink.PLUMBLINE_PHASE_GUIDED: "busy",
 }
+MOST_ROWS = 30_000  # four minutes at 125 Hz
 _USUAL = "bebop"  # drawn where nobody says which vehicle flew
 # steps to which numbers are rounded
 _PLACE_M, _SPEED_M_S, _UNIT, _FORCE_N, _TIME_S, _PSI = 1e-6, 1e-4, 1e-5, 1e-3, 1e-6, 1e-8
@@ -188,16 +190,44 @@ def _columns(
         Column("attached", samples.attached.astype(np.float64), 1.0),
         Column("scored", samples.position_tracked.astype(np.float64), 1.0),
     ]
-    gaps = np.flatnonzero(np.diff(t) > MAX_GAP_S)
+    kept = _kept(telemetry, samples)
+    t = t[kept]
+    gaps = np.flatnonzero(_ends(samples.time_s)[kept][:-1])
     columns = [
         Column("time", np.insert(t, gaps + 1, 0.5 * (t[gaps] + t[gaps + 1])), _TIME_S),
         *(
-            Column(name, np.insert(values, gaps + 1, np.nan), step)
+            Column(name, np.insert(values[kept], gaps + 1, np.nan), step)
             for name, values, step in found
             if wanted is None or name.partition("_")[0] in wanted
         ),
     ]
     return columns, len(t) + len(gaps)
+
+
+def _ends(time_s: Floats) -> NDArray[np.bool_]:
+    """(n,) True at the last sample before a gap."""
+    return np.append(np.diff(time_s) > MAX_GAP_S, False)
+
+
+def _kept(telemetry: Telemetry, samples: Samples) -> NDArray[np.intp]:
+    """The samples that the page carries: all; of a long flight every so many, with each peak of error and
+    tension, both sides of a gap, and where the load leaves the cable."""
+    n = len(samples.time_s)
+    stride = -(-n // MOST_ROWS)
+    kept = np.zeros(n, dtype=np.bool_)
+    kept[:: max(stride, 1)] = True
+    if stride > 1:
+        ends = _ends(samples.time_s)
+        kept |= ends | np.roll(ends, 1)
+        kept[1:] |= np.diff(samples.attached)
+        kept[-1] = True
+        error = np.linalg.norm(samples.error_m, axis=1)
+        for values in (error, telemetry.load_truth.tension_n, -telemetry.load_truth.tension_n):
+            blocks = np.full(-(-n // stride) * stride, -np.inf)
+            blocks[:n] = np.where(np.isfinite(values), values, -np.inf)
+            peaks = blocks.reshape(-1, stride).argmax(axis=1) + np.arange(0, n, stride)
+            kept[np.minimum(peaks, n - 1)] = True
+    return np.flatnonzero(kept)
 
 
 def _xyz(name: str, values: Floats, step: float) -> list[Column]:

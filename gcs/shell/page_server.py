@@ -13,6 +13,7 @@ import hmac
 import http
 import ipaddress
 import json
+import os
 import secrets
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -228,5 +229,5 @@ def _refused(status: http.HTTPStatus) -> Response:
 def _trouble(host: str, port: int, error: OSError) -> str:
     if error.errno == errno.EADDRINUSE:
         return f"port {port} of {host} is in use by another program; choose another with --port"
-    reason = error.strerror or error
+    reason = os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
     return f"no page can be served on {host}:{port}: {reason}; choose others with --bind and --port"

@@ -40,18 +40,19 @@
       controls.enable(false);
     },
     session(record) {
+      const isOver = Boolean(record.outcome && !page.session.outcome);
       page.session = record;
       panels.setSession(record);
       if (record.outcome) {
         panels.showBanner(null);
         const chosen = page.vehicles.get(page.chosen);
         if (chosen && chosen.state) panels.show(chosen.state);
-        if (scene) {
+        if (scene && isOver) {
           scene.camera("orbit");
           pressCamera("orbit");
           scene.fit();
         }
-        plots.showAll();
+        if (isOver) plots.showAll();
       }
       enable();
     },

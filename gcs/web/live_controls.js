@@ -99,7 +99,7 @@
 
     showAnswer(record) {
       const box = byId("answer");
-      box.textContent = record.text;
+      box.textContent = record.ok && record.action === "push" ? "push: a gust blows" : record.text;
       box.classList.toggle("bad", !record.ok);
     }
 

@@ -92,11 +92,15 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
                     client = _fly_own(mission, options, log, out, stop, watch, page)
                 else:
                     client = _fly_running(mission, options, options.connect, log, stop, watch, page)
-            flight = _end(mission, options, client, watch.stop(), out, folder, stop, told)
+
+            def tell(record: Record, outcome: Outcome) -> None:
+                told(record, outcome)
+                if page is not None:
+                    page.tell(outcome=outcome.name, reason=outcome.reason)
+
+            flight = _end(mission, options, client, watch.stop(), out, folder, stop, tell)
             if page is not None:
-                page.tell(
-                    outcome=flight.outcome.name, reason=flight.outcome.reason, report=str(out.resolve())
-                )
+                page.tell(report=str(out.resolve()))
                 page.stay(stop)
             return flight
 

@@ -87,14 +87,15 @@ class Browser:
         """The element of that CSS selector: `.click()`, `.text`, `.send_keys(...)`."""
         return self.driver.find_element("css selector", selector)
 
-    def click_at(self, selector: str, x: float, y: float) -> None:
-        """Press and release the mouse at that pixel of the element."""
+    def click_at(self, selector: str, x: float, y: float, clicks: int = 1) -> None:
+        """Press and release the mouse at that pixel of the element, so many times."""
         box = self.run(
             "const b = arguments[0].getBoundingClientRect(); return [b.x, b.y]", self.find(selector)
         )
-        for kind in ("mousePressed", "mouseReleased"):
-            event = {"type": kind, "x": box[0] + x, "y": box[1] + y, "button": "left", "clickCount": 1}
-            self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+        for count in range(1, clicks + 1):
+            for kind in ("mousePressed", "mouseReleased"):
+                place = {"x": box[0] + x, "y": box[1] + y, "button": "left", "clickCount": count}
+                self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", {"type": kind, **place})
 
     def screenshot(self, path: Path) -> None:
         """Write what is seen as PNG."""

@@ -1,0 +1,159 @@
+"""The live page of real flights, in a browser: it shows what flies, and what a person asks is done."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.sync.client import connect
+
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.tlog import TlogWriter
+from gcs.closed_loop import Conditions, fly
+from missions.fileformat import load_mission
+from tests.doubles.browser import Browser
+
+pytestmark = pytest.mark.processes
+
+FLYING = "/^(hold|mission|lift)/.test(document.getElementById('phase').textContent)"
+STATE = "Plumbline.live.page.vehicles.get(1).state"
+ANSWER = "document.getElementById('answer').textContent"
+
+# the colours of the pixels about a place, as the scene shows the vehicle at this moment
+SEEN = """
+const scene = Plumbline.live.scene, vehicle = scene.vehicles.get(1), gl = scene.renderer.getContext();
+const load = vehicle.load.position, top = vehicle.position;
+const around = (place, reach) => {
+  const [x, y] = scene.project(place).map(Math.round), side = 2 * reach + 1;
+  const out = new Uint8Array(4 * side * side);
+  gl.readPixels(x - reach, scene.canvas.height - 1 - y - reach, side, side, gl.RGBA, gl.UNSIGNED_BYTE, out);
+  return Array.from({ length: side * side }, (_, i) => [...out.slice(4 * i, 4 * i + 3)]);
+};
+scene.render();
+return {
+  load: around(load, 0)[0],
+  cable: around(load.map((value, axis) => 0.5 * (value + top[axis])), 3),
+  vehicle: around(top, 5),
+  nothing: around([load[0] + 0.9, load[1], load[2]], 0)[0],
+};
+"""
+
+
+def page_of(program: Any) -> str:
+    """The address that a program prints."""
+    program.says(rb"live page: http://\S+/\n")
+    found = re.search(r"live page: (http://\S+)", program.log.read_text())
+    assert found
+    return found[1]
+
+
+def test_a_flight_is_seen_and_led_by_hand(
+    start: Callable[..., Any], browser: Browser, tmp_path: Path
+) -> None:
+    flight = start(
+        "gcs", "fly", "square", "--view", "--speed", "2", "--out", str(tmp_path / "out"), "--quiet"
+    )
+    address = page_of(flight)
+    browser.open(address)
+    browser.wait(f"{FLYING} && {STATE}.load.position[2] < -0.5 && {STATE}.taut", 60.0)
+
+    seen = browser.run(SEEN)
+    red, green, blue = seen["load"]
+    assert red > 150 > blue, seen["load"]  # amber, as nothing else there
+    assert red > green > blue
+    assert max(min(pixel) for pixel in seen["cable"]) > 170  # nearly white
+    assert max(min(pixel) for pixel in seen["vehicle"]) > 150
+    assert max(seen["nothing"]) < 90  # ground and lines
+
+    browser.find("[data-action=hold]").click()
+    browser.wait(f"{ANSWER} === 'pause: accepted' && {STATE}.phase === 'hold'")
+    browser.find("[data-action=arm]").click()
+    browser.wait(f"{ANSWER}.includes('denied') && {ANSWER}.includes('in the air')")
+
+    browser.find("[data-camera=top]").click()
+    # two metres east of the load, as seen from above
+    x, y = browser.run(
+        f"const p = {STATE}.load.position; return Plumbline.live.scene.project([p[0], p[1] + 1, p[2]])"
+    )
+    browser.click_at("#scene", x, y, clicks=2)
+    browser.wait(f"{ANSWER} === 'reposition: accepted'")
+    browser.wait(f"{STATE}.load.position[1] > 0.9 && {STATE}.error < 0.05")
+
+    slider = "document.querySelector('[data-parameter=SIM_WIND_E]')"
+    browser.run(f"{slider}.value = 4; {slider}.dispatchEvent(new Event('change'))")
+    browser.wait(f"{ANSWER} === 'SIM_WIND_E = 4' && {STATE}.wind[1] === 4")
+    browser.wait("document.getElementById('wind').textContent === 'wind 4.0 m/s'")
+
+    browser.find("[data-signal=height]").click()
+    assert browser.run("return document.querySelectorAll('.strip canvas').length") == 4
+    assert browser.run("return Plumbline.live.plots.samples.length") > 100
+
+    browser.find("[data-action=land]").click()
+    browser.wait("document.querySelector('#banner a')", 90.0)
+    assert "before the end of the mission" in browser.find("#banner").text
+    assert browser.run("return document.querySelector('[data-action=hold]').disabled")
+    browser.listen()
+    assert browser.errors == []
+    ours = (address, address.replace("http:", "ws:") + "socket", "data:,")
+    assert [url for url in browser.requests if not url.startswith(ours)] == []
+
+    browser.open(browser.run("return document.querySelector('#banner a').href"))
+    assert "report" in browser.run("return document.title")
+    browser.driver.get("about:blank")
+    assert flight.process.wait(30.0) == 3  # the page is closed: the command ends, with the flight's own code
+
+
+def test_a_lockstep_flight_is_the_same_with_the_page_open(start: Callable[..., Any], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    flight = start("gcs", "fly", "hover", "--view", "--seed", "7", "--out", str(out), "--quiet")
+    address = page_of(flight)
+    host = address.split("/")[2]
+    with connect(address.replace("http:", "ws:") + "socket", origin=f"http://{host}") as page:  # type: ignore[arg-type]
+        heights = []
+        while True:
+            record = json.loads(page.recv(60.0))
+            for samples in record.get("samples", {}).values() if record["type"] == "state" else ():
+                heights += [-sample[1][2] for sample in samples if sample[1]]
+            if record["type"] == "session" and "outcome" in record:
+                break
+    assert record["outcome"] == "completed"
+    assert flight.process.wait(30.0) == 0
+    log = io.BytesIO()
+    fly(load_mission("hover"), Conditions(sensors="lab", seed=7), TlogWriter(log))
+    assert (out / "flight.tlog").read_bytes() == log.getvalue()
+    assert max(heights) > 0.9  # the page has seen it fly
+
+
+def test_what_comes_over_a_link_is_text_and_a_silent_vehicle_is_told(
+    start: Callable[..., Any], browser: Browser
+) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        view = start("gcs", "view", "--connect", str(port), "--no-open", "--no-truth")
+        browser.open(page_of(view))
+        browser.wait("Plumbline.live.page.socket.readyState === WebSocket.OPEN")
+        markup = "<img src=x onerror='document.title=0'>"
+        writer = FrameWriter(4, 1)
+        for message in (
+            mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 29, 0x03040000, 3, 3),
+            mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_WARNING, markup.encode()),
+        ):
+            vehicle.sendto(writer.frame(message), ("127.0.0.1", port))
+        browser.wait("document.querySelector('#texts span')")
+        assert browser.find("#texts span").text == markup
+        assert browser.run("return document.querySelectorAll('img').length") == 0
+        browser.wait("document.getElementById('phase').textContent === 'link lost'")
+        assert "Nothing heard" in browser.find("#banner").text
+        browser.listen()
+        assert browser.errors == []
+    assert view.interrupt() == 0
