@@ -24,9 +24,8 @@ def flown(folder: Path, name: str, seed: int = 1, **meta: object) -> Path:
     directory = folder / name
     directory.mkdir()
     flights.case_b(seed, duration_s=6.0).write(directory / "flight.tlog")
-    about = FlightMeta(
-        **{"mission": "case-b", "law": "plumbline", "seed": seed, "outcome": "completed", **meta}
-    )
+    told = {"mission": "case-b", "law": "plumbline", "outcome": "completed", "command": "gcs fly case-b"}
+    about = FlightMeta(**{**told, "seed": seed, **meta})
     (directory / "meta.json").write_text(json.dumps(about.to_json()))
     return directory
 
