@@ -3,8 +3,8 @@
     python benchmarks/live_page.py [--seconds 15] [--screenshot docs/images/live.png] [--theme dark]
 
 A flight in real time is watched by headless Chromium, which draws without a graphics card. Times are those
-that the threads and processes had the processor, so that a busy machine does not count. With --screenshot only the
-picture is made, of a flight in the wind that is pushed by a gust.
+that the threads and processes had the processor, so that a busy machine does not count. With --screenshot
+only the picture is made, of a flight in the wind that is pushed by a gust.
 """
 
 from __future__ import annotations

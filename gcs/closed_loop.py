@@ -55,16 +55,23 @@ def build_simulator(conditions: Conditions, home: Home) -> HilSimulator:
 Watch = Callable[[Onboard, HilSimulator], bool]
 
 
-def fly(mission: Mission, conditions: Conditions, log: FrameLog, watch: Watch | None = None) -> Outcome:
+def fly(
+    mission: Mission,
+    conditions: Conditions,
+    log: FrameLog,
+    watch: Watch | None = None,
+    client: FlightClient | None = None,
+) -> Outcome:
     """Fly a mission from take-off to landing; the log gets what `gcs fly --lockstep` writes.
 
     `watch` is shown the cores at every tick, before the world moves on; False from it ends the flight.
+    `client` is the ground station's side of it, if it is not to be as usual.
     """
     home = Home()
     onboard = build_onboard(conditions, home)
     onboard.add_link(_GROUND)
     simulator = build_simulator(conditions, home)
-    client = FlightClient(encode_mission(mission, home), expected_duration_s(mission))
+    client = client or FlightClient(encode_mission(mission, home), expected_duration_s(mission))
     capture = Capture(log)
     turns, truth_queue = LockstepTurns(), TruthQueue()
     said: list[bytes] = []

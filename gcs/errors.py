@@ -12,6 +12,7 @@ EXIT_DONE = 0
 EXIT_ERROR = 1  # a known error, told in one line
 EXIT_USAGE = 2  # the command line itself is wrong
 EXIT_NOT_MET = 3  # flown, but the mission was not completed
+EXIT_REQUIRED = 4  # a requirement of --require was not met
 EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, as shells count it
 
 

@@ -16,9 +16,11 @@ from gcs.commands.options import (
     law_option,
     page_options,
     print_json,
+    require_options,
     sensors_option,
     vehicle_option,
 )
+from gcs.errors import EXIT_REQUIRED
 from gcs.shell.display import say
 from gcs.shell.link import DEFAULT_PORT, Address
 
@@ -83,6 +85,7 @@ _OWN = (
 @click.option("--overwrite", is_flag=True, help="Even if --out holds an earlier flight: it is lost.")
 @click.option("--view", is_flag=True, help="Show the flight live in a browser; see gcs view.")
 @page_options
+@require_options
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress and no table, only the outcome.")
 @click.pass_context
@@ -105,6 +108,8 @@ def fly_command(
     view: bool,
     port: int | None,
     bind: str,
+    required: tuple[str, ...],
+    junit: Path | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -145,6 +150,13 @@ def fly_command(
     from gcs.workflows.flight_options import FlightOptions
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record
+    from gcs.workflows.requirements import conclude, judge, read_requirements, reporting
+
+    requirements = []
+    if required:
+        from gcs.analysis.definitions import METRICS
+
+        requirements = read_requirements(required, list(METRICS))
 
     def told(record: Record, outcome: Outcome) -> None:
         if as_json:
@@ -154,26 +166,27 @@ def fly_command(
         reason = f": {outcome.reason}" if outcome.reason else ""
         say(f"{mission}: {outcome.name}{reason}")
 
-    flight = fly(
-        FlightOptions(
-            mission=mission,
-            law=law,
-            sensors=sensors,
-            vehicle=vehicle,
-            seed=seed,
-            speed=speed,
-            real_time=real_time,
-            out=out,
-            settings=settings,
-            connect=connect,
-            quiet=quiet or as_json,
-            force=force,
-            overwrite=overwrite,
-            limit_s=limit_s,
-        ),
-        told,
-        page,
+    options = FlightOptions(
+        mission=mission,
+        law=law,
+        sensors=sensors,
+        vehicle=vehicle,
+        seed=seed,
+        speed=speed,
+        real_time=real_time,
+        out=out,
+        settings=settings,
+        connect=connect,
+        quiet=quiet or as_json,
+        force=force,
+        overwrite=overwrite,
+        limit_s=limit_s,
     )
+    run = f"gcs fly {mission}"
+    with reporting(run, junit):
+        flight = fly(options, told, page)
     if not (as_json or quiet):
         click.echo(f"report: {flight.out / 'report.html'}")
-    return flight.exit_code
+    wall_s = flight.record["wall_s"] or 0.0
+    met = conclude(run, junit, flight.outcome.name, wall_s, judge(requirements, flight.record))
+    return flight.exit_code if met or flight.stopped else EXIT_REQUIRED

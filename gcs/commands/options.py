@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -117,6 +118,24 @@ def sensors_option(function: F) -> F:
 
     help_text = f"What the vehicle senses with: {PROFILES.choice()}."
     return click.option("--sensors", default="lab", show_default=True, help=help_text)(function)
+
+
+def require_options(function: F) -> F:
+    """--require and --junit of every command whose result can gate a build."""
+    require = click.option(
+        "--require",
+        "required",
+        metavar='"KEY SIGN VALUE"',
+        multiple=True,
+        help='A figure of --json that must hold, e.g. "load_error_max_m < 0.01"; if not, the exit code is 4. '
+        "May be given again.",
+    )
+    junit = click.option(
+        "--junit",
+        type=click.Path(dir_okay=False, path_type=Path),
+        help="Write the outcome, and what was required, as a JUnit test report.",
+    )
+    return require(junit(function))
 
 
 def json_option(function: F) -> F:

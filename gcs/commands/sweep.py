@@ -9,7 +9,15 @@ from pathlib import Path
 import click
 
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
-from gcs.commands.options import SettingType, json_option, print_json, sensors_option, vehicle_option
+from gcs.commands.options import (
+    SettingType,
+    json_option,
+    print_json,
+    require_options,
+    sensors_option,
+    vehicle_option,
+)
+from gcs.errors import EXIT_REQUIRED
 from gcs.shell.display import say
 
 
@@ -67,6 +75,7 @@ from gcs.shell.display import say
     "the first that was lost.",
 )
 @click.option("--fresh", is_flag=True, help="Fly everything anew, also what has been flown already.")
+@require_options
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress.")
 @click.pass_context
@@ -85,6 +94,8 @@ def sweep_command(
     out: Path | None,
     reports: bool,
     fresh: bool,
+    required: tuple[str, ...],
+    junit: Path | None,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -103,27 +114,30 @@ def sweep_command(
     if jobs is not None and scheduler is not None:
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
 
-    from gcs.workflows.sweep import SweepOptions, run_sweep
+    from gcs.workflows.requirements import COMPLETED, conclude, judge, read_requirements, reporting
+    from gcs.workflows.sweep import FIGURES, SweepOptions, run_sweep
 
-    sweep = run_sweep(
-        SweepOptions(
-            mission=mission,
-            laws=laws or (DEFAULT_LAW,),
-            sensors=sensors,
-            vehicle=vehicle,
-            varied=varied,
-            settings=settings,
-            seeds=seeds,
-            sample=sample,
-            jobs=jobs,
-            scheduler=scheduler,
-            out=out,
-            reports=reports,
-            fresh=fresh,
-            quiet=quiet or as_json,
-            command=shlex.join(sys.argv),
-        )
+    requirements = read_requirements(required, FIGURES)
+    run = f"gcs sweep {mission}"
+    options = SweepOptions(
+        mission=mission,
+        laws=laws or (DEFAULT_LAW,),
+        sensors=sensors,
+        vehicle=vehicle,
+        varied=varied,
+        settings=settings,
+        seeds=seeds,
+        sample=sample,
+        jobs=jobs,
+        scheduler=scheduler,
+        out=out,
+        reports=reports,
+        fresh=fresh,
+        quiet=quiet or as_json,
+        command=shlex.join(sys.argv),
     )
+    with reporting(run, junit):
+        sweep = run_sweep(options)
     if as_json:
         print_json(sweep.record)
     else:
@@ -136,4 +150,6 @@ def sweep_command(
                     f"{one['law']}, {one['kind']} (flight {one['index']}, {one['told']}): {one['command']}"
                 )
         click.echo(f"report: {sweep.page}")
-    return sweep.exit_code
+    outcome = COMPLETED if sweep.done.whole else "interrupted"
+    met = conclude(run, junit, outcome, sweep.done.wall_s, judge(requirements, sweep.record))
+    return sweep.exit_code if met or not sweep.done.whole else EXIT_REQUIRED

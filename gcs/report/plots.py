@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from gcs.report.style import (
     PURPLE,
     RED,
     ROTORS,
+    Target,
     bands,
     draw,
     key,
@@ -80,7 +80,7 @@ class View:
         return slice(int(np.searchsorted(time_s, begin)), int(np.searchsorted(time_s, end, side="right")))
 
 
-def track(view: View, path: Path) -> None:
+def track(view: View, path: Target) -> None:
     """Load track in three dimensions."""
     figure = new_figure(9.0, 6.4)
     draw_track(figure, view.samples, (0.0, 0.0, 0.88, 0.92), (0.925, 0.22, 0.014, 0.5))
@@ -94,7 +94,7 @@ def track(view: View, path: Path) -> None:
     save(figure, path)
 
 
-def position(view: View, path: Path) -> None:
+def position(view: View, path: Target) -> None:
     """Desired and true position and velocity of the load per axis."""
     figure, axes = rows(11.0, 6.2, 3, 2)
     s = view.samples
@@ -125,7 +125,7 @@ def position(view: View, path: Path) -> None:
     save(figure, path)
 
 
-def error(view: View, path: Path) -> None:
+def error(view: View, path: Target) -> None:
     """Position and velocity error of the load per axis."""
     figure, axes = rows(11.0, 6.2, 3, 2)
     s = view.samples
@@ -160,7 +160,7 @@ def error(view: View, path: Path) -> None:
     save(figure, path)
 
 
-def angles(view: View, path: Path) -> None:
+def angles(view: View, path: Target) -> None:
     """Cable angles and attitude of the vehicle, both true."""
     figure, axes = rows(10.0, 5.6, 2)
     cable, vehicle = axes[:, 0]
@@ -184,7 +184,7 @@ def angles(view: View, path: Path) -> None:
     save(figure, path)
 
 
-def psi(view: View, path: Path) -> None:
+def psi(view: View, path: Target) -> None:
     """Error functions of vehicle attitude and load attitude."""
     figure, axes = rows(10.0, 5.0, 2)
     cascade = view.telemetry.cascade
@@ -203,7 +203,7 @@ def psi(view: View, path: Path) -> None:
     save(figure, path)
 
 
-def rotors(view: View, path: Path) -> None:
+def rotors(view: View, path: Target) -> None:
     """Force of each rotor, command and truth, with its limits and where they cut a command."""
     figure, axes = rows(11.0, 5.8, 2, 2, share_y=True)
     for i, ax in enumerate(axes.flat):
@@ -253,7 +253,7 @@ def _limits(view: View, ax: Any) -> None:
             ax.axhline(float(values[-1]), color=RED, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
 
 
-def tension(view: View, path: Path) -> None:
+def tension(view: View, path: Target) -> None:
     """Cable tension over the whole flight, slack marked."""
     figure, axes = rows(10.0, 3.6, 1)
     ax = axes[0, 0]
@@ -292,7 +292,7 @@ def tension(view: View, path: Path) -> None:
     save(figure, path)
 
 
-def overview(view: View, path: Path) -> None:
+def overview(view: View, path: Target) -> None:
     """Track, error and rotors in one picture, for a reader in a hurry."""
     figure = new_figure(13.0, 6.2)
     draw_track(figure, view.samples, (0.0, 0.0, 0.475, 0.89), (0.503, 0.22, 0.009, 0.5))
@@ -365,9 +365,10 @@ def _least_range(ax: Any, least: float) -> None:
 
 
 class Picture:
-    """A picture's file name, its caption, and what draws it."""
+    """A picture's name and file name, its caption, and what draws it."""
 
-    def __init__(self, name: str, caption: str, draw_it: Callable[[View, Path], None]) -> None:
+    def __init__(self, name: str, caption: str, draw_it: Callable[[View, Target], None]) -> None:
+        self.name = name
         self.file = f"{name}.png"
         self.caption = caption
         self.draw = draw_it

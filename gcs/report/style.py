@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +95,10 @@ def new_figure(width_in: float, height_in: float) -> Any:
     return figure
 
 
-def save(figure: Any, path: Path) -> None:
+Target = Path | BinaryIO  # of a picture
+
+
+def save(figure: Any, path: Target) -> None:
     """PNG without date or version inside, so that the same flight gives the same bytes."""
     figure.savefig(path, dpi=DPI, metadata={"Software": None}, pil_kwargs={"compress_level": 6})
 

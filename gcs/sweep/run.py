@@ -30,6 +30,7 @@ class Swept:
     flights: int  # in the table
     flown: int  # of them in this run
     completed: int
+    load_error_max_m: float | None  # of those that were completed; None: there is none
     wall_s: float
     whole: bool  # False: stopped before the end
 
@@ -74,4 +75,6 @@ def sweep(
             flown, wall_s = display.flown, display.elapsed_s
     table = store.merge()
     outcomes = table.column("outcome").to_pylist()
-    return Swept(len(outcomes), flown, outcomes.count(COMPLETED), wall_s, whole)
+    errors = table.column("load_error_max_m").to_pylist()
+    completed = [error for error, outcome in zip(errors, outcomes, strict=True) if outcome == COMPLETED]
+    return Swept(len(outcomes), flown, len(completed), max(completed, default=None), wall_s, whole)

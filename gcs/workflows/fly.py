@@ -7,11 +7,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.vehicle.file import VEHICLES
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import (
     EXIT_DONE,
@@ -25,18 +23,17 @@ from gcs.errors import (
 from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.checked import known_flyable
-from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.before_flight import check_mission, check_options
+from gcs.workflows.flight_options import FlightOptions, meta_of
 from gcs.workflows.mission_file import load
 from gcs.workflows.own_vehicle import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
 from gcs.workflows.report import TLOG_FILE, make_report
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.warmup import flight_parts, warm_up
 from missions.model import Mission
-from sitl.sensors.shipped import PROFILES
 
 if TYPE_CHECKING:
-    from gcs.analysis.record import FlightMeta, Record
+    from gcs.analysis.record import Record
     from gcs.clients.flight import FlightClient, Outcome
     from gcs.workflows.flight_page import FlightPage, PageOptions
 
@@ -71,10 +68,8 @@ class Flight:
 def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> Flight:
     """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
     the report are drawn. With `view` a page shows it, and stays."""
-    if options.connect is None and not _as_shipped(options):
-        from gcs.workflows.flight_inputs import check_flight_inputs
-
-        check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings))
+    if options.connect is None:
+        check_options(options)
     mission = load(options.mission)
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with _Folder(out, options.overwrite) as folder:
@@ -120,13 +115,6 @@ def _page(
         yield page
 
 
-def _as_shipped(options: FlightOptions) -> bool:
-    """Nothing is asked for that could be refused; to know more, most of the simulator would be loaded."""
-    return (
-        options.vehicle in VEHICLES.names() and options.sensors in PROFILES.names() and not options.settings
-    )
-
-
 def _fly_own(
     mission: Mission,
     options: FlightOptions,
@@ -139,7 +127,7 @@ def _fly_own(
     with own_vehicle(options, out) as own:
         from gcs.workflows.own_flight import fly_own  # while they load
 
-        _check(mission, options)
+        check_mission(mission, options)
         if options.speed is None:
             from gcs.report.warm import load as load_report
 
@@ -158,19 +146,8 @@ def _fly_running(
 ) -> FlightClient:
     from gcs.workflows.running_flight import fly_running
 
-    _check(mission, options)
+    check_mission(mission, options)
     return fly_running(mission, options, address, log, stop, watch, page)
-
-
-def _check(mission: Mission, options: FlightOptions) -> None:
-    """GcsError unless the vehicle can fly it, or need not."""
-    if options.force or options.tries_anyway:
-        return
-    shaped = options.law == "plumbline"
-    if not known_flyable(mission, options.vehicle, shaped):
-        from gcs.workflows.check_mission import refuse_unflyable
-
-        refuse_unflyable(mission, options.vehicle, shaped)
 
 
 def _end(
@@ -195,7 +172,7 @@ def _end(
     if options.real_time and outcome.name != "completed":
         outcome = outcome.because(_too_slow(tlog))
     try:
-        meta = _meta(mission, options, outcome, wall_s)
+        meta = meta_of(mission, options, outcome, wall_s)
         record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
     except KeyboardInterrupt:
         say(f"report abandoned; the telemetry is in {tlog}")
@@ -216,30 +193,6 @@ def _too_slow(tlog: Path) -> str:
         return ""
     return (
         f"the machine was too slow: {missed} of some {sent} commands came too late; try without --real-time"
-    )
-
-
-def _meta(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: float) -> FlightMeta:
-    from gcs.analysis.record import FlightMeta
-
-    own = options.connect is None
-    settings: dict[str, float | str] = {}
-    for setting in options.settings:
-        name, value = setting_of(setting)
-        settings[name] = value
-    return FlightMeta(
-        mission=options.mission,
-        title=mission.title,
-        law=options.law if own else None,
-        sensors=options.sensors if own else None,
-        vehicle=options.vehicle if own else None,
-        seed=options.seed if own else None,
-        outcome=outcome.name,
-        reason=outcome.reason or None,
-        wall_s=wall_s,
-        command=options.command_line(),
-        version=version("plumbline"),
-        settings=settings,
     )
 
 

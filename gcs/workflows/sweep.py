@@ -22,6 +22,18 @@ from gcs.workflows.warmup import warm_up
 STOPPING = "stopping; completed flights are stored, run the same command again to continue"
 
 
+FIGURES = (  # of the record, that something can be required of
+    "flights",
+    "completed",
+    "failed",
+    "completed_fraction",
+    "load_error_max_m",
+    "flown",
+    "wall_s",
+    "flights_per_s",
+)
+
+
 @dataclass(frozen=True)
 class SweepOptions:
     """Arguments and options of `gcs sweep`."""
@@ -64,6 +76,8 @@ class Sweep:
             "flights": self.done.flights,
             "completed": self.done.completed,
             "failed": self.done.flights - self.done.completed,
+            "completed_fraction": self.done.completed / max(self.done.flights, 1),
+            "load_error_max_m": self.done.load_error_max_m,
             "planned": self.planned,
             "flown": self.done.flown,
             "wall_s": round(self.done.wall_s, 3),

@@ -5,8 +5,9 @@ laws, estimator and guidance on those; the supervisor on guidance and services; 
 everything below. A law is known by its folder: nothing outside imports one by name. `sitl` knows of the
 autopilot its geometry and its wire, and is built like it: the plant on geometry, the sensors on the plant,
 the world's tick on both. `gcs` knows also the paths and the definitions of parameters; only
-`gcs/closed_loop.py` and `gcs/sweep` join the cores. What a vehicle is and how a TOML file is read are leaves
-that every program shares. Sockets, clocks, threads and logging belong to the shells alone.
+`gcs/closed_loop.py` and `gcs/sweep` join the cores. `plumbline`, which scripts import, stands on it. What a
+vehicle is and how a TOML file is read are leaves that every program shares. Sockets, clocks, threads and
+logging belong to the shells alone.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-ROOMS = ("autopilot", "sitl", "gcs", "missions")
+ROOMS = ("autopilot", "sitl", "gcs", "missions", "plumbline")
 
 LAW_FILES = (ROOT / "autopilot" / "control" / "laws").glob("[!_]*.py")
 LAWS = sorted(path.stem for path in LAW_FILES if path.stem != "interface")
@@ -93,6 +94,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "gcs.report.settings": (*GCS, "gcs", "sitl.vehicles"),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
+    "plumbline": ("autopilot.vehicle.parameters", "autopilot.wire", "missions", "gcs"),
 }
 # module: the only ones that may import it
 TOP: dict[str, tuple[str, ...]] = {
@@ -116,6 +118,7 @@ SHELLS = (
     "gcs.commands",
     "gcs.shell",
     "gcs.workflows",
+    "plumbline",
     "gcs.batch.pool",
     "gcs.batch.programs",
     "gcs.batch.progress",

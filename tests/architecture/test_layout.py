@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 # subjects that are no room
 OTHERS = ("architecture", "clients", "documentation", "doubles", "flights", "processes", "thesis")
-TOP = ("sitl", "gcs", "missions")  # rooms beside the autopilot
+TOP = ("sitl", "gcs", "missions", "plumbline")  # rooms beside the autopilot
 
 
 def homeless(root: Path) -> list[str]:

@@ -185,10 +185,13 @@ def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
         str(tmp_path),
         "--json",
     ]
-    result = CliRunner().invoke(gcs, [*arguments, "--json"], prog_name="gcs")
-    assert result.exit_code == 0, result.output
+    required = ["--require", "completed_fraction >= 0.99", "--require", "load_error_max_m < 1e-6"]
+    result = CliRunner().invoke(gcs, [*arguments, "--json", *required], prog_name="gcs")
+    assert result.exit_code == 4, "a load is not held so well"
+    assert "required load_error_max_m < 1e-6; found " in result.stderr
     record = json.loads(result.stdout)
     assert (record["flights"], record["completed"], record["failed"]) == (2, 2, 0)
+    assert record["completed_fraction"] == 1.0 and 1e-6 < record["load_error_max_m"] < 0.3
     assert record["out"] == str(tmp_path) and record["flights_per_s"] > 0.0
     assert (tmp_path / "report.html").exists()
 

@@ -1,0 +1,36 @@
+"""What is looked at before a flight, however it is flown: the options, and whether the vehicle can fly it."""
+
+from __future__ import annotations
+
+from autopilot.vehicle.file import VEHICLES
+from gcs.workflows.checked import known_flyable
+from gcs.workflows.flight_options import FlightOptions, setting_of
+from missions.model import Mission
+from sitl.sensors.shipped import PROFILES
+
+
+def check_options(options: FlightOptions) -> None:
+    """GcsError if there is no such vehicle or sensor profile, or if a parameter cannot be set so."""
+    if _as_shipped(options):
+        return
+    from gcs.workflows.flight_inputs import check_flight_inputs
+
+    check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings))
+
+
+def _as_shipped(options: FlightOptions) -> bool:
+    """Nothing is asked for that could be refused; to know more, most of the simulator would be loaded."""
+    return (
+        options.vehicle in VEHICLES.names() and options.sensors in PROFILES.names() and not options.settings
+    )
+
+
+def check_mission(mission: Mission, options: FlightOptions) -> None:
+    """GcsError unless the vehicle can fly it, or need not."""
+    if options.force or options.tries_anyway:
+        return
+    shaped = options.law == "plumbline"
+    if not known_flyable(mission, options.vehicle, shaped):
+        from gcs.workflows.check_mission import refuse_unflyable
+
+        refuse_unflyable(mission, options.vehicle, shaped)

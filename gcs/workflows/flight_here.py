@@ -1,0 +1,38 @@
+"""A flight without processes and sockets: simulator, autopilot and ground station in this one."""
+
+from __future__ import annotations
+
+from autopilot.vehicle.parameters import LAWS
+from autopilot.wire.convert import Home
+from gcs.clients.capture import FrameLog
+from gcs.clients.flight import Outcome
+from gcs.closed_loop import Conditions, fly
+from gcs.shell.display import FlightDisplay
+from gcs.workflows.before_flight import check_mission, check_options
+from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.own_flight import flight_client
+from gcs.workflows.warmup import flight_parts, warm_up
+from missions.model import Mission
+
+
+def fly_here(mission: Mission, options: FlightOptions, log: FrameLog) -> Outcome:
+    """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown."""
+    check_options(options)
+    warm_up(flight_parts((options.law,)), options.quiet)
+    check_mission(mission, options)
+    settings = {"CTL_LAW": float(LAWS.index(options.law)), **dict(map(setting_of, options.settings))}
+    client = flight_client(mission, options, Home())
+    with FlightDisplay(mission.name, options.quiet) as display:
+
+        def watch(*_: object) -> bool:
+            if display.due:
+                display.update(client.progress)
+            return True
+
+        return fly(
+            mission,
+            Conditions(options.vehicle, options.sensors, options.seed, settings),
+            log,
+            watch,
+            client,
+        )

@@ -1,0 +1,149 @@
+"""What a run must reach, by `--require`, and whether it did: for people, and as JUnit's XML for CI."""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from gcs.errors import GcsError, InputError
+from gcs.shell.display import say
+
+COMPLETED = "completed"
+Value = float | str
+_SIGNS: dict[str, Callable[[Any, Any], bool]] = {
+    "<=": operator.le,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    ">": operator.gt,
+}
+_FORM = re.compile(r"\s*(\w+)\s*(<=|>=|==|!=|<|>)\s*(\S.*?)\s*")
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A figure of the record, and what it must be."""
+
+    text: str  # as it was typed
+    key: str
+    sign: str
+    value: Value
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found of it."""
+
+    requirement: Requirement
+    found: Any  # None: not known
+    met: bool
+
+    @property
+    def line(self) -> str:
+        """For people."""
+        found = "not known" if self.found is None else f"{self.found}"
+        return f"required {self.requirement.text}; found {found}"
+
+
+def read_requirements(texts: Iterable[str], keys: Sequence[str]) -> list[Requirement]:
+    """Requirements as they were typed, on the figures `keys`. InputError names what is wrong with one."""
+    return [_read(text, keys) for text in texts]
+
+
+def _read(text: str, keys: Sequence[str]) -> Requirement:
+    form = _FORM.fullmatch(text)
+    if form is None:
+        raise InputError(f'--require {text!r}: must be KEY SIGN VALUE, e.g. "load_error_max_m < 0.01"')
+    key, sign, word = form.groups()
+    if key not in keys:
+        near = get_close_matches(key, keys, n=1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise InputError(f"--require {text!r}: no figure {key}; {hint}there are {', '.join(keys)}")
+    value = _value(word)
+    if isinstance(value, str) and sign not in ("==", "!="):
+        raise InputError(f"--require {text!r}: {word} is no number; a word is compared by == or !=")
+    if isinstance(value, float) and math.isnan(value):
+        raise InputError(f"--require {text!r}: nothing compares to {word}")
+    return Requirement(text.strip(), key, sign, value)
+
+
+def _value(word: str) -> Value:
+    try:
+        return float(word)
+    except ValueError:
+        return word.strip("\"'")
+
+
+def judge(requirements: Iterable[Requirement], record: Mapping[str, Any]) -> list[Verdict]:
+    """What the record says to each; a figure that is not known meets nothing."""
+    found = []
+    for requirement in requirements:
+        value = record.get(requirement.key)
+        number = isinstance(value, int | float)
+        same = number == isinstance(requirement.value, float)
+        met = value is not None and same and _SIGNS[requirement.sign](value, requirement.value)
+        found.append(Verdict(requirement, value, met))
+    return found
+
+
+@contextmanager
+def reporting(run: str, junit: Path | None) -> Iterator[None]:
+    """A run that does not come about is in the test report as well."""
+    try:
+        yield
+    except GcsError as error:
+        if junit is not None:
+            suite = _suite(run, errors=1)
+            ET.SubElement(_case(suite, run, "completed"), "error", message=str(error))
+            _write(junit, suite)
+        raise
+
+
+def conclude(run: str, junit: Path | None, outcome: str, wall_s: float, verdicts: Sequence[Verdict]) -> bool:
+    """Tell each requirement that was not met on stderr, and write the test report: whether the run was
+    completed, and each requirement. True if all requirements were met."""
+    missed = [verdict for verdict in verdicts if not verdict.met]
+    for verdict in missed:
+        say(verdict.line)
+    if junit is not None:
+        cases = [("completed", outcome == COMPLETED, f"outcome {outcome}")]
+        cases += [(verdict.requirement.text, verdict.met, verdict.line) for verdict in verdicts]
+        suite = _suite(run, len(cases), sum(not met for _, met, _ in cases), wall_s=wall_s)
+        for name, met, said in cases:
+            case = _case(suite, run, name)
+            if not met:
+                ET.SubElement(case, "failure", message=said)
+        _write(junit, suite)
+    return not missed
+
+
+def _suite(run: str, tests: int = 1, failures: int = 0, errors: int = 0, wall_s: float = 0.0) -> ET.Element:
+    counts = {"tests": str(tests), "failures": str(failures), "errors": str(errors)}
+    return ET.Element("testsuite", {"name": run, **counts, "time": f"{wall_s:.3f}"})
+
+
+def _case(suite: ET.Element, run: str, name: str) -> ET.Element:
+    return ET.SubElement(suite, "testcase", classname=run, name=name, time="0")
+
+
+def _write(path: Path, suite: ET.Element) -> None:
+    for element in suite.iter():  # XML has no word for most control characters
+        for key, value in element.attrib.items():
+            element.set(key, "".join(c if c.isprintable() else " " for c in value))
+    suites = ET.Element("testsuites")
+    suites.append(suite)
+    ET.indent(suites)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        ET.ElementTree(suites).write(path, encoding="utf-8", xml_declaration=True)
+    except OSError as error:
+        raise GcsError(f"--junit {path}: {error.strerror}") from None

@@ -1,0 +1,167 @@
+"""One flight: flown in this process, and what is known of it afterwards."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
+from autopilot.wire.tlog import TlogWriter, read_tlog
+from gcs.errors import GcsError
+from gcs.workflows.flight_options import FlightOptions, meta_of
+from gcs.workflows.mission_file import load
+from missions.model import Mission
+from plumbline.frames import as_frame
+
+if TYPE_CHECKING:
+    from gcs.analysis.record import FlightMeta, Record
+    from gcs.analysis.samples import Samples
+    from gcs.analysis.tracks import Telemetry
+    from gcs.clients.flight import Outcome
+
+Settings = Mapping[str, float]  # parameters of simulator (SIM_) and autopilot by name
+
+
+def fly(
+    mission: str | Path | Mission,
+    *,
+    law: str = DEFAULT_LAW,
+    sensors: str | Path = "lab",
+    vehicle: str | Path = "bebop",
+    seed: int = 1,
+    settings: Settings | None = None,
+    timeout_s: float | None = None,
+    force: bool = False,
+    quiet: bool = False,
+) -> Flight:
+    """Fly a mission from take-off to landing, as fast as this machine does it.
+
+    `mission`: the name of a shipped one, the path of a file, or a `missions.model.Mission`. `sensors` and
+    `vehicle`: a shipped name or the path of a file. `settings`: parameters of the simulator (`SIM_...`) and
+    of the autopilot that are not to be their defaults. `timeout_s`: the flight is given up after so many
+    seconds of its own clock; by default one and a half times what is expected, and a minute. `force`: fly
+    even what the vehicle cannot do. Progress is shown on stderr unless `quiet`.
+
+    A lost flight is a result: see `Flight.outcome`. `Error` if there is no such mission, vehicle, sensor
+    profile, law or parameter, if a value is out of its range, or if the vehicle cannot fly the mission.
+    """
+    from gcs.workflows.flight_here import fly_here
+
+    known = isinstance(mission, Mission)
+    flown = mission if isinstance(mission, Mission) else load(str(mission))
+    if law not in LAWS:
+        raise GcsError(f"law {law!r}: there is none of that name; must be one of {', '.join(LAWS)}")
+    options = FlightOptions(
+        mission=flown.name if known else str(mission),
+        law=law,
+        sensors=str(sensors),
+        vehicle=str(vehicle),
+        seed=seed,
+        speed=None,
+        real_time=False,
+        out=None,
+        settings=tuple(f"{name}={float(value)!r}" for name, value in (settings or {}).items()),
+        connect=None,
+        quiet=quiet,
+        force=force,
+        overwrite=False,
+        limit_s=timeout_s,
+    )
+    log = io.BytesIO()
+    began_s = time.perf_counter()
+    outcome = fly_here(flown, options, TlogWriter(log))
+    wall_s = time.perf_counter() - began_s
+    return Flight(flown, outcome, log.getvalue(), meta_of(flown, options, outcome, wall_s))
+
+
+class Flight:
+    """A flight that is over.
+
+    `mission` is what was flown; `outcome` is `completed`, `diverged`, `timeout` or `refused`, and `reason`
+    says why it was not completed; `tlog` is its telemetry as the bytes of a `.tlog`, those of `gcs fly`.
+    """
+
+    def __init__(self, mission: Mission, outcome: Outcome, tlog: bytes, meta: FlightMeta) -> None:
+        self.mission = mission
+        self.outcome = outcome.name
+        self.reason = outcome.reason
+        self.tlog = tlog
+        self._meta = meta
+
+    @cached_property
+    def summary(self) -> Record:
+        """The figures of the flight: the keys of `gcs fly --json` (docs/report.md)."""
+        from gcs.analysis.record import flight_record
+
+        return flight_record(self._received, self._meta, self._samples)
+
+    def telemetry(self, kind: Literal["pandas", "polars", "arrow"] = "pandas") -> Any:
+        """The table of flight.parquet (docs/report.md), a row for each sample of the true load, units in the
+        names of the columns; as a DataFrame of pandas or polars, or a table of Arrow."""
+        from gcs.analysis.parquet import flight_table
+
+        return as_frame(flight_table(self._received, self._samples, self._meta.to_json()), kind)
+
+    def plot(self, name: str = "overview") -> Picture:
+        """One picture of the report: overview, track, position, error, angles, psi, rotors or tension."""
+        from gcs.report.plots import PICTURES, View
+        from gcs.report.style import style
+
+        pictures = {picture.name: picture for picture in PICTURES}
+        if name not in pictures:
+            raise GcsError(f"plot {name!r}: there is none; must be one of {', '.join(pictures)}")
+        view = View(self._received, self._samples, self.summary, self._meta)
+        png = io.BytesIO()
+        with style():
+            pictures[name].draw(view, png)
+        return Picture(png.getvalue())
+
+    def report(self, out: str | Path, quiet: bool = True) -> Path:
+        """Write what `gcs fly` leaves into the directory `out`, but for the autopilot's own log; the path of
+        the page."""
+        from gcs.report.build import PAGE_FILE
+        from gcs.workflows.report import TLOG_FILE, make_report
+
+        folder = Path(out)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / TLOG_FILE).write_bytes(self.tlog)
+        make_report(folder / TLOG_FILE, folder, self._meta, quiet)
+        return folder / PAGE_FILE
+
+    @cached_property
+    def _received(self) -> Telemetry:
+        from gcs.analysis.telemetry import telemetry_of
+
+        return telemetry_of(read_tlog(io.BytesIO(self.tlog)))
+
+    @cached_property
+    def _samples(self) -> Samples:
+        from gcs.analysis.samples import samples_of
+
+        return samples_of(self._received)
+
+    def __repr__(self) -> str:
+        error_m = self.summary["load_error_max_m"]
+        error = "" if error_m is None else f", load error at most {1e3 * error_m:.1f} mm"
+        return f"<Flight {self.mission.name}: {self.outcome}{error}>"
+
+    def _repr_png_(self) -> bytes:
+        return self.plot().png
+
+
+class Picture:
+    """A picture as the bytes of a PNG, which a notebook shows."""
+
+    def __init__(self, png: bytes) -> None:
+        self.png = png
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a file."""
+        Path(path).write_bytes(self.png)
+
+    def _repr_png_(self) -> bytes:
+        return self.png

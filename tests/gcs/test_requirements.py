@@ -1,0 +1,102 @@
+"""Requirements on a run: read, judged, told, and as a test report."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from gcs.cli import gcs
+from gcs.errors import GcsError, InputError
+from gcs.workflows.requirements import conclude, judge, read_requirements, reporting
+
+KEYS = ("load_error_max_m", "outcome", "slack_events")
+RECORD = {"load_error_max_m": 0.004, "outcome": "completed", "slack_events": None}
+
+
+@pytest.mark.parametrize(
+    ("text", "met"),
+    [
+        ("load_error_max_m < 0.01", True),
+        ("load_error_max_m<=0.004", True),
+        ("load_error_max_m < 0.004", False),
+        ("load_error_max_m > 4e-3", False),
+        ("load_error_max_m >= 0.004", True),
+        ("load_error_max_m != 0.004", False),
+        ("outcome == completed", True),
+        ("outcome == 'completed'", True),
+        ("outcome != completed", False),
+        ("outcome == 3", False),
+        ("load_error_max_m == small", False),
+        ("slack_events == 0", False),  # not known
+        ("slack_events != 0", False),
+    ],
+)
+def test_a_requirement_is_met_or_not(text: str, met: bool) -> None:
+    (verdict,) = judge(read_requirements([text], KEYS), RECORD)
+    assert verdict.met is met
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("load_error_max_m", "must be KEY SIGN VALUE"),
+        ("load_error_max_m <", "must be KEY SIGN VALUE"),
+        ("< 3", "must be KEY SIGN VALUE"),
+        ("", "must be KEY SIGN VALUE"),
+        ("load_eror_max_m < 1", "did you mean load_error_max_m? there are load_error_max_m, outcome"),
+        ("outcome < completed", "a word is compared by == or !="),
+        ("load_error_max_m < nan", "nothing compares to nan"),
+    ],
+)
+def test_what_is_no_requirement_is_refused_with_what_to_write(text: str, says: str) -> None:
+    with pytest.raises(InputError) as told:
+        read_requirements([text], KEYS)
+    assert says in str(told.value) and repr(text) in str(told.value)
+
+
+def test_a_command_refuses_it_before_it_flies() -> None:
+    for command in ("fly", "sweep"):
+        result = CliRunner().invoke(gcs, [command, "hover", "--require", "no_such < 1"], prog_name="gcs")
+        assert result.exit_code == 2 and "no figure no_such" in result.output
+
+
+def test_what_was_missed_is_told_and_stands_in_the_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    junit = tmp_path / "deep" / "report.xml"
+    texts = ["load_error_max_m < 0.001", "outcome == completed"]
+    assert not conclude("run", junit, "completed", 2.5, judge(read_requirements(texts, KEYS), RECORD))
+    assert capsys.readouterr().err == "gcs: required load_error_max_m < 0.001; found 0.004\n"
+    (suite,) = ET.parse(junit).getroot()
+    assert (suite.get("tests"), suite.get("failures"), suite.get("time")) == ("3", "1", "2.500")
+    failed = {case.get("name"): [fault.get("message") for fault in case] for case in suite}
+    assert failed == {
+        "completed": [],
+        "load_error_max_m < 0.001": ["required load_error_max_m < 0.001; found 0.004"],
+        "outcome == completed": [],
+    }
+
+
+def test_a_flight_that_was_lost_fails_in_the_report(tmp_path: Path) -> None:
+    junit = tmp_path / "report.xml"
+    assert conclude("run", junit, "diverged", 1.0, [])
+    (suite,) = ET.parse(junit).getroot()
+    assert [fault.get("message") for case in suite for fault in case] == ["outcome diverged"]
+
+
+def test_a_run_that_does_not_come_about_is_an_error_in_the_report(tmp_path: Path) -> None:
+    junit = tmp_path / "report.xml"
+    with pytest.raises(GcsError, match="no\x1bport"), reporting("run", junit):
+        raise GcsError("no\x1bport")
+    (suite,) = ET.parse(junit).getroot()
+    assert suite.get("errors") == "1"
+    assert [fault.get("message") for case in suite for fault in case] == ["no port"]
+
+
+def test_a_report_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(GcsError, match=r"--junit .*file/report.xml: File exists"):
+        conclude("run", tmp_path / "file" / "report.xml", "completed", 1.0, [])
