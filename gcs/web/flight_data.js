@@ -45,6 +45,7 @@
       this.layout = values.vehicle;
       this._columns = columns;
       this.time = columns.time || new Float64Array(0);
+      this._windTimes = values.wind.map((row) => row[0]);
       this._most = (values.limits_n && values.limits_n[1]) || values.vehicle.rotor_max_n || 1;
     }
 
@@ -103,7 +104,7 @@
     }
 
     windAt(t) { // [E, N, U] or null
-      const i = this.wind.length ? Plumbline.indexAt(this.wind.map((row) => row[0]), t) : -1;
+      const i = this.wind.length ? Plumbline.indexAt(this._windTimes, t) : -1;
       return i < 0 || this.wind[i][0] > t ? null : this.wind[i].slice(1);
     }
 

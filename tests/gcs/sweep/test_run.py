@@ -228,3 +228,31 @@ def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept],
     done = run.sweep(plan, tmp_path, "gcs sweep", cluster(), lambda: False, quiet=True, fresh=False)
     assert done.whole and done.flown == 6
     assert without_clock(tmp_path) == without_clock(complete)
+
+
+@pytest.mark.processes
+def test_flights_that_stand_out_are_the_same_when_they_are_flown_again(short: str, tmp_path: Path) -> None:
+    arguments = [
+        "sweep",
+        short,
+        "--vary",
+        "SIM_NOISE_SCALE=0.5,3.1415",
+        "--seeds",
+        "2",
+        "--set",
+        "SIM_WIND_E=0.7",
+    ]
+    result = CliRunner().invoke(
+        gcs, [*arguments, "--reports", "--out", str(tmp_path), "--json"], prog_name="gcs"
+    )
+    assert result.exit_code == 0, result.output
+    rows = {row["index"]: row for row in pq.read_table(tmp_path / "flights.parquet").to_pylist()}
+    found = json.loads(result.stdout)["standouts"]
+    assert [one["kind"] for one in found] == ["worst", "median"]
+    for one in found:
+        record = json.loads((Path(one["report"]).parent / "summary.json").read_text())
+        assert record["seed"] == one["seed"]
+        # the sweep looks at every tick, the report at 125 samples a second
+        assert record["load_error_max_m"] == pytest.approx(rows[one["index"]]["load_error_max_m"], rel=2e-3)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert 'href="flights/plumbline-worst/report.html"' in page
