@@ -1,6 +1,7 @@
 /* report.html: scene, time line, plots and lists, all at one time of the flight. */
 (function () {
   "use strict";
+  const FAR_M = 5;
   const byId = (id) => document.getElementById(id);
   const text = (value, digits, unit) => (Number.isFinite(value) ? `${value.toFixed(digits)} ${unit}` : "–");
   const length = (value) => (value >= 1 ? text(value, 2, "m") : text(1000 * value, 1, "mm"));
@@ -35,6 +36,12 @@
   function showTracks(stage, flight) {
     flight.tracks().forEach((track, i) => stage.scene.setTrack(track, i + 1));
     stage.fit(flight.corners());
+  }
+
+  /** Of a flight that leads far the whole is so small that nothing of the load is seen. */
+  function leadsFar(flight) {
+    const [low, high] = flight.corners();
+    return Boolean(low) && Math.hypot(...low.map((value, axis) => high[axis] - value)) > FAR_M;
   }
 
   async function main() {
@@ -100,6 +107,7 @@
     if (mission.length) near.click();
     if (stage) showTracks(stage, flight);
     transport.set(flight.worst ? flight.worst.time : startOf(flight));
+    if (stage && leadsFar(flight)) stage.camera("follow");
     window.replay = { flight, stage, transport, group };
     document.documentElement.dataset.ready = "1";
   }

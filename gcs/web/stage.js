@@ -3,6 +3,7 @@
    stage = new Plumbline.Stage(element, layout)    throws where the browser offers no WebGL
    stage.show(state)          as Scene.show
    stage.readings([[name, text], ...], phase)
+   stage.camera(mode), stage.fit(places)
    stage.note(text)           a word over the scene; empty: none
    stage.scene                the Scene; drawn when something has changed */
 (function () {
@@ -46,22 +47,28 @@
     _cameras(element) {
       const box = element.appendChild(document.createElement("div"));
       box.className = "over cameras";
-      const buttons = CAMERAS.map(([mode, name]) => {
+      this._modes = new Map(CAMERAS.map(([mode, name]) => {
         const button = box.appendChild(document.createElement("button"));
         button.type = "button";
         button.textContent = name;
         button.setAttribute("aria-pressed", String(mode === "orbit"));
-        button.addEventListener("click", () => {
-          this.scene.camera(mode);
-          for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
-          this._dirty = true;
-        });
-        return button;
-      });
+        button.addEventListener("click", () => this.camera(mode));
+        return [mode, button];
+      }));
       const fit = box.appendChild(document.createElement("button"));
       fit.type = "button";
       fit.textContent = "Whole flight";
-      fit.addEventListener("click", () => this.fit());
+      fit.addEventListener("click", () => {
+        if (this.scene.mode === "follow") this.camera("orbit"); // which would go along at once
+        this.fit();
+      });
+    }
+
+    /** "orbit", "follow" or "top". */
+    camera(mode) {
+      this.scene.camera(mode);
+      for (const [other, button] of this._modes) button.setAttribute("aria-pressed", String(other === mode));
+      this._dirty = true;
     }
 
     /** Brings the whole flight into the picture: paths, and `places` [N, E, D] where vehicles will be. */
