@@ -84,15 +84,10 @@ class UdpSocket:
 
     def drain(self) -> list[bytes]:
         """All datagrams that are there, without waiting."""
-        datagrams: list[bytes] = []
-        while True:
-            try:
-                datagram, self._peer = self._socket.recvfrom(_DATAGRAM, socket.MSG_DONTWAIT)
-            except ConnectionError:  # the peer's port was closed when we last sent; it may come back
-                continue
-            except BlockingIOError:
-                return datagrams
-            datagrams.append(datagram)
+        found = self.drain_with_senders()
+        if found:
+            self._peer = found[-1][1]
+        return [datagram for datagram, _ in found]
 
     def drain_with_senders(self) -> list[tuple[bytes, tuple[str, int]]]:
         """As `drain`, each datagram with the address from which it came."""
@@ -132,11 +127,6 @@ class UdpSocket:
         except OSError as error:
             raise GcsError(f"UDP to {peer[0]}:{peer[1]}: {error.strerror}") from None
 
-    @property
-    def peer(self) -> tuple[str, int] | None:
-        """Where `send` sends to."""
-        return self._peer
-
     def close(self) -> None:
         self._socket.close()
 
@@ -150,6 +140,14 @@ def open_address(address: Address) -> UdpSocket:
     except OSError as error:
         raise GcsError(f"host {address.host!r}: {error.strerror or error}") from None
     return UdpSocket("0.0.0.0" if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
+
+
+def truth_socket() -> UdpSocket | None:
+    """Where a simulator that runs by itself tells what is true; None if another program listens there."""
+    try:
+        return UdpSocket(LOOPBACK, TRUTH_PORT)
+    except GcsError:
+        return None
 
 
 def wait(sockets: list[UdpSocket], timeout_s: float) -> None:

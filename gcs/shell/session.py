@@ -16,12 +16,11 @@ from gcs.clients.vehicle_view import VehicleView
 from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.display import StepDisplay
 from gcs.shell.link import (
-    LOOPBACK,
-    TRUTH_PORT,
     Address,
     UdpSocket,
     monotonic_us,
     open_address,
+    truth_socket,
     unix_us,
     wait,
 )
@@ -58,11 +57,8 @@ class Session:
 
     def listen_to_truth(self) -> bool:
         """Hear the simulated world too, as far as nobody else listens to it; False if somebody does."""
-        try:
-            self._truth = UdpSocket(LOOPBACK, TRUTH_PORT)
-        except GcsError:
-            return False
-        return True
+        self._truth = truth_socket()
+        return self._truth is not None
 
     def find(self) -> Target:
         """Wait for the vehicle's heartbeat."""

@@ -2,6 +2,7 @@
 "use strict";
 (() => {
   const LEAST_WIND = 0.3; // m/s; an estimate is never quite still
+  const TOAST_S = 6; // of the vehicle's clock
   const MOST_TEXTS = 40;
   const SHOWN_TEXTS = 8;
   const WARNING = 4, ERROR = 3; // MAV_SEVERITY
@@ -34,6 +35,11 @@
 
   function put(box, text) {
     if (box.textContent !== text) box.textContent = text;
+  }
+
+  function levelOf(text) {
+    if (text.severity <= ERROR) return "bad";
+    return text.severity <= WARNING ? "warn" : "";
   }
 
   class Panels {
@@ -71,6 +77,17 @@
       this.showLink(state);
       this.showWind(state.wind);
       this.showBanner(state);
+      this.showToast(state);
+    }
+
+    /** What the vehicle said a moment ago, over the picture. */
+    showToast(state) {
+      const box = byId("toast"), last = this.texts[0];
+      const age = last && last.time !== null && state.time !== null ? state.time - last.time : Infinity;
+      box.hidden = !(age >= -1 && age < TOAST_S);
+      if (box.hidden) return;
+      put(box, last.text);
+      box.className = levelOf(last);
     }
 
     showPhase(state) {
@@ -169,8 +186,7 @@
         const line = document.createElement("li"), time = document.createElement("time"), text = document.createElement("span");
         time.textContent = one.time === null ? "" : `${one.time.toFixed(1)} s`;
         text.textContent = one.text;
-        if (one.severity <= ERROR) text.className = "bad";
-        else if (one.severity <= WARNING) text.className = "warn";
+        text.className = levelOf(one);
         line.append(time, text);
         return line;
       }));

@@ -122,7 +122,7 @@
       const { flown, asked } = this.trackOf(id);
       if (flownPlace && flown.add(...flownPlace, error)) this.levelScale();
       if (askedPlace) asked.add(...askedPlace);
-      if (flown.size === 2) this.levelScale();
+      if (Number.isFinite(error) && !this.legend.shown) this.levelScale();
     }
 
     /** Takes the paths of a vehicle away. */
@@ -387,7 +387,9 @@
     box.append(title, bar, ends);
     parent.append(box);
     return {
+      shown: false,
       show(some, full, theme) {
+        this.shown = some;
         box.style.display = some ? "block" : "none";
         box.style.color = theme.label;
         const stops = theme.scale.map((colour) => `#${colour.toString(16).padStart(6, "0")}`);

@@ -2,6 +2,7 @@
 "use strict";
 (() => {
   const FIRST_CAPACITY = 512;
+  const LEAST_FULL = 0.02; // m: smaller errors are not worth a colour
 
   /** A wide line that can grow; each point has a colour. */
   class Trail {
@@ -84,7 +85,7 @@
       this.theme = theme;
       this.points = [];
       this.errors = [];
-      this.full = 0.1; // m, the error at the upper end of the scale
+      this.full = LEAST_FULL; // m, the error at the upper end of the scale
       this.only = null; // one colour for the whole path
       this.colour = new Float32Array(3);
     }
@@ -134,14 +135,14 @@
       this.points = Array.from(points);
       this.errors = Array.from({ length: points.length / 3 }, (_, i) => (errors ? errors[i] : NaN));
       const most = this.errors.reduce((a, b) => (b > a ? b : a), 0);
-      this.full = most > 0 ? Plumbline.sceneTheme.niceAbove(most) : 0.01;
+      this.full = most > 0 ? Plumbline.sceneTheme.niceAbove(most) : LEAST_FULL;
       this.recolour();
     }
 
     clear() {
       this.points = [];
       this.errors = [];
-      this.full = 0.1;
+      this.full = LEAST_FULL;
       this.trail.clear();
     }
 

@@ -23,7 +23,7 @@ from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, pipe
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.flight_options import FlightOptions, setting_of
-from gcs.workflows.view import open_browser
+from gcs.workflows.view import open_browser, tell_if_open
 from missions.model import Mission
 
 _BEGIN_S = 20.0  # for the page's process to say its address
@@ -43,8 +43,9 @@ class PageOptions:
 class FlightPage:
     """Our end of it."""
 
-    def __init__(self, feed: FeedEnd) -> None:
+    def __init__(self, feed: FeedEnd, host: str) -> None:
         self.address = ""
+        self._host = host
         self._feed = feed
         self._readers = 0
         self._had_readers = False
@@ -96,6 +97,7 @@ class FlightPage:
     def await_reader(self, stop: StopRequest) -> None:
         """Open a browser and wait until it shows the page; without a screen nobody is waited for."""
         say(f"live page: {self.address}")
+        tell_if_open(self._host)
         if open_browser(self.address):
             self._wait(_READER_S, lambda: bool(self._readers or stop))
 
@@ -140,7 +142,7 @@ def flight_page(mission: Mission, options: FlightOptions, page: PageOptions) -> 
             if page.port is not None:
                 arguments += ["--port", str(page.port)]
             processes.start("gcs", arguments, Path(os.devnull), (theirs.fileno(),))
-        shown = FlightPage(ours)
+        shown = FlightPage(ours, page.host)
         shown.await_address()
         shown.tell(**_about(mission, options))
         yield shown

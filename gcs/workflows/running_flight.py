@@ -11,9 +11,8 @@ from autopilot.wire.tlog import TlogWriter
 from gcs.clients import command
 from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient
-from gcs.errors import GcsError
 from gcs.shell.display import FlightDisplay, say
-from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, UdpSocket, open_address, unix_us
+from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, open_address, truth_socket, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.flight_loops import run_wall_clock
@@ -41,7 +40,9 @@ def fly_running(
         client = flight_client(mission, options, vehicle_home(session))
     if address.signing_key is not None:
         client.connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
-    truth = _truth_of_a_running_world()
+    truth = truth_socket()
+    if truth is None:
+        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the report will have no truth of the simulator")
     vehicle = open_address(address)
     try:
         with FlightDisplay(mission.name, options.quiet) as display:
@@ -64,11 +65,3 @@ def vehicle_home(session: Session) -> Home:
     """Where the vehicle says its home is."""
     message = session.request(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
     return Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
-
-
-def _truth_of_a_running_world() -> UdpSocket | None:
-    try:
-        return UdpSocket(LOOPBACK, TRUTH_PORT)
-    except GcsError:
-        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the report will have no truth of the simulator")
-        return None

@@ -18,7 +18,16 @@ from gcs.clients.connection import Connection
 from gcs.errors import GcsError
 from gcs.shell.display import say
 from gcs.shell.feed import COMMAND, EVENT, TRUTH, FeedEnd, inherited
-from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, UdpSocket, monotonic_us, open_address, unix_us
+from gcs.shell.link import (
+    LOOPBACK,
+    TRUTH_PORT,
+    Address,
+    UdpSocket,
+    monotonic_us,
+    open_address,
+    truth_socket,
+    unix_us,
+)
 from gcs.shell.page_server import Pages, PageServer, Site
 from gcs.view.controls import ROTORS, SLIDERS
 from gcs.view.station import Station
@@ -63,7 +72,9 @@ class UdpLinks:
                 if not address.listen:
                     self._spoken.append(self._sockets[-1])
             if truth:
-                self._truth = _truth_socket()
+                self._truth = truth_socket()
+                if self._truth is None:
+                    say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes")
         except GcsError:
             self.close()
             raise
@@ -194,7 +205,7 @@ async def _serve(
         if feed is not None:
             feed.tell_event({"address": server.address})
         else:
-            _announce(server.address, options.opens)
+            _announce(server.address, options)
         next_state_s = loop.time()
         while not stopped.is_set():
             now_us = monotonic_us()
@@ -230,10 +241,17 @@ def _known(vehicle: str | None, settings: dict[str, float]) -> dict[str, float]:
     return {**known, "SIM_LOAD_MASS": sizes.load_mass_kg, **settings}
 
 
-def _announce(address: str, opens: bool) -> None:
+def _announce(address: str, options: ViewOptions) -> None:
     print(f"live page: {address}", flush=True)
-    if opens:
+    tell_if_open(options.host)
+    if options.opens:
         open_browser(address)
+
+
+def tell_if_open(host: str) -> None:
+    """Say so if others than this machine can reach the page."""
+    if host not in (LOOPBACK, "localhost", "::1"):
+        say("the page is served beyond this machine: whoever knows its whole address commands the vehicle")
 
 
 def open_browser(address: str) -> bool:
@@ -246,11 +264,3 @@ def open_browser(address: str) -> bool:
 
 def _texts() -> dict[str, bytes]:
     return {"": asset(LIVE_PAGE).encode(), **{name: asset(name).encode() for name in LIVE_FILES}}
-
-
-def _truth_socket() -> UdpSocket | None:
-    try:
-        return UdpSocket(LOOPBACK, TRUTH_PORT)
-    except GcsError:
-        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes")
-        return None

@@ -20,14 +20,19 @@ from gcs.shell.page_server import Pages, PageServer, Site
 class Served:
     """A server in a loop of its own, and what came of requests."""
 
-    def __init__(self, report: Path) -> None:
+    def __init__(self, report: Path, bind: str = "127.0.0.1") -> None:
         self.asked: list[Any] = []
         self.site = Site({"": b"<p>page</p>", "live.js": b"1;"}, report)
         self.loop = asyncio.new_event_loop()
         pages = Pages(lambda: [{"type": "hello"}], lambda page, record: self.asked.append(record))
-        self.server = PageServer(self.site, pages, "127.0.0.1", None)
+        self.server = PageServer(self.site, pages, bind, None)
         self.loop.run_until_complete(self.server.__aenter__())
-        self.host, self.token = self.server.address.split("/")[2:4]
+        self.host, self.token = self.server.address.replace(bind, "127.0.0.1").split("/")[2:4]
+
+    def close(self) -> None:
+        """End the server."""
+        self.loop.run_until_complete(self.server.__aexit__(None, None, None))
+        self.loop.close()
 
     def get(self, path: str, host: str | None = None, **headers: str) -> tuple[int, dict[str, str], bytes]:
         """Status, headers and body."""
@@ -61,8 +66,7 @@ def served(tmp_path: Path) -> Iterator[Served]:
     (tmp_path / "out" / "link").symlink_to(tmp_path / "secret")
     found = Served(tmp_path / "out")
     yield found
-    found.loop.run_until_complete(found.server.__aexit__(None, None, None))
-    found.loop.close()
+    found.close()
 
 
 def test_the_page_comes_with_a_policy_that_keeps_strangers_out(served: Served) -> None:
@@ -97,6 +101,17 @@ def test_another_host_name_that_leads_here_is_refused(served: Served) -> None:
 )
 def test_of_the_disk_only_the_files_of_the_report_are_served(served: Served, name: str) -> None:
     assert served.get(f"/{served.token}/report/{name}")[0] == 404
+
+
+def test_bound_to_all_addresses_it_goes_by_numbers_and_by_no_strangers_name(tmp_path: Path) -> None:
+    served = Served(tmp_path, "0.0.0.0")
+    port = served.host.rpartition(":")[2]
+    try:
+        assert served.get(f"/{served.token}/", f"192.168.1.7:{port}")[0] == 200
+        assert served.get(f"/{served.token}/", f"[fe80::1]:{port}")[0] == 200
+        assert served.get(f"/{served.token}/", f"evil.example:{port}")[0] == 421
+    finally:
+        served.close()
 
 
 def test_a_report_may_run_its_own_scripts_and_ask_for_nothing(served: Served) -> None:

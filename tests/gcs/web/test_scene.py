@@ -150,6 +150,27 @@ def test_the_path_is_coloured_by_the_error_and_the_legend_tells_the_scale(page: 
     assert text.endswith("20 cm")
 
 
+def test_a_path_that_grows_shows_its_legend_with_the_first_error_and_widens_the_scale(page: Browser) -> None:
+    assert page.run(
+        """const legend = document.querySelector(".scene-legend"), seen = [];
+        const tell = () => seen.push(legend.style.display === "none" ? "" : legend.textContent);
+        for (let i = 0; i < 5; i += 1) scene.extendTrack(1, [0, 0.1 * i, -1], null, null);
+        tell();
+        scene.extendTrack(1, [0, 1, -1], 0.004, [0, 1, -1]);
+        scene.extendTrack(1, [0, 1.1, -1], 0.004, [0, 1.1, -1]);
+        tell();
+        scene.extendTrack(1, [0, 1.2, -1], 0.31, [0, 1.2, -1]);
+        tell();
+        for (let i = 0; i < 2000; i += 1) scene.extendTrack(1, [0, 1 + 0.01 * i, -1], 0.01, null);
+        scene.render();
+        scene.clearTrack(1);
+        tell();
+        return seen.map((text) => text.slice(-5))"""
+    ) == ["", "02 cm", "50 cm", ""]
+    page.listen()
+    assert page.errors == []
+
+
 def test_fence_rally_points_wind_and_themes_are_drawn_without_a_word_on_the_console(page: Browser) -> None:
     before, fenced, light = page.run(
         """scene.setTheme("dark");
