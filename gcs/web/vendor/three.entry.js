@@ -1,6 +1,6 @@
 // The parts of three.js that scene.js uses; all else is left out of three.min.js.
 export {
-  AmbientLight, BufferAttribute, BufferGeometry, CanvasTexture, CircleGeometry, Color, ConeGeometry,
+  BufferAttribute, BufferGeometry, CanvasTexture, CircleGeometry, Color, ConeGeometry,
   CylinderGeometry, DirectionalLight, DoubleSide, Fog, Group,
   HemisphereLight, Line, LineBasicMaterial, LineSegments,
   Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, OctahedronGeometry,
