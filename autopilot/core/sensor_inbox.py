@@ -60,6 +60,17 @@ _SENSORS = (
     mavlink.MAVLINK_MSG_ID_LOAD_SENSOR,
     mavlink.MAVLINK_MSG_ID_HIL_GPS,
 )
+
+
+class SlowSensors(NamedTuple):
+    """Of HIL_SENSOR what is not new at each tick, as it was read last; zeros: never."""
+
+    field_gauss: Vec3 = ZERO
+    pressure_pa: float = 0.0
+    pressure_altitude_m: float = 0.0
+    temperature_degC: float = 0.0
+
+
 _NO_SENSOR = HilSensor(0, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0, 0, 0)
 _NO_FIX = HilGps(0, 0, ZERO, ZERO, 0.0, 0.0, 0)
 
@@ -130,12 +141,12 @@ def _put_fix(inbox: Array, at: int, gps: HilGps) -> int:
 
 @kernel
 def _read(
-    datagram: bytes, home: Row, since_us: int, inbox: Array, imu: Row, fix: Row, payload: Bytes
+    datagram: bytes, home: Row, since_us: int, inbox: Array, imu: Row, slow: Row, fix: Row, payload: Bytes
 ) -> tuple[int, int, int, bool]:
     """The number of readings that a datagram holds, its time, HIL_SENSOR.fields_updated, and whether there
     was a HIL_GPS. As many readings as there is room for go into the inbox, in the order in which they are
-    absorbed; the inertial sample also into `imu` and the HIL_GPS into `fix`, if the tick is later than
-    `since_us`.
+    absorbed; the inertial sample also into `imu`, `SlowSensors` into `slow` and the HIL_GPS into `fix`, if
+    the tick is later than `since_us`.
     """
     place = unpack(Home, home, 0)
     sensor, gps = _NO_SENSOR, _NO_FIX
@@ -170,6 +181,13 @@ def _read(
         count = _put_vector(inbox, count, FIELD, sensor.mag_body_gauss)
     if now_us > since_us:
         pack(sample, imu, 0)
+        read = unpack(SlowSensors, slow, 0)
+        field = sensor.mag_body_gauss if sensor.fields & MAG else read.field_gauss
+        if sensor.fields & PRESSURE:
+            air = (sensor.pressure_pa, sensor.pressure_altitude_m, sensor.temperature_degC)
+        else:
+            air = (read.pressure_pa, read.pressure_altitude_m, read.temperature_degC)
+        pack(SlowSensors(field, air[0], air[1], air[2]), slow, 0)
         if fixed:
             pack(gps, fix, 0)
     return (count, now_us, sensor.fields, fixed)
@@ -182,6 +200,7 @@ class SensorInbox:
         self.rows = rows
         self._home = packed(home)
         self.imu = np.full(width(ImuReading), np.nan)  # `ImuReading` of the last tick
+        self.slow = packed(SlowSensors())
         self.fix = np.zeros(width(HilGps))  # `HilGps`, the last one
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._writer = FrameWriter(1, 1)
@@ -196,7 +215,7 @@ class SensorInbox:
         than `since_us` the sample and the fix are kept.
         """
         aside: tuple[Any, ...] = ()
-        kept = (self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+        kept = (self._home, since_us, self.rows, self.imu, self.slow, self.fix, self._payload)
         if self._entry is None:
             self._entry = entry_of(_read, datagram, *kept)
         count, now_us, fields, fixed = self._entry(datagram, *kept)
@@ -208,5 +227,6 @@ class SensorInbox:
             count, now_us, fields, fixed = self._entry(datagram, *kept)
         if count > len(self.rows):
             self.rows = new_inbox(2 * count)
-            self._entry(datagram, self._home, since_us, self.rows, self.imu, self.fix, self._payload)
+            kept = (self._home, since_us, self.rows, *kept[3:])
+            self._entry(datagram, *kept)
         return Tick(now_us, count, fields, fixed, aside) if count >= 0 else None

@@ -165,7 +165,7 @@ class Onboard:
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
-        self._moments = Moments(self.core, options, parameters, self._health, self._sensors.fix)
+        self._moments = Moments(self.core, options, parameters, self._health, self._sensors)
         self.work: Work | None = None  # what waits for `finish`
         self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
@@ -336,15 +336,16 @@ class Onboard:
 
     # ---- ground
 
-    def add_link(self, link: Link) -> None:
-        """A link that always gets telemetry."""
-        self.endpoint.add_link(link, self.now_us)
+    def add_link(self, link: Link, program: bool = False) -> None:
+        """A link that always gets telemetry; `program`: as programs that fly want it, not ground stations."""
+        self.endpoint.add_link(link, self.now_us, program)
 
-    def receive_ground(self, datagram: bytes, link: Link) -> list[Event]:
-        """Handle a datagram from a ground station; what must be stored comes back as events."""
+    def receive_ground(self, datagram: bytes, link: Link, program: bool = False) -> list[Event]:
+        """Handle a datagram from a ground station, or from a program; what must be stored comes back as
+        events."""
         if self._received_loss.drops(datagram, self.parameters[LOSS_PARAMETER]):
             return []
-        events = self.endpoint.receive(datagram, link, self.now_us, self._decide)
+        events = self.endpoint.receive(datagram, link, self.now_us, self._decide, program)
         for event in events:
             match event:
                 case MissionChanged(mission):

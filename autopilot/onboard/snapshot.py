@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, nan, sqrt
+from math import inf, isnan, nan, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,8 @@ import numpy as np
 from autopilot.control.load_motion import Drag
 from autopilot.core.flight_core import FlightCore, LaidOut, Setup
 from autopilot.core.health import Condition, battery_constants, remaining, sensors, vibration, voltage
-from autopilot.estimation.records import TRACKER, Array, EstimatorState
+from autopilot.core.sensor_inbox import SensorInbox, SlowSensors
+from autopilot.estimation.records import TRACKER, Array, EstimatorState, ImuReading
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import Vec3, norm, scale
 from autopilot.geometry.packed import Row, unpack, width
@@ -23,7 +24,7 @@ from autopilot.onboard.instant_row import NO_LEG, put_instant
 from autopilot.services import identity, snapshot
 from autopilot.services.instant import Instant
 from autopilot.services.mission_store import StoredMission
-from autopilot.services.snapshot import GpsFix, Snapshot
+from autopilot.services.snapshot import GpsFix, Sensed, Snapshot, Sortie
 from autopilot.supervisor.requests.arming import arming_complaints
 from autopilot.supervisor.state import (
     CARRYING,
@@ -36,6 +37,7 @@ from autopilot.supervisor.state import (
     View,
     carries,
 )
+from autopilot.supervisor.watches.fence import limited
 from autopilot.wire.convert import HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
@@ -204,21 +206,38 @@ def told(flight: Flight, items: int) -> Told:
     )
 
 
+def sortie_after(before: Sortie, was: Flight, now: Flight) -> Sortie:
+    """The flight under way, or the last one, when a flight record is followed by another."""
+    if was.phase in UNARMED and now.phase not in UNARMED:
+        before = Sortie(armed_us=now.phase_start_us)
+    if now.phase in IN_AIR and not before.takeoff_us:
+        return before._replace(takeoff_us=now.phase_start_us)
+    if was.phase in IN_AIR and now.phase in ON_GROUND:
+        return before._replace(landed_us=now.phase_start_us)
+    return before
+
+
 class Moments:
     """Makes the snapshots of one flight core; remembers what follows from a flight record while it lasts."""
 
     def __init__(
-        self, core: FlightCore, options: Options, parameters: ParameterTable, health: Row, fix: Row
+        self,
+        core: FlightCore,
+        options: Options,
+        parameters: ParameterTable,
+        health: Row,
+        readings: SensorInbox,
     ) -> None:
-        """`health` and `fix` are the rows of `Condition` and, once `fixed` is set, of the last HIL_GPS."""
+        """`health` is the row of `Condition`; the fix of `readings` counts once `fixed` is set."""
         self.core = core
         self.options = options
         self.parameters = parameters
         self.health = health
-        self.fix = fix
+        self.readings = readings
         self.fixed = False
+        self.sortie = Sortie()
         self.battery = battery_constants(parameters)
-        self._flight: Flight | None = None
+        self._flight = core.flight
         self._items = 0
         self._told = told(core.flight, 0)
         self._standing = _standing(core, core.flight, None)
@@ -227,6 +246,7 @@ class Moments:
     def told(self, flight: Flight, items: int) -> Told:
         """What a flight record with a mission of so many items says."""
         if flight is not self._flight or items != self._items:
+            self.sortie = sortie_after(self.sortie, self._flight, flight)
             self._flight, self._items, self._told = flight, items, told(flight, items)
         return self._told
 
@@ -400,19 +420,35 @@ def _system_status(m: Moment) -> tuple[Any, ...]:
 
 @_makes("sensors_present", "sensors_healthy")
 def _sensors(m: Moment) -> tuple[Any, ...]:
-    return sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us)
+    present, healthy = sensor_bits(m.condition, m.estimator, m.ready, m.fake_gps, m.now_us)
+    return present | (snapshot.GEOFENCE if limited(m.flight, m.core.settings) else 0), healthy
 
 
 @_makes("gps")
 def _gps(m: Moment) -> tuple[Any, ...]:
     if m.moments.fixed:
-        gps = unpack(HilGps, m.moments.fix, 0)
+        gps = unpack(HilGps, m.moments.readings.fix, 0)
         place = (gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std)
         return (GpsFix(gps.time_us, gps.fix_type, *place, gps.satellites),)
     if m.fake_gps and tracked(m.estimator):
         fixed, accuracy = mavlink.GPS_FIX_TYPE_3D_FIX, (m.horizontal_std, m.vertical_std)
         return (GpsFix(m.now_us, fixed, m.x_quad, m.v_quad, *accuracy, _NO_COUNT),)
     return (None,)
+
+
+@_makes("sensed")
+def _sensed(m: Moment) -> tuple[Any, ...]:
+    readings = m.moments.readings
+    imu, slow = unpack(ImuReading, readings.imu, 0), unpack(SlowSensors, readings.slow, 0)
+    if isnan(imu.gyro[0]):
+        return (None,)
+    _, _, field_us, pressure_us = m.condition.heard_us
+    return (Sensed(imu.gyro, imu.accel, *slow, field_us, pressure_us),)
+
+
+@_makes("sortie")
+def _sortie(m: Moment) -> tuple[Any, ...]:
+    return (m.moments.sortie,)
 
 
 @_makes("vibration")

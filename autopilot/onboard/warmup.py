@@ -6,9 +6,10 @@ import numpy as np
 
 from autopilot.core.flight_core import FlightCore, Setup
 from autopilot.core.health import BatteryConstants, Condition
+from autopilot.core.sensor_inbox import SensorInbox
 from autopilot.estimation.records import ImuReading
 from autopilot.geometry.linear import ZERO
-from autopilot.geometry.packed import packed, width
+from autopilot.geometry.packed import packed
 from autopilot.onboard.log_records import SampleRecords
 from autopilot.onboard.log_topics import FAST, Sample
 from autopilot.onboard.snapshot import Moment, Moments, Options
@@ -17,7 +18,7 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.services.stream_frames import BITS, StreamFrames
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
-from autopilot.wire.convert import HilGps, Home
+from autopilot.wire.convert import Home
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.ulog import UlogWriter
 
@@ -25,7 +26,9 @@ from autopilot.wire.ulog import UlogWriter
 def rehearse_telemetry(setup: Setup, parameters: ParameterTable) -> None:
     """Put an instant together, send and log it."""
     core, options = FlightCore(setup), Options(Home(), 0)
-    moments = Moments(core, options, parameters, packed(Condition()), np.zeros(width(HilGps)))
+    moments = Moments(
+        core, options, parameters, packed(Condition()), SensorInbox(options.home, core.rows.inbox)
+    )
     moment = Moment(moments, StoredMission(), 0)
     StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2), Home()).frames(sum(BITS.values()), moment.instant)
     imu = packed(ImuReading(ZERO, ZERO))

@@ -65,7 +65,15 @@ from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
 from autopilot.services.stream_frames import parts_of
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
-from autopilot.services.telemetry import GROUPS, LOAD_STREAMS, LOAD_SYSTEM, STREAMS, WATCHED, Stream
+from autopilot.services.telemetry import (
+    GROUPS,
+    LOAD_STREAMS,
+    LOAD_SYSTEM,
+    PROGRAM_INTERVALS_US,
+    STREAMS,
+    WATCHED,
+    Stream,
+)
 from autopilot.services.timesync import answer_ping, answer_timesync
 from autopilot.services.virtual_files import information_message, made_files, metadata_message
 from autopilot.wire.codec import Received, decode
@@ -138,7 +146,11 @@ class VehicleEndpoint:
         self._links: dict[Link, LinkState] = {}
         self._learned: dict[Link, LinkState] = {}  # of these the ones that were not configured
         table: dict[int, Stream] = STREAMS | (LOAD_STREAMS if identity.load_system else {})
-        self._defaults = {key: stream.interval_us for key, stream in table.items()}
+        intervals_us = {key: stream.interval_us for key, stream in table.items()}
+        self._defaults = (
+            intervals_us,
+            intervals_us | PROGRAM_INTERVALS_US,
+        )  # of ground stations, of programs
         self._built_by = {
             key: ((identity.load_system if key & LOAD_SYSTEM else identity.system, row.component), row.build)
             for key, row in table.items()
@@ -176,9 +188,10 @@ class VehicleEndpoint:
 
     # ---- what the shell calls
 
-    def add_link(self, link: Link, now_us: int = 0) -> None:
-        """A link that always gets telemetry, whether or not somebody is heard on it."""
-        self._links[link] = self._new_link(now_us)
+    def add_link(self, link: Link, now_us: int = 0, program: bool = False) -> None:
+        """A link that always gets telemetry, whether or not somebody is heard on it; `program`: as one that
+        flies the vehicle by a program, not as a ground station."""
+        self._links[link] = self._new_link(now_us, program)
         self._learned.pop(link, None)
         self._work = True
 
@@ -187,15 +200,20 @@ class VehicleEndpoint:
         if link in self._links:
             self._forget(link)
 
-    def receive(self, datagram: bytes, link: Link, now_us: int, decide: Decide) -> list[Event]:
-        """Handle a datagram of `link`; answers leave with the next `poll`. Malformed input never raises."""
+    def receive(
+        self, datagram: bytes, link: Link, now_us: int, decide: Decide, program: bool = False
+    ) -> list[Event]:
+        """Handle a datagram of `link`; answers leave with the next `poll`. Malformed input never raises.
+
+        `program`: what the link is, if it is new (see `add_link`).
+        """
         events: list[Event] = []
         self._stirred = True
         for received in decode(datagram, PATIENCE)[0]:
             message_id = received.id
             if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
-            state = self._heard(link, now_us)
+            state = self._heard(link, now_us, program)
             handler = self.handlers.get(message_id)
             if handler and self._is_for_us(message_id, received.message):
                 peer = Peer(link, received.system, received.component)
@@ -407,18 +425,19 @@ class VehicleEndpoint:
 
     # ---- links
 
-    def _new_link(self, now_us: int) -> LinkState:
+    def _new_link(self, now_us: int, program: bool) -> LinkState:
         taken = {state.number for state in self._links.values()}
         number = next(number for number in range(len(taken) + 1) if number not in taken)
         signer, system = self._signing.signer, self.identity.system
-        return LinkState(self._defaults, now_us, number & 0xFF, signer, system, self._home)
+        defaults = self._defaults[program]
+        return LinkState(defaults, now_us, number & 0xFF, signer, system, self._home)
 
-    def _heard(self, link: Link, now_us: int) -> LinkState:
+    def _heard(self, link: Link, now_us: int, program: bool) -> LinkState:
         state = self._links.get(link)
         if state is None:
             if len(self._learned) >= MAX_LINKS:
                 self._forget(min(self._learned, key=lambda link: self._learned[link].heard_us))
-            state = self._links[link] = self._learned[link] = self._new_link(now_us)
+            state = self._links[link] = self._learned[link] = self._new_link(now_us, program)
             self._work = True
         state.heard_us = now_us
         return state

@@ -3,12 +3,17 @@ an INT32 where the identity says so.
 
 Lists go out at a steady pace for each link; whoever misses an index asks for it again. A set is answered with
 the value that is really stored, to every link if it is a new one, so that no ground station shows an old one.
+
+Where values travel by their bits, as from PX4, a list begins with PX4's `_HASH_CHECK`: a ground station that
+has kept parameters of this hash sends it back, and the list ends there.
 """
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
+from autopilot.services.file_tree import checksum
 from autopilot.services.identity import ALL_REAL, ParameterEncoding
 from autopilot.services.records import (
     Decide,
@@ -21,9 +26,10 @@ from autopilot.services.records import (
     WorldSaved,
 )
 from autopilot.services.streams import NEVER_US
+from autopilot.wire.codec import Layout
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_encoding import from_the_wire, on_the_wire
-from autopilot.wire.parameter_table import ParameterError, ParameterTable
+from autopilot.wire.parameter_table import ParameterError, ParameterTable, float32
 
 _FAILED, _ALL_ROTORS = "SIM_ENGINE_FAIL", 0b1111
 _BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
@@ -35,7 +41,20 @@ DOES_NOT_EXIST = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
 OUT_OF_RANGE = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
 READ_ONLY = mavlink.MAV_PARAM_ERROR_READ_ONLY
 TYPE_MISMATCH = 7
+HASH_NAME = "_HASH_CHECK"
+_HASH_INDEX = -1  # in a list, before the first value
+_NO_INDEX = 0xFFFF  # PARAM_VALUE.param_index
+_FLOAT32, _INT32 = struct.Struct("<f"), struct.Struct("<i")
 _TYPE_NAMES = {mavlink.MAV_PARAM_TYPE_REAL32: "REAL32", mavlink.MAV_PARAM_TYPE_INT32: "INT32"}
+
+
+class _HashValue(mavlink.MAVLink_param_value_message):
+    """PARAM_VALUE with a UINT32 in the field of the float; as a float, some would not keep their bits."""
+
+    unpacker = struct.Struct("<IHH16sB")
+
+
+_HASH_VALUE = Layout(_HashValue)
 
 
 class ParameterService:
@@ -46,16 +65,19 @@ class ParameterService:
         self._encoding = encoding
         self._lists: dict[Link, tuple[int, int]] = {}  # next index, and when
         self._complete = True  # the table: no more parameters will be learned
+        self._hash: tuple[int, int] = (-1, 0)  # version of the table, and its hash
 
     def receive_request_list(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
-        """Begin the list for this link, from the start if one is under way."""
-        self._lists[peer.link] = (0, now_us)
+        """Begin the list for this link, from the start if one is under way; then without the hash."""
+        self._lists[peer.link] = (0 if peer.link in self._lists else self._begin, now_us)
         return []
 
     def receive_request_read(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """One value, by index or by name."""
         index, names = message.param_index, self.table.names
         if index == _BY_NAME:
+            if message.param_id == HASH_NAME and self._encoding.bytewise:
+                return [Send(peer.link, self._hash_message())]
             if message.param_id in self.table:
                 return [Send(peer.link, self.value_message(message.param_id))]
         elif 0 <= index < len(names):
@@ -65,6 +87,9 @@ class ParameterService:
     def receive_set(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Store a value, or say why not; either way the answer is the value in force."""
         name = message.param_id
+        if name == HASH_NAME and self._encoding.bytewise:  # it has our parameters already
+            self._lists.pop(peer.link, None)
+            return []
         if name not in self.table:
             return [self._error(name, _BY_NAME, DOES_NOT_EXIST, peer)]
         kind = self._carried(name)[1]
@@ -123,6 +148,24 @@ class ParameterService:
             name.encode(), *self._carried(name), len(table.names), table.index(name)
         )
 
+    @property
+    def _begin(self) -> int:
+        """With what a list begins."""
+        return _HASH_INDEX if self._encoding.bytewise else 0
+
+    def _hash_message(self) -> Any:
+        """PARAM_VALUE of the hash: PX4's, over names and values in the order of the names."""
+        table = self.table
+        if self._hash[0] != table.version:
+            parts = []
+            for name in table.names:
+                whole = self._encoding.integers and table.describe(name).integer
+                value = _INT32.pack(round(table[name])) if whole else _FLOAT32.pack(float32(table[name]))
+                parts.append(name.encode() + value)
+            self._hash = (table.version, checksum(b"".join(parts)))
+        values = (self._hash[1], len(table), _NO_INDEX, HASH_NAME.encode(), mavlink.MAV_PARAM_TYPE_UINT32)
+        return (_HASH_VALUE, values)
+
     def _carried(self, name: str) -> tuple[float, int]:
         whole = self._encoding.integers and self.table.describe(name).integer
         return on_the_wire(self.table[name], whole, self._encoding.bytewise)
@@ -134,7 +177,7 @@ class ParameterService:
     def complete(self, now_us: int) -> None:
         """The table is complete: lists that were asked for begin."""
         self._complete = True
-        self._lists = dict.fromkeys(self._lists, (0, now_us))
+        self._lists = dict.fromkeys(self._lists, (self._begin, now_us))
 
     def next_timer(self) -> int:
         """When `poll` has something to send, in us."""
@@ -152,7 +195,10 @@ class ParameterService:
             if at_us > now_us:
                 continue
             count = min((now_us - at_us) // LIST_PACE_US + 1, LIST_BURST)
-            outputs += [Send(link, self.value_message(name)) for name in names[index : index + count]]
+            if index == _HASH_INDEX:
+                outputs.append(Send(link, self._hash_message()))
+            sent = names[max(index, 0) : index + count]
+            outputs += [Send(link, self.value_message(name)) for name in sent]
             self._lists[link] = (index + count, at_us + count * LIST_PACE_US)
             if index + count >= len(names):
                 del self._lists[link]

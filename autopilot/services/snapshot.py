@@ -29,6 +29,7 @@ TRACKER = mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION
 MOTORS = mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 AHRS = mavlink.MAV_SYS_STATUS_AHRS
 BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE  # present: there is something to keep within
 PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK  # health: the vehicle may be armed
 
 
@@ -42,6 +43,30 @@ class GpsFix(NamedTuple):
     horizontal_std: float  # m
     vertical_std: float  # m
     satellites: int
+
+
+class Sensed(NamedTuple):
+    """What the vehicle's own sensors read last, body FLU; zeros of one that never read anything."""
+
+    gyro: Vec3  # rad/s
+    accel: Vec3  # specific force, m/s^2
+    field_gauss: Vec3
+    pressure_pa: float
+    pressure_altitude_m: float
+    temperature_degC: float
+    field_us: int  # when the magnetometer read, and the barometer; -1: never
+    pressure_us: int
+
+
+class Sortie(NamedTuple):
+    """The flight under way, or the last one, by the vehicle's clock in us; 0: not yet."""
+
+    armed_us: int = 0
+    takeoff_us: int = 0
+    landed_us: int = 0
+
+
+_NO_SORTIE = Sortie()
 
 
 @dataclass
@@ -126,6 +151,8 @@ class Snapshot:
     sensors_present: int = 0  # the bits above
     sensors_healthy: int = 0
     gps: GpsFix | None = None
+    sensed: Sensed | None = None  # None: no inertial sample yet
+    sortie: Sortie = _NO_SORTIE
     vibration: Vec3 = ZERO  # m/s^2, body
     wind: Vec3 = _UNKNOWN  # m/s, where to
     battery_voltage: float = math.nan  # V

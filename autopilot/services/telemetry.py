@@ -42,7 +42,16 @@ from autopilot.services.instant import (
     servo_output_raw_of,
     vfr_hud_of,
 )
-from autopilot.services.snapshot import PREARM, Snapshot
+from autopilot.services.sensor_streams import (
+    actuator_output_status,
+    flight_information,
+    highres_imu,
+    odometry,
+    rc_channels,
+    scaled_imu,
+    scaled_pressure,
+)
+from autopilot.services.snapshot import GEOFENCE, PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import (
@@ -87,9 +96,9 @@ def _heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     # some tools read a missing health bit as a breach
-    health = s.sensors_healthy | (0 if s.breach else mavlink.MAV_SYS_STATUS_GEOFENCE)
+    health = s.sensors_healthy | (0 if s.breach else GEOFENCE)
     present = s.sensors_present | PREARM
-    enabled = present if s.guarded else present & ~mavlink.MAV_SYS_STATUS_GEOFENCE
+    enabled = present if s.guarded else present & ~GEOFENCE
     return (
         mavlink.MAVLink_sys_status_message(
             onboard_control_sensors_present=present,
@@ -363,6 +372,13 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(_AUTOPILOT, _rate(1), _ekf_status_report),
     mavlink.MAVLINK_MSG_ID_VIBRATION: Stream(_AUTOPILOT, _rate(1), _vibration),
     mavlink.MAVLINK_MSG_ID_WIND_COV: Stream(_AUTOPILOT, _rate(1), _wind_cov),
+    mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: Stream(_AUTOPILOT, _rate(1), scaled_pressure),
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU: Stream(_AUTOPILOT, OFF, scaled_imu),
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: Stream(_AUTOPILOT, OFF, highres_imu),
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: Stream(_AUTOPILOT, OFF, odometry),
+    mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: Stream(_AUTOPILOT, OFF, actuator_output_status),
+    mavlink.MAVLINK_MSG_ID_RC_CHANNELS: Stream(_AUTOPILOT, OFF, rc_channels),
+    mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: Stream(_AUTOPILOT, OFF, flight_information),
     mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(_AUTOPILOT, _rate(25), _attitude),
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: Stream(_AUTOPILOT, _rate(25), _attitude_quaternion),
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(_AUTOPILOT, _rate(20), _local_position_ned),
@@ -389,7 +405,17 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _rate(20), _rotor_state),
 }
 
+# What a link to a program has besides, as PX4's profile `onboard`
+PROGRAM_INTERVALS_US: dict[int, int] = {
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _rate(50),
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: _rate(30),
+}
+
 _GROUPED: dict[int, tuple[int, ...]] = {
+    mavlink.MAV_DATA_STREAM_RAW_SENSORS: (
+        mavlink.MAVLINK_MSG_ID_SCALED_IMU,
+        mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE,
+    ),
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
         mavlink.MAVLINK_MSG_ID_SYS_STATUS,
         mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
@@ -399,7 +425,10 @@ _GROUPED: dict[int, tuple[int, ...]] = {
         mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET,
         mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
     ),
-    mavlink.MAV_DATA_STREAM_RC_CHANNELS: (mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,),
+    mavlink.MAV_DATA_STREAM_RC_CHANNELS: (
+        mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+        mavlink.MAVLINK_MSG_ID_RC_CHANNELS,
+    ),
     mavlink.MAV_DATA_STREAM_POSITION: (
         mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,

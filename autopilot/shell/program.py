@@ -104,20 +104,24 @@ def _is_loopback(host: str) -> bool:
 
 
 class GroundStations:
-    """Sockets towards ground stations, one for each address that we were pointed at.
+    """Sockets towards ground stations and programs, one for each address that we were pointed at.
 
     Whoever else speaks to such a socket is a link of its own and is answered where it is.
     """
 
-    def __init__(self, addresses: tuple[Address, ...], tcp: TcpServer | None = None) -> None:
+    def __init__(
+        self, stations: tuple[Address, ...], programs: tuple[Address, ...] = (), tcp: TcpServer | None = None
+    ) -> None:
         self._tcp = tcp
+        addresses = (*stations, *programs)
         self._sockets = [_open(address, "ground station") for address in addresses]
+        self._is_program = [i >= len(stations) for i in range(len(addresses))]
         self._links: list[Link] = [(i, address) for i, address in enumerate(addresses)]
 
     def join(self, onboard: Onboard) -> None:
         """Serve the configured links from now on."""
-        for link in self._links:
-            onboard.add_link(link)
+        for link, is_program in zip(self._links, self._is_program, strict=True):
+            onboard.add_link(link, is_program)
         if self._tcp is not None:
             self._tcp.join(onboard)
 
@@ -129,7 +133,7 @@ class GroundStations:
         for i, sock in enumerate(self._sockets):
             while (arrived := receive(sock, socket.MSG_DONTWAIT, _LARGEST_HEARD)) is not None:
                 datagram, sender = arrived
-                handle(onboard.receive_ground(datagram, (i, sender)))
+                handle(onboard.receive_ground(datagram, (i, sender), self._is_program[i]))
                 if time.perf_counter() > until:  # the others have their turn, and the rest waits
                     break
         self.send(onboard)
@@ -582,12 +586,12 @@ def main(
             onboard.restore_world(kept.load_world()[0])
             return onboard
 
-        stations = [address for address in (*gcs, *api) if address is not None]
+        stations, programs = (tuple(filter(None, addresses)) for addresses in (gcs, api))
         ground: GroundStations | GroundInStep
         if ground_lockstep:
             ground = GroundInStep(ground_lockstep)
         else:
-            ground = GroundStations(tuple(stations), _listen(tcp) if tcp else None)
+            ground = GroundStations(stations, programs, _listen(tcp) if tcp else None)
         program = Program(build, mission, kept, sim, ground, say)
         areas, unread = kept.load_areas(place)
         program.take_areas(areas)

@@ -11,6 +11,8 @@
     DISARM    rotors off again                            OVER      OVER
 
 Time limits run on the vehicle's clock once it flies, so that they hold at any speed of simulation.
+
+From STREAMS until it flies the vehicle is also asked for its parameters, for the record; nothing waits.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from gcs.clients import command
 from gcs.clients.connection import LINK_TIMEOUT_US, Connection
 from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Status
+from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
 
 REPORT_INTERVAL_US = 8_000
@@ -119,6 +122,7 @@ class FlightClient:
         self._expected_s = expected_s
         self._limit_s = limit_s if limit_s is not None else expected_s * TIME_FACTOR + TIME_MARGIN_S
         self._operations: list[Operation] = []
+        self._parameters: ParameterList | None = None  # while they are asked for
         self._stage_began_us: int | None = None  # our clock
         self._flight_began_us: int | None = None  # the vehicle's clock
         self._texts_before = 0  # texts that came before this stage; while flying, before take-off
@@ -143,6 +147,8 @@ class FlightClient:
             self.view.update(one, now_us)
             if self._operations:
                 self._operations[0].receive(one.message, now_us)
+            if self._parameters is not None and one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
+                self._parameters.receive(one.message, now_us)
             if self.stage is Stage.FLY and one.id in _WATCHED and self._is_news(one):
                 self._watch()
 
@@ -157,8 +163,8 @@ class FlightClient:
             self._end(Outcome("lost", f"the vehicle fell silent while {self.stage.value}"))
         while self.outcome is None and self._advance(now_us):
             pass
-        if self._operations:
-            datagrams += [self.connection.frame(message) for message in self._operations[0].poll(now_us)]
+        for operation in (*self._operations[:1], *filter(None, (self._parameters,))):
+            datagrams += [self.connection.frame(message) for message in operation.poll(now_us)]
         return datagrams
 
     @property
@@ -236,9 +242,11 @@ class FlightClient:
         self._texts_before = len(self.view.texts)
         if stage is Stage.ARM:
             self._texts_armed = len(self.view.texts)
+        if stage is Stage.STREAMS and self.connection.target is not None:
+            self._parameters = ParameterList(self.connection.target)
         if stage is Stage.FLY:
             self._flight_began_us = self.view.time_us
-            self._operations = []
+            self._operations, self._parameters = [], None
             return
         operations = _TABLE[stage].operations
         self._operations = list(operations(self)) if operations else []
@@ -246,7 +254,7 @@ class FlightClient:
     def _end(self, outcome: Outcome) -> None:
         self.outcome = outcome
         self.stage = Stage.OVER
-        self._operations = []
+        self._operations, self._parameters = [], None
 
     # ---- the flight itself
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from autopilot.wire.tlog import TlogWriter
+from autopilot.wire.tlog import TlogPair, dialect_log
 from gcs.clients import command
 from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
-from gcs.errors import GcsError, RefusedError
+from gcs.clients.parameter_transfer import ParameterList
+from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.display import say
 from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, monotonic_us, unix_us
 from gcs.shell.session import Session
@@ -20,7 +21,7 @@ from gcs.workflows.report import TLOG_FILE
 def capture_to(out: Path | None, address: Address, duration_s: float | None) -> tuple[Path, int]:
     """Record telemetry until `duration_s` is over or somebody asks to stop; the log and its messages' number.
 
-    Without `out` the log goes to flights/capture-TIME/flight.tlog.
+    Without `out` the log goes to flights/capture-TIME/flight.tlog. Parameters come first.
     """
     path = out or Path("flights") / f"capture-{datetime.now():%Y%m%d-%H%M%S}" / TLOG_FILE
     with Session(address) as session, StopRequest("stopping") as stop:
@@ -29,11 +30,11 @@ def capture_to(out: Path | None, address: Address, duration_s: float | None) -> 
         target = session.find()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            file = path.open("wb")
+            files = path.open("wb"), dialect_log(path).open("wb")
         except OSError as error:
             raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
-        with file:
-            capture = Capture(TlogWriter(file), unix_us() - monotonic_us())
+        with files[0], files[1]:
+            capture = Capture(TlogPair(*files), unix_us() - monotonic_us())
 
             def received(datagram: bytes, now_us: int) -> None:
                 capture.on_vehicle(datagram)
@@ -48,6 +49,10 @@ def capture_to(out: Path | None, address: Address, duration_s: float | None) -> 
             session.on_truth = truth
             session.on_received = received
             session.on_sent = sent
+            try:
+                session.run(ParameterList(target), "parameters")
+            except NoVehicleError as error:
+                say(str(error))
             for message_id in REPORT_MESSAGES:
                 try:
                     session.run(command.message_interval(target, message_id, REPORT_INTERVAL_US))

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_mission
-from autopilot.wire.tlog import TlogWriter
-from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture
+from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient
 from gcs.shell.display import FlightDisplay
@@ -38,7 +37,7 @@ def flight_client(mission: Mission, options: FlightOptions, home: Home) -> Fligh
 def fly_own(
     mission: Mission,
     options: FlightOptions,
-    log: TlogWriter,
+    log: FrameLog,
     own: OwnVehicle,
     stop: StopRequest,
     watch: Stopwatch,

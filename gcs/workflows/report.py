@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.wire.tlog import read_tlog
+from autopilot.wire.tlog import dialect_log, is_of_dialect, read_tlog
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
 
@@ -43,6 +43,9 @@ def find_log(source: Path) -> Path:
         raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
     if next(read_tlog(tlog), None) is None:
         raise GcsError(f"{tlog}: holds no telemetry; must be a .tlog, or a directory that holds {TLOG_FILE}")
+    beside = dialect_log(tlog)
+    if not beside.is_file() and not any(is_of_dialect(received.frame) for _, received in read_tlog(tlog)):
+        raise GcsError(f"{tlog}: says nothing of the load; {beside.name}, which does, must be beside it")
     return tlog
 
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing, timestamp_of
-from autopilot.wire.tlog import TlogWriter
 from gcs.clients import command
-from gcs.clients.capture import Capture
+from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
 from gcs.shell.display import FlightDisplay, say
 from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, open_address, truth_socket, unix_us
@@ -29,7 +28,7 @@ def fly_running(
     mission: Mission,
     options: FlightOptions,
     address: Address,
-    log: TlogWriter,
+    log: FrameLog,
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None = None,

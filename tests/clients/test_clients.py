@@ -18,6 +18,7 @@ import pytest
 
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.tlog import read_tlog
 
 from .conftest import LONG_S, LOOPBACK, Mavproxy, Place, Stage, Told, Witness, complaints, staged
 
@@ -86,7 +87,17 @@ def mavsdk_and_two_ground_stations(stage: Stage) -> Watched:
         "upload",
         "take_off",
     )
-    more = ("go_to", "fly_mission", "offboard", "come_back", "gripper", "log")
+    more = (
+        "dated",
+        "go_to",
+        "fly_mission",
+        "upload_and_fly",
+        "offboard",
+        "go_away",
+        "come_back",
+        "gripper",
+        "log",
+    )
     finished = stage.program("mavsdk_flight.py", f"udpin://{LOOPBACK}:{stage.api}", *steps, *more)
     stays.expect("Cable taut, lifting the load")
     vanishes.type("wp list")
@@ -106,8 +117,11 @@ def test_mavsdk_flies(mavsdk_and_two_ground_stations: Callable[[], Watched]) -> 
     assert told["progress"] == [0, 1, 2, 3]
     # how busy this machine is, is no matter of the client's
     texts = [text for text in told["texts"] if not text.startswith("Machine busy")]
-    assert texts == [*FLOWN, "Load released", "Load taken"]
+    once, complete, *landed = FLOWN
+    assert texts == [once, complete, complete, *landed, "Load released", "Load taken"]
     assert "again" not in told
+    # all else is flown at 2.5 m and below; the return at the height that was set
+    assert max(place[2] for _, place in flight.witness.load) == pytest.approx(3.0, abs=0.05)
     result, size, path, name = told["log"]
     assert (result, size) == ("SUCCESS", len(flight.log))
     assert Path(path).read_bytes() == flight.log
@@ -269,11 +283,92 @@ def _flat(value: Any) -> list[float]:
     return [float(value)]
 
 
+def _load_a_loop(program: Mavproxy, directory: Path, *first: str) -> None:
+    """A mission of three waypoints that begins anew when it is over."""
+    rows = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t0\t1", *first]
+    for north in (47.397746, 47.397750, 47.397748):
+        rows.append(f"{len(rows) - 1}\t0\t3\t16\t0\t0\t0\t0\t{north}\t8.545594\t1.5\t1")
+    (directory / "loop.txt").write_text("\n".join(rows) + "\n")
+    program.type(f"wp load {directory / 'loop.txt'}")
+    program.expect("Got MISSION_ACK: TYPE_MISSION: ACCEPTED")
+    program.type("wp loop")
+    program.expect("Closed loop on mission")
+    program.expect("Got MISSION_ACK: TYPE_MISSION: ACCEPTED")
+
+
+def _ask_for_home_and_the_fence(program: Mavproxy) -> None:
+    """That home is told, MAVProxy does not say: see `acknowledged`."""
+    program.type("gethome")
+    program.type("param set GF_MAX_HOR_DIST 50")
+    program.expect("fence present")
+    for command, said in (("disable", "fence disabled"), ("enable", "fence enabled")):
+        program.type(f"fence {command}")
+        program.expect(said)
+
+
+def _push_forward(stage: Stage, program: Mavproxy) -> None:
+    """`velocity`, as often as setpoints must come, until the load has followed: ahead is east."""
+    begin = stage.witness.load[-1][1][0]
+
+    def moved() -> bool:
+        program.type("velocity 0.4 0 0")
+        return stage.witness.load[-1][1][0] > begin + 0.4
+
+    stage.wait_until(moved)
+
+
+def acknowledged(program: Mavproxy, command: int) -> list[int]:
+    """The results of a command, by MAVProxy's own log."""
+    heard = (received for _, received in read_tlog(program.directory / "mav.tlog"))
+    acks = [one.message for one in heard if one.id == m.MAVLINK_MSG_ID_COMMAND_ACK]
+    return [ack.result for ack in acks if ack.command == command]
+
+
+class Looped(NamedTuple):
+    """MAVProxy in the air: a mission without end, then by `velocity`."""
+
+    mavproxy: str
+    home: list[int]
+    witness: Witness
+
+
+@staged
+def mavproxy_in_a_loop(stage: Stage) -> Looped:
+    stage.begin(speed=SPEED)
+    program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
+    program.expect("parameters (ftp)")
+    _ask_for_home_and_the_fence(program)
+    _load_a_loop(program, stage.directory, "1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t1.5\t1")
+    program.type("long DO_SET_MODE 129 4 4")
+    program.expect("MISSION>")
+    program.type("arm throttle")
+    program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
+    for item in (4, 2, 3):
+        program.expect(f"waypoint {item}", LONG_S)
+    for _ in range(3):
+        program.type("velocity 0 0 0")
+    program.type("long DO_SET_MODE 129 6")
+    stage.wait_until(lambda: stage.witness.phases[-1] == m.PLUMBLINE_PHASE_GUIDED)
+    _push_forward(stage, program)
+    program.type("long DO_SET_MODE 129 4 5")
+    program.expect("Landed, disarmed", LONG_S)
+    return Looped(program.end(), acknowledged(program, m.MAV_CMD_GET_HOME_POSITION), stage.witness)
+
+
+def test_mavproxy_flies_a_loop_and_by_velocity(mavproxy_in_a_loop: Callable[[], Looped]) -> None:
+    flight = mavproxy_in_a_loop()
+    assert complaints(flight.mavproxy) == []
+    assert flight.home == [m.MAV_RESULT_ACCEPTED]
+    assert FAILSAFE not in flight.witness.phases
+    assert [text for text in flight.witness.texts if complaints(text)] == []
+
+
 class Ardupilot(NamedTuple):
     """DroneKit, and after it MAVProxy, with a vehicle that says it is an ArduPilot."""
 
     dronekit: Told
     mavproxy: str
+    home: list[int]
     witness: Witness
 
 
@@ -283,12 +378,8 @@ def clients_of_ardupilot(stage: Stage) -> Ardupilot:
     dronekit = stage.program("dronekit_flight.py", f"tcp:{LOOPBACK}:{stage.tcp}", "ardupilot")()
     program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     program.expect("parameters (ftp)")
-    rows = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t0\t1"]
-    for seq, north in ((1, 47.397746), (2, 47.397750), (3, 47.397746)):
-        rows.append(f"{seq}\t0\t3\t16\t0\t0\t0\t0\t{north}\t8.545594\t1.5\t1")
-    (stage.directory / "mission.txt").write_text("\n".join(rows) + "\n")
-    program.type(f"wp load {stage.directory / 'mission.txt'}")
-    program.expect("Got MISSION_ACK: TYPE_MISSION: ACCEPTED")
+    _ask_for_home_and_the_fence(program)
+    _load_a_loop(program, stage.directory)
     for name in ("GUIDED", "LOITER", "GUIDED"):
         program.type(f"mode {name}")
         program.expect(f"{name}>")
@@ -300,14 +391,19 @@ def clients_of_ardupilot(stage: Stage) -> Ardupilot:
     stage.wait_until(lambda: stage.witness.phases[-1] == m.PLUMBLINE_PHASE_HOLD)
     program.type("mode AUTO")
     program.expect("AUTO>")
-    program.expect("waypoint 2")
+    for item in (3, 1, 2):
+        program.expect(f"waypoint {item}")
     program.type("mode LOITER")
     program.expect("LOITER>")
+    program.type("mode GUIDED")
+    program.expect("GUIDED>")
+    _push_forward(stage, program)
     program.type("guided 47.397745 8.545594 1.5")
     program.type("mode RTL")
     program.expect("RTL>")
     program.expect("Landed, disarmed", 90.0)
-    return Ardupilot(dronekit, program.end(), stage.witness)
+    said = program.end()
+    return Ardupilot(dronekit, said, acknowledged(program, m.MAV_CMD_GET_HOME_POSITION), stage.witness)
 
 
 def test_dronekit_flies_an_ardupilot(clients_of_ardupilot: Callable[[], Ardupilot]) -> None:
@@ -323,6 +419,7 @@ def test_mavproxy_flies_an_ardupilot_by_the_names_of_its_modes(
 ) -> None:
     flight = clients_of_ardupilot()
     assert complaints(flight.mavproxy) == []
+    assert flight.home == [m.MAV_RESULT_ACCEPTED]
     assert FAILSAFE not in flight.witness.phases
 
 

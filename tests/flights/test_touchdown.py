@@ -9,6 +9,9 @@ import pytest
 
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.closed_loop import Conditions, fly
+from gcs.sweep.flight import boarding
+from gcs.sweep.flight import fly as sweep_fly
+from missions.fileformat import load_mission
 from missions.model import Land, Mission, Takeoff
 from sitl.vehicles.truth import load_truth
 
@@ -42,3 +45,15 @@ def test_a_vehicle_that_trembles_on_the_ground_stands(seed: int) -> None:
     log = io.BytesIO()
     outcome = fly(mission, Conditions(seed=seed, settings=settings), TlogWriter(log))
     assert (outcome.name, outcome.reason) == ("completed", "")
+
+
+@pytest.mark.parametrize("noise", [0.25, 0.5])
+def test_quiet_trackers_that_are_late_see_a_load_that_lies(noise: float) -> None:
+    """The vehicle holds still above the load, its cable a centimetre loose: too little for a slack cable at
+    once, too much for a pendulum by readings of 0.1 mm."""
+    mission = load_mission("case-b")
+    settings = {"CTL_LAW": 2.0, "SIM_SENS_LAT_MS": 30.0, "SIM_NOISE_SCALE": noise}
+    flown = sweep_fly(
+        mission, Conditions(settings=settings), boarding(mission, Conditions(settings=settings))
+    )
+    assert (flown.outcome, flown.reason) == ("completed", "")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from autopilot.services import identity
 from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import PENDING, Prepared
@@ -118,6 +120,38 @@ def test_a_mission_asked_for_right_after_its_upload_in_the_air_begins_by_itself(
     assert craft.flight.mission.active
     craft.run(at_phase(Phase.MISSION))
     assert craft.results(command) == [ACCEPTED]
+
+
+def test_a_vehicle_stays_armed_while_its_mission_waits_for_paths() -> None:
+    """On a machine that is busy they take longer than an armed vehicle is left without a task."""
+    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+    craft.wait(1.0)
+    upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
+    work = craft.onboard.work
+    assert work is not None
+    craft.begin()
+    craft.wait(15.0)
+    assert (craft.flight.phase, craft.flight.mission.waiting) == (Phase.ARMED, True)
+    craft.onboard.finish(work, work.done())
+    craft.run(at_phase(Phase.MISSION))
+    assert "Disarmed: nothing was asked of the vehicle" not in craft.texts
+
+
+@pytest.mark.parametrize("refused", [False, True])
+def test_a_vehicle_that_nothing_is_asked_of_is_disarmed(refused: bool) -> None:
+    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+    craft.wait(1.0)
+    if refused:
+        upload(craft, Takeoff(2.0), Delay(1.0), EDGE, Land())
+        work = craft.onboard.work
+        assert work is not None
+        craft.begin()
+        craft.wait(15.0)
+        craft.onboard.finish(work, Prepared(refusal="no way", notes=()))
+    else:
+        assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == ACCEPTED
+    craft.run(at_phase(Phase.DISARMED), 11.0)
+    assert "Disarmed: nothing was asked of the vehicle" in craft.texts
 
 
 def test_a_mission_that_turns_out_not_to_be_flyable_is_told() -> None:

@@ -10,7 +10,7 @@ from autopilot.services.endpoint import LINK_SILENCE_US, MAX_LINKS, VehicleEndpo
 from autopilot.services.identity import AUTO, AUTO_MISSION, DIALECT_COMPONENT, LOAD_COMPONENT, Identity
 from autopilot.services.links import DATAGRAM_BYTES
 from autopilot.services.records import TimesyncAnswered, Verdict
-from autopilot.services.snapshot import Snapshot
+from autopilot.services.snapshot import Sensed, Snapshot
 from autopilot.services.statustext import CHUNK
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import STREAMS
@@ -26,6 +26,13 @@ def types(received):
     return [r.message.get_type() for r in received]
 
 
+ALL_THERE = {
+    "x_quad_d": (0.0, 0.0, 1.0),
+    "wind": (1.0, 0.0, 0.0),
+    "sensed": Sensed((0.0,) * 3, (0.0, 0.0, 9.81), (0.0,) * 3, 1e5, 0.0, 15.0, 0, 0),
+}
+
+
 # ---- streams over links
 
 
@@ -34,7 +41,7 @@ def test_a_configured_link_hears_from_the_first_tick(rig):
 
 
 def test_default_rates_over_ten_seconds(rig):
-    rig.changes = {"x_quad_d": (0.0, 0.0, 1.0), "wind": (1.0, 0.0, 0.0)}
+    rig.changes = ALL_THERE
     rig.run(1_000_000 - 4000)  # up to the tick before a whole second: each multiple is counted once
     rig.poll()
     counts: dict[int, int] = {}
@@ -47,8 +54,26 @@ def test_default_rates_over_ten_seconds(rig):
         assert counts.get(message_id, 0) == expected * per_poll.get(message_id, 1), message_id
 
 
+@pytest.mark.parametrize("configured", [True, False])
+def test_a_link_to_a_program_has_what_programs_expect_besides(rig, configured):
+    rig.changes = ALL_THERE
+    if configured:
+        rig.endpoint.add_link("api", program=True)
+    else:
+        ping = FrameWriter(245, 190).frame(m.MAVLink_ping_message(1, 1, 0, 0))
+        rig.endpoint.receive(ping, "api", rig.now_us, rig.decide, program=True)
+    rig.run(1_000_000 - 4000)
+    rig.poll()
+    heard = {"api": [], "gcs": []}
+    for _ in range(250):
+        for link, received in rig.poll().items():
+            heard[link] += [r.message.get_msgId() for r in received]
+    besides = {key: heard["api"].count(key) for key in set(heard["api"]) - set(heard["gcs"])}
+    assert besides == {m.MAVLINK_MSG_ID_HIGHRES_IMU: 50, m.MAVLINK_MSG_ID_ODOMETRY: 30}
+
+
 def test_every_stream_comes_when_it_is_asked_for(rig):
-    rig.changes = {"x_quad_d": (0.0, 0.0, 1.0), "wind": (1.0, 0.0, 0.0)}
+    rig.changes = ALL_THERE
     for message_id in STREAMS:
         rig.run(12_000)
         for off in STREAMS.keys() - {m.MAVLINK_MSG_ID_HEARTBEAT}:

@@ -7,9 +7,10 @@ import struct
 
 import pytest
 
-from autopilot.services.identity import ParameterEncoding
+from autopilot.services.identity import ARDUPILOT, GENERIC, Identity, ParameterEncoding
 from autopilot.services.parameter_protocol import (
     DOES_NOT_EXIST,
+    HASH_NAME,
     LIST_PACE_US,
     OUT_OF_RANGE,
     READ_ONLY,
@@ -18,6 +19,7 @@ from autopilot.services.parameter_protocol import (
 )
 from autopilot.services.records import ParameterChanged, Peer
 from autopilot.services.streams import NEVER_US
+from autopilot.wire.codec import payload_of
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 
@@ -40,8 +42,31 @@ def errors(messages):
     return [(x.param_id, x.error) for x in messages if x.get_type() == "PARAM_ERROR"]
 
 
-def listed(rig, link="gcs", duration_us=200_000):
+def told(rig, link="gcs", duration_us=200_000):
     return [r.message for r in rig.run(duration_us, link) if r.message.get_type() == "PARAM_VALUE"]
+
+
+def listed(rig, link="gcs", duration_us=200_000):
+    """The values, without the hash before them."""
+    return [x for x in told(rig, link, duration_us) if x.param_id != HASH_NAME]
+
+
+def px4_hash(rig) -> int:
+    """PX4's `param_hash_check`, bit by bit: CRC-32 from 0, not inverted, over each name and its 4 bytes."""
+    crc = 0
+    for name in sorted(rig.table.names):
+        for byte in name.encode() + struct.pack("<f", rig.table[name]):
+            crc ^= byte
+            for _ in range(8):
+                crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
+    return crc
+
+
+def hash_in(received) -> int:
+    """The hash in the frame of a PARAM_VALUE, by its bits."""
+    assert received.message.param_type == m.MAV_PARAM_TYPE_UINT32
+    assert (received.message.param_id, received.message.param_index) == (HASH_NAME, 65535)
+    return struct.unpack("<I", payload_of(received.frame)[:4])[0]
 
 
 def test_the_list_is_whole_in_order_and_real32(rig):
@@ -51,6 +76,51 @@ def test_the_list_is_whole_in_order_and_real32(rig):
     assert [x.param_index for x in got] == list(range(len(rig.table)))
     assert {x.param_count for x in got} == {len(rig.table)}
     assert {x.param_type for x in got} == {REAL32}
+
+
+def hashes(received):
+    return [hash_in(r) for r in received if getattr(r.message, "param_id", "") == HASH_NAME]
+
+
+def test_a_list_begins_with_the_hash_that_px4_would_send(rig):
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    first, *rest = [r for r in rig.run(200_000) if r.message.get_type() == "PARAM_VALUE"]
+    assert hash_in(first) == px4_hash(rig)
+    assert first.message.param_count == len(rest) == len(rig.table)
+
+
+def test_the_hash_is_that_of_the_values_in_force_to_the_bit(rig):
+    # hundreds of values, so that some are signalling NaN: a passage through a float would change them
+    seen = set()
+    for step in range(600):
+        rig.table.set("LOAD_MASS", 0.1 + step * 1e-4)
+        rig.poll()
+        rig.send(read(HASH_NAME.encode()))
+        (number,) = hashes(rig.poll()["gcs"])
+        assert number == px4_hash(rig)
+        seen.add(number)
+    assert len(seen) == 600
+    assert any(number >> 22 & 0x1FF == 0x1FE and number & 0x3FFFFF for number in seen)  # a signalling NaN
+
+
+def test_a_ground_station_that_has_these_parameters_ends_the_list(rig):
+    rig.poll()
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    rig.poll()
+    rig.send(set_(HASH_NAME.encode(), 1.0, m.MAV_PARAM_TYPE_UINT32))
+    out = rig.run(200_000)
+    assert not [r for r in out if r.message.get_type() in ("PARAM_VALUE", "PARAM_ERROR", "STATUSTEXT")]
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    assert len(listed(rig)) == len(rig.table)
+
+
+@pytest.mark.parametrize("flavour", [ARDUPILOT, GENERIC], ids=["ardupilot", "generic"])
+def test_only_px4_has_a_hash(rig_with, flavour):
+    rig = rig_with(identity=Identity(flavour=flavour))
+    rig.send(m.MAVLink_param_request_list_message(1, 1))
+    assert HASH_NAME not in {x.param_id for x in told(rig)}
+    for ask in (read(HASH_NAME.encode()), set_(HASH_NAME.encode(), 1.0)):
+        assert errors(rig.replies(ask)) == [(HASH_NAME, DOES_NOT_EXIST)]
 
 
 def test_the_list_is_paced_and_only_for_the_asker(rig):
@@ -64,7 +134,7 @@ def test_the_list_is_paced_and_only_for_the_asker(rig):
         names.append(len(values(r.message for r in out.get("gcs", []))))
     per_tick = 4000 // LIST_PACE_US
     assert names[0] <= per_tick
-    assert names[:3] == [1, per_tick, 1]  # 4 in all
+    assert names[:3] == [1, per_tick, per_tick]  # the hash and 4
 
 
 def test_a_second_request_begins_again(rig):
@@ -203,6 +273,6 @@ def test_a_list_waits_until_the_table_is_complete(rig):
     assert not [r for r in rig.run(500_000) if r.message.get_type() == "PARAM_VALUE"]
     rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
     rig.endpoint.parameters_complete(rig.now_us)
-    told = [r.message for r in rig.run(100_000) if r.message.get_type() == "PARAM_VALUE"]
-    assert [x.param_id for x in told] == list(rig.table.names)
-    assert {x.param_count for x in told} == {len(rig.table.names)}
+    got = listed(rig)
+    assert [x.param_id for x in got] == list(rig.table.names)
+    assert {x.param_count for x in got} == {len(rig.table.names)}

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from autopilot.services.identity import Identity
-from autopilot.services.snapshot import ACCEL, GYRO, MAG, PREARM, GpsFix
+from autopilot.services.snapshot import ACCEL, GEOFENCE, GYRO, MAG, PREARM, GpsFix, Sensed
 from autopilot.services.streams import OFF
-from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, STREAMS
+from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, PROGRAM_INTERVALS_US, STREAMS
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -98,6 +98,7 @@ def test_every_stream_stands_any_numbers(key, vector, snap):
         scalar,
     )
     fix = GpsFix(0, 3, vector, vector, scalar, scalar, 300)
+    changes["sensed"] = Sensed(vector, vector, vector, scalar, scalar, scalar, 0, 0)
     snapshot = snap(
         2**40, forces=(scalar,) * 4, quat_wxyz=(vector[0],) * 4, gps=fix, slack_events=2**20, **changes
     )
@@ -140,6 +141,18 @@ def test_health_as_the_sensors_say_and_no_fence_breach(snap):
     assert status.onboard_control_sensors_health & PREARM
     assert status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_GEOFENCE
     assert (status.voltage_battery, status.battery_remaining) == (11_100, 75)
+
+
+@pytest.mark.parametrize("guarded", [True, False])
+def test_a_fence_is_present_and_enabled_unless_it_is_switched_off(snap, guarded):
+    (status,) = sent(
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS, snap(sensors_present=GYRO | GEOFENCE, guarded=guarded)
+    )
+    assert status.onboard_control_sensors_present & GEOFENCE
+    assert bool(status.onboard_control_sensors_enabled & GEOFENCE) == guarded
+    assert status.onboard_control_sensors_enabled & GYRO
+    (status,) = sent(mavlink.MAVLINK_MSG_ID_SYS_STATUS, snap(sensors_present=GYRO))
+    assert not (status.onboard_control_sensors_present | status.onboard_control_sensors_enabled) & GEOFENCE
 
 
 def test_what_is_unknown_is_said_to_be(snap):
@@ -200,6 +213,8 @@ def test_every_stream_and_its_rate_stand_in_the_manual(key):
     stream = ALL[key]
     message = mavlink.mavlink_map[key & ~LOAD_SYSTEM]
     rate = "on request" if stream.interval_us == OFF else f"{1_000_000 // stream.interval_us} Hz"
+    if key in PROGRAM_INTERVALS_US:
+        rate += f"; {1_000_000 // PROGRAM_INTERVALS_US[key]} Hz to programs"
     manual = Path(__file__).parents[2] / "docs" / "mavlink.md"
     rows = [line for line in manual.read_text().splitlines() if line.startswith(f"| {message.msgname} ")]
     assert any(f"| {rate} |" in row and f"| {stream.component} |" in row for row in rows), (

@@ -7,15 +7,17 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.tlog import TlogWriter, read_tlog
+from autopilot.wire.tlog import TlogPair, TlogWriter, dialect_log, is_of_dialect, read_both, read_tlog
 
+XML = Path(str(mavlink.__file__)).with_name("plumbline.xml")
 BOOT_US = 1_767_225_600_000_000  # 2026-01-01, as in lockstep flights
 quick = settings(max_examples=100, deadline=None, derandomize=True)
 
@@ -49,6 +51,37 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
     path.write_bytes(_written(records))
     for source in (path, str(path)):
         assert [(unix_us, received.frame) for unix_us, received in read_tlog(source)] == records
+
+
+def test_the_private_dialect_has_a_log_of_its_own_that_is_read_with_the_other(tmp_path: Path) -> None:
+    """Tools of others end at a message that they do not know."""
+    records = _records(500)
+    tlog = tmp_path / "some.flight.tlog"
+    with tlog.open("wb") as standard, dialect_log(tlog).open("wb") as dialect:
+        pair = TlogPair(standard, dialect)
+        for unix_us, frame in records:
+            pair.write(unix_us, frame)
+    assert dialect_log(tlog) == tmp_path / "some.flight.plumbline.tlog"
+    assert {received.id for _, received in read_tlog(tlog)} == {mavlink.MAVLINK_MSG_ID_ATTITUDE}
+    assert {r.id for _, r in read_tlog(dialect_log(tlog))} == {mavlink.MAVLINK_MSG_ID_ROTOR_STATE}
+    both = [(unix_us, received.frame) for unix_us, received in read_both(tlog)]
+    assert sorted(both) == sorted(records)
+    dialect_log(tlog).unlink()
+    assert {received.id for _, received in read_both(tlog)} == {mavlink.MAVLINK_MSG_ID_ATTITUDE}
+
+
+def test_a_message_is_of_the_dialect_where_the_xml_says_so() -> None:
+    own = {f"{message.get('name')}" for message in ElementTree.parse(XML).iter("message")}
+    assert "LOAD_STATE" in own
+    for kind in mavlink.mavlink_map.values():
+        values = kind.unpacker.unpack(bytes(kind.unpacker.size))
+        frame = FrameWriter(1, 1).frame((layout_of(kind), values))
+        assert is_of_dialect(frame) == (kind.msgname in own), kind.msgname
+
+
+def test_a_frame_of_mavlink_1_is_never_of_the_dialect() -> None:
+    # whatever stands where the other version has its message id
+    assert not any(is_of_dialect(bytes((0xFE, 9, 0, 1, 1, 0, low, low, low, low))) for low in range(256))
 
 
 def test_a_record_is_a_big_endian_time_and_the_frame() -> None:

@@ -35,13 +35,16 @@ from autopilot.estimation.records import (
     LoadEstimate,
     LoadReading,
 )
-from autopilot.estimation.tautness import SLACK_BELOW, slacken
+from autopilot.estimation.tautness import LIFTING_S, SLACK_BELOW, slacken
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, dot, norm, scale, sub
 
 SLACK_FROM = 0.8  # share of the cable length below which a short distance is an outlier, not a slack cable
 REFUSED_BELOW = 0.98  # share below which readings that the pendulum does not explain show a slack cable
 SLACK_READINGS = 3.0  # that in a row must show a short distance
+# After so many refusals in a row this share of the length that was learned shows it as well: a vehicle that
+# holds still above a load on the ground leaves the cable millimetres loose, and quiet trackers are refused.
+REFUSED_LONG, REFUSED_LONG_BELOW = 12.0, 0.995
 REACH = 1.5  # cable lengths from the vehicle beyond which no load is believed
 
 
@@ -195,8 +198,11 @@ def correct_load(
     short = SLACK_FROM < distance < SLACK_BELOW
     refused = not farness(history, 3) <= 3.0 * tuning.gate_sigma * tuning.gate_sigma
     if refused or short:
-        # nearer the threshold the pendulum tells: it no longer is one
+        # nearer the threshold the pendulum tells: it no longer is one; and the longer that lasts, the nearer
         short = short or SLACK_FROM < distance < REFUSED_BELOW
+        if load.rejected >= REFUSED_LONG and load.held_s > LIFTING_S:
+            length = load.length / tuning.cable_length
+            short = short or SLACK_FROM < distance < REFUSED_LONG_BELOW * length
         if short and load.rejected + 1.0 >= SLACK_READINGS:
             return start_load(state, history, reading, tuning)
         return refuse_load(state, history, reading, tuning)

@@ -11,9 +11,10 @@ FAILSAFE_DISARM_US = 3_000_000
 
 
 def watch_idle(flight: Flight, view: View, settings: Settings) -> Watched:
-    """Disarm when nothing has been asked of the armed vehicle, or some time after a failsafe."""
+    """Disarm when nothing has been asked of the armed vehicle, or some time after a failsafe. A vehicle whose
+    mission waits for its paths was asked for something, however long these take."""
     lasted_us = view.now_us - flight.phase_start_us
-    if flight.phase == Phase.ARMED and lasted_us > IDLE_DISARM_US:
+    if flight.phase == Phase.ARMED and not flight.mission.waiting and lasted_us > IDLE_DISARM_US:
         return Watched(flight, Event.DISARM, ((INFO, "Disarmed: nothing was asked of the vehicle"),))
     if flight.phase == Phase.FAILSAFE and lasted_us > FAILSAFE_DISARM_US:
         return Watched(flight, Event.DISARM, ((WARNING, "Disarmed after failsafe"),))

@@ -29,6 +29,7 @@ from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 
 LONG_S = 120.0  # of a busy machine
 LOST_ON_THE_WAY = ("TIMEOUT", "BUSY", "NOT_RECEIVED_YET")
+RETURN_M = 3.0
 DEGREE_M = 111_319.5  # of latitude
 NAN = math.nan
 
@@ -115,15 +116,32 @@ class Pilot:
             "unix_epoch_time",
             "position_velocity_ned",
             "attitude_angular_velocity_body",
+            "imu",
+            "odometry",
+            "scaled_imu",
+            "actuator_output_status",
+            "rc_status",
         )
-        for name in streams:
-            getattr(self.telemetry, f"subscribe_{name}")(
+        for name in ("scaled_imu", "actuator_output_status", "rc_status"):
+            getattr(self.telemetry, f"set_rate_{name}")(10.0)
+        heard = {
+            name: getattr(self.telemetry, f"subscribe_{name}")(
                 lambda value, *_, name=name: seen.setdefault(name, value)
             )
+            for name in streams
+        }
         self.until("all streams", lambda: len(seen) == len(streams))
+        for name, handle in heard.items():  # so many callbacks keep a busy machine's Python from the rest
+            getattr(self.telemetry, f"unsubscribe_{name}")(handle)
         battery = seen["battery"]
         self.told["battery"] = [battery.voltage_v, battery.remaining_percent]
         self.told["satellites"] = seen["gps_info"].num_satellites
+        # it stands: weight, no rotation, rotors off
+        for name in ("imu", "scaled_imu"):
+            assert abs(seen[name].acceleration_frd.down_m_s2 + 9.81) < 0.5
+        assert seen["actuator_output_status"].active == 4
+        assert seen["actuator_output_status"].actuator[0] == 1000.0
+        assert not seen["rc_status"].was_available_once
         fast: list[Any] = []
         self.telemetry.set_rate_position(20.0)
         self.telemetry.subscribe_position(lambda value, *_: fast.append(value))
@@ -144,6 +162,8 @@ class Pilot:
         assert param.get_param_int("MIS_SHAPE") == 1
         self.action.set_takeoff_altitude(1.5)
         assert self.action.get_takeoff_altitude() == 1.5
+        self.action.set_return_to_launch_altitude(RETURN_M)
+        assert self.action.get_return_to_launch_altitude() == RETURN_M
 
     def missions(self) -> None:
         raw = MissionRaw(self.system)
@@ -188,8 +208,14 @@ class Pilot:
         self.until("armed", self.telemetry.armed)
 
     def go_to(self) -> None:
+        self._go_to(1.0, 2.5)
+
+    def go_away(self) -> None:
+        """As far as a return climbs from."""
+        self._go_to(1.6, 2.5)
+
+    def _go_to(self, north: float, height: float) -> None:
         home = self.telemetry.home()
-        north, height = 1.0, 2.5
         place = (home.latitude_deg + north / DEGREE_M, home.longitude_deg)
         self.action.goto_location(*place, home.absolute_altitude_m + height, NAN)
 
@@ -232,6 +258,23 @@ class Pilot:
         self.mode("MISSION")
         self.until("the end of the mission", self.mission.is_mission_finished)
         self.told["progress"] = sorted(set(done))
+
+    def upload_and_fly(self) -> None:
+        """A mission that is started in the air as soon as it is there, before its paths can be prepared."""
+        self.upload()
+        self.mission.start_mission()
+        self.mode("MISSION")
+        self.until("the end of the mission", self.mission.is_mission_finished)
+        self.mode("HOLD")
+
+    def dated(self) -> None:
+        """In the air: since when."""
+        heard: list[Any] = []
+        info = Info(self.system)
+        info.subscribe_flight_information(lambda flight, *_: heard.append(flight))
+        self.until("when it was armed", lambda: bool(heard) and heard[-1].duration_since_arming_ms > 0)
+        assert 0 < heard[-1].duration_since_takeoff_ms <= heard[-1].duration_since_arming_ms
+        assert heard[-1].flight_uid > 0
 
     def offboard(self) -> None:
         """Places, then velocities, as the examples of MAVSDK do it."""

@@ -93,6 +93,28 @@ def test_the_messages_of_the_report_are_asked_for(world, fly):
     assert asked == dict.fromkeys(REPORT_MESSAGES, REPORT_INTERVAL_US)
 
 
+def test_parameters_are_asked_for_while_the_flight_is_prepared_and_never_in_the_air(world, fly):
+    vehicle = world.vehicle
+    vehicle.script, vehicle.ready = normal_flight, False  # so that there is time
+    vehicle.lost_list_indices = set(range(3, 119, 7))
+    told, value = [], vehicle.on_param_request_read
+
+    def note(message):
+        told.append((message.param_index, vehicle.started_us))
+        value(message)
+
+    vehicle.on_param_request_read = note
+    client, _ = fly()
+    assert client.outcome.name == "completed"
+    assert sorted(told) == [(index, None) for index in sorted(vehicle.lost_list_indices)]
+
+
+def test_a_vehicle_without_parameters_is_flown(world, fly):
+    world.vehicle.parameters = {}
+    world.vehicle.script, world.vehicle.ready = normal_flight, False
+    assert fly()[0].outcome.name == "completed"
+
+
 def test_a_message_that_is_not_served_does_not_stop_the_flight(world, fly):
     world.vehicle.command_results[mavlink.MAV_CMD_SET_MESSAGE_INTERVAL] = [mavlink.MAV_RESULT_UNSUPPORTED] * 5
     assert fly()[0].outcome.name == "completed"

@@ -1,0 +1,150 @@
+"""What the vehicle's own sensors read, its estimate as odometry, and what else an autopilot can be asked for.
+
+Builders of `telemetry`; NED and FRD on the wire, scaled integers saturate. Nothing is said of a sensor that
+the vehicle does not carry.
+"""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Any
+
+from autopilot.geometry.linear import Vec3
+from autopilot.services.identity import Identity
+from autopilot.services.instant import attitude_quaternion_of, servo_output_raw_of
+from autopilot.services.snapshot import Sensed, Snapshot
+from autopilot.wire.codec import layout_of
+from autopilot.wire.convert import boot_ms, saturated
+from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
+
+_HIGHRES_IMU = layout_of(mavlink.MAVLink_highres_imu_message)
+_ODOMETRY = layout_of(mavlink.MAVLink_odometry_message)
+_RC_CHANNELS = layout_of(mavlink.MAVLink_rc_channels_message)
+_ACTUATOR_OUTPUT_STATUS = layout_of(mavlink.MAVLink_actuator_output_status_message)
+
+_UINT16, _INT16 = 0xFFFF, 0x7FFF
+_CHANNELS = 18  # of RC_CHANNELS
+_OUTPUTS, _ROTORS = 32, 4  # of ACTUATOR_OUTPUT_STATUS, and of the vehicle
+_STANDARD_GRAVITY = 9.80665  # m/s^2, of a milli-g
+# HIGHRES_IMU.fields_updated
+_INERTIAL, _FIELD, _PRESSURE = 0x003F, 0x01C0, 0x1A00
+_UPDATED_US = 20_000  # a slower sensor is "updated" where it read within the default interval of HIGHRES_IMU
+_LOST = -1  # ODOMETRY.quality; 0 is "not stated"
+
+
+def _within(value: float, factor: float) -> int:
+    return saturated(value * factor, -_INT16 - 1, _INT16)
+
+
+def _updated(s: Snapshot, sensed: Sensed) -> int:
+    """The fields of HIGHRES_IMU that are news."""
+    fields = _INERTIAL
+    for bits, read_us in ((_FIELD, sensed.field_us), (_PRESSURE, sensed.pressure_us)):
+        if read_us >= 0 and s.now_us - read_us < _UPDATED_US:
+            fields |= bits
+    return fields
+
+
+def highres_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """HIGHRES_IMU; 0 in the fields of a sensor that never read anything, whose bits are never set."""
+    sensed = s.sensed
+    if sensed is None:
+        return ()
+    return (
+        (
+            _HIGHRES_IMU,
+            (
+                s.now_us,
+                *frd_from_flu(sensed.accel),
+                *frd_from_flu(sensed.gyro),
+                *frd_from_flu(sensed.field_gauss),
+                sensed.pressure_pa * 0.01,
+                0.0,
+                sensed.pressure_altitude_m,
+                sensed.temperature_degC,
+                _updated(s, sensed),
+                0,
+            ),
+        ),
+    )
+
+
+def scaled_imu(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """SCALED_IMU of the one inertial unit: milli-g, mrad/s, mgauss; its temperature is not known."""
+    sensed = s.sensed
+    if sensed is None:
+        return ()
+    readings = (
+        *(_within(a, 1e3 / _STANDARD_GRAVITY) for a in frd_from_flu(sensed.accel)),
+        *(_within(w, 1e3) for w in frd_from_flu(sensed.gyro)),
+        *(_within(b, 1e3) for b in frd_from_flu(sensed.field_gauss)),
+    )
+    return (mavlink.MAVLink_scaled_imu_message(boot_ms(s.now_us), *readings),)
+
+
+def scaled_pressure(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """SCALED_PRESSURE of the barometer, where one is carried."""
+    sensed = s.sensed
+    if sensed is None or sensed.pressure_us < 0:
+        return ()
+    temperature = _within(sensed.temperature_degC, 100.0)
+    pressure = sensed.pressure_pa * 0.01
+    return (mavlink.MAVLink_scaled_pressure_message(boot_ms(s.now_us), pressure, 0.0, temperature),)
+
+
+def _diagonal(first: Vec3) -> tuple[float, ...]:
+    """Upper triangle of a 6x6 covariance of which three variances are known; NaN: not known."""
+    x, y, z = first
+    return (x, *(nan,) * 5, y, *(nan,) * 4, z, *(nan,) * 9)
+
+
+def odometry(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """ODOMETRY: the estimate of the vehicle, position and velocity in LOCAL_NED."""
+    attitude = attitude_quaternion_of(s)
+    rates = frd_from_flu(s.omega_body)
+    horizontal, vertical = s.horizontal_std * s.horizontal_std, s.vertical_std * s.vertical_std
+    return (
+        (
+            _ODOMETRY,
+            (
+                s.now_us,
+                *ned_from_enu(s.x_quad),
+                *attitude[1:5],
+                *ned_from_enu(s.v_quad),
+                *rates,
+                *_diagonal((horizontal, horizontal, vertical)),
+                *(nan,) * 21,
+                mavlink.MAV_FRAME_LOCAL_NED,
+                mavlink.MAV_FRAME_LOCAL_NED,
+                0,
+                mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
+                0 if s.estimator_flags else _LOST,
+            ),
+        ),
+    )
+
+
+def actuator_output_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """ACTUATOR_OUTPUT_STATUS: the pulses of SERVO_OUTPUT_RAW, us."""
+    pulses = servo_output_raw_of(s)[1 : 1 + _ROTORS]
+    return ((_ACTUATOR_OUTPUT_STATUS, (s.now_us, _ROTORS, *pulses, *(0.0,) * (_OUTPUTS - _ROTORS))),)
+
+
+def rc_channels(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """RC_CHANNELS: there is no receiver."""
+    return ((_RC_CHANNELS, (boot_ms(s.now_us), *(_UINT16,) * _CHANNELS, 0, 255)),)
+
+
+def flight_information(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """FLIGHT_INFORMATION of the flight under way, or of the last one: us since boot, whatever the names say.
+
+    The number of a flight is when it was armed, us since 1970.
+    """
+    armed_us, takeoff_us, landed_us = s.sortie
+    number = s.boot_unix_us + armed_us if armed_us else 0
+    return (
+        mavlink.MAVLink_flight_information_message(
+            boot_ms(s.now_us), armed_us, takeoff_us, number, boot_ms(landed_us)
+        ),
+    )

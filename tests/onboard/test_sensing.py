@@ -1,0 +1,85 @@
+"""What telemetry is told of the vehicle's own sensors, and of the flight under way."""
+
+from __future__ import annotations
+
+import pytest
+
+from autopilot.onboard.snapshot import Moment
+from autopilot.services.snapshot import GEOFENCE, Sortie
+from autopilot.supervisor.state import Phase
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem
+from missions.model import Land, Takeoff
+from sitl.messages import pressure_pa
+from tests.doubles.craft import Craft
+
+
+def moment(craft: Craft) -> Moment:
+    seen = craft.onboard.log_sample().snapshot
+    assert isinstance(seen, Moment)
+    return seen
+
+
+def test_before_the_first_tick_nothing_was_sensed() -> None:
+    assert moment(Craft()).sensed is None
+
+
+def test_the_slower_sensors_are_kept_between_their_readings() -> None:
+    craft = Craft(sensors="gps")
+    craft.wait(1.0)
+    read_us = set()
+    for _ in range(100):
+        craft.tick()
+        sensed = moment(craft).sensed
+        assert sensed is not None
+        read_us.add((sensed.field_us, sensed.pressure_us))
+        # a barometer of 0.3 m, at rest: 12 Pa to the metre
+        assert sensed.pressure_pa == pytest.approx(pressure_pa(0.0), abs=30.0)
+        assert 0.2 < sum(b * b for b in sensed.field_gauss) ** 0.5 < 0.7  # the Earth's
+        assert sensed.accel[2] == pytest.approx(9.81, abs=1.0)
+    assert 1 < len(read_us) < 100
+
+
+def test_a_sensor_that_is_not_carried_never_read() -> None:
+    craft = Craft(sensors="lab")
+    craft.wait(0.5)
+    sensed = moment(craft).sensed
+    assert sensed is not None
+    assert (sensed.field_us, sensed.pressure_us) == (-1, -1)
+
+
+def test_a_flight_is_dated_by_arming_take_off_and_landing() -> None:
+    craft = Craft(Takeoff(1.0), Land())
+    craft.wait(1.0)
+    assert moment(craft).sortie == Sortie()
+    craft.begin()
+    craft.run(lambda craft: craft.flight.phase not in (Phase.DISARMED, Phase.ARMED))
+    taken_off_us = craft.flight.phase_start_us
+    assert craft.onboard.now_us - taken_off_us <= 4000
+    armed_us = moment(craft).sortie.armed_us
+    assert 1_000_000 < armed_us <= taken_off_us
+    craft.run(lambda craft: craft.flight.phase == Phase.DISARMED)
+    assert moment(craft).sortie == Sortie(armed_us, taken_off_us, craft.onboard.now_us)
+    # the next flight begins anew
+    assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    again = moment(craft).sortie
+    assert again.armed_us > taken_off_us
+    assert (again.takeoff_us, again.landed_us) == (0, 0)
+
+
+@pytest.mark.parametrize("limit", ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"])
+def test_a_fence_of_parameters_is_shown_as_present(limit: str) -> None:
+    assert not moment(Craft()).sensors_present & GEOFENCE
+    assert moment(Craft(**{limit: 20.0})).sensors_present & GEOFENCE
+
+
+def test_a_fence_that_is_uploaded_is_shown_as_present_until_it_is_cleared() -> None:
+    craft = Craft()
+    corners = ((-300, -300), (-300, 300), (300, 300), (300, -300))
+    origin = (473977420, 85455940)
+    fence = tuple(
+        WireItem(3, 5001, 0, 1, 4.0, 0.0, 0.0, 0.0, origin[0] + x, origin[1] + y, 0.0) for x, y in corners
+    )
+    for items in (fence, ()):
+        craft.onboard.take_areas(mavlink.MAV_MISSION_TYPE_FENCE, items)
+        assert bool(moment(craft).sensors_present & GEOFENCE) == bool(items)
