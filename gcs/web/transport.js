@@ -151,7 +151,11 @@
       };
       const act = acts[event.key];
       if (!act) return;
-      if (event.key === " " && where instanceof Element && where.closest("button, a, summary")) where.blur();
+      // a button that was reached by the keyboard is pressed by it; one that was clicked leaves the space bar alone
+      if (event.key === " " && where instanceof Element && where.closest("button, a, summary")) {
+        if (where.matches(":focus-visible")) return;
+        where.blur();
+      }
       event.preventDefault();
       act();
     }

@@ -110,6 +110,14 @@ def test_it_plays_and_stops_by_the_space_bar(page: Browser) -> None:
     assert page.run("return replay.transport.time") == pytest.approx(stopped + 0.1)
 
 
+def test_the_space_bar_presses_a_button_that_the_keyboard_reached(page: Browser) -> None:
+    page.run("replay.transport.set(8, true)")
+    page.find(".controls .speed").send_keys("\t")  # on to the button behind it
+    page.driver.switch_to.active_element.send_keys(" ")
+    assert page.run("return replay.transport.playing") is False
+    assert page.run("return replay.transport.time === replay.flight.worst.time")
+
+
 def test_the_greatest_error_is_one_click_away(page: Browser, case_b: Path) -> None:
     page.run("replay.transport.set(8, true)")
     page.find("button.figure").click()
