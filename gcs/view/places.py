@@ -1,4 +1,4 @@
-"""Fence and rally points of a vehicle as the page draws them."""
+"""Fence, rally points and waypoints of a vehicle as the page draws them."""
 
 from __future__ import annotations
 
@@ -15,6 +15,18 @@ from autopilot.wire.items import WireItem
 _POLYGONS = {
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: "inclusion",
     mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: "exclusion",
+}
+_PLACED = {
+    mavlink.MAV_CMD_NAV_TAKEOFF,
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LAND,
+}
+_HEIGHTS = {  # by frame: whether they are above home
+    mavlink.MAV_FRAME_GLOBAL: False,
+    mavlink.MAV_FRAME_GLOBAL_INT: False,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT: True,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT: True,
 }
 _CIRCLES = {
     mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: "inclusion",
@@ -51,6 +63,19 @@ def fence_record(
 def rally_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
     """Places on the ground: heights of rally points are not used."""
     return [[*_spot(item, home), 0.0] for item in items if item.command == mavlink.MAV_CMD_NAV_RALLY_POINT]
+
+
+def waypoints_record(items: Sequence[WireItem], home: Home) -> list[list[float]]:
+    """The places that a mission names, one after the other; how it flies between them is not said here."""
+    places: list[list[float]] = [[0.0, 0.0, 0.0]]
+    for item in items:
+        if item.command not in _PLACED or item.frame not in _HEIGHTS or not -inf < item.z < inf:
+            continue
+        north, east = _spot(item, home) if item.x or item.y else places[-1][:2]
+        ground = 0.0 if _HEIGHTS[item.frame] else home.altitude_m
+        height = 0.0 if item.command == mavlink.MAV_CMD_NAV_LAND else item.z - ground
+        places.append([north, east, round(-height, 3)])
+    return places if len(places) > 1 else []
 
 
 def _spot(item: WireItem, home: Home) -> list[float]:

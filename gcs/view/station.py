@@ -25,7 +25,7 @@ from gcs.clients.parameter_transfer import ParameterGet
 from gcs.view.actions import ActionError, operations_of
 from gcs.view.controls import READ, SLIDERS
 from gcs.view.history import History
-from gcs.view.places import fence_record, rally_record
+from gcs.view.places import fence_record, rally_record, waypoints_record
 from gcs.view.vehicle import WatchedVehicle
 
 INTERVAL_US = 20_000
@@ -67,6 +67,7 @@ class Station:
     def __init__(self, speaks: bool = True, signing: Signing | None = None) -> None:
         self.vehicles: dict[int, WatchedVehicle] = {}
         self.known_parameters: dict[str, float] = {}  # of vehicles that must not be asked
+        self.known_waypoints: list[list[float]] = []
         self._histories: dict[int, History] = {}
         self._fresh: dict[str, list[list[Any]]] = {}  # samples that pages have not been told of
         self._speaks = speaks
@@ -90,7 +91,9 @@ class Station:
                 vehicle.receive(one, now_us)
                 self._listen(vehicle, one, now_us)
                 if self._speaks and one.id == mavlink.MAVLINK_MSG_ID_MISSION_CURRENT:
-                    self._fetch_plans(vehicle, (one.message.fence_id, one.message.rally_points_id))
+                    current = one.message
+                    ids = current.mission_id, current.fence_id, current.rally_points_id
+                    self._fetch_plans(vehicle, ids)
         return heard
 
     def receive_truth(self, datagram: bytes) -> None:
@@ -203,6 +206,7 @@ class Station:
         vehicle = WatchedVehicle(Target(*connection.target), connection)
         for name, value in self.known_parameters.items():
             vehicle.set_parameter(name, value)
+        vehicle.waypoints = self.known_waypoints
         system = vehicle.target.system
         self.vehicles[system] = vehicle
         self._histories[system] = History()
@@ -213,9 +217,9 @@ class Station:
                 _Task(None, "", [operation]) for operation in _first_questions(vehicle)
             )
 
-    def _fetch_plans(self, vehicle: WatchedVehicle, ids: tuple[int, int]) -> None:
-        """Fetch the fence and the rally points that have changed."""
-        before = vehicle.plan_ids or (None, None)
+    def _fetch_plans(self, vehicle: WatchedVehicle, ids: tuple[int, int, int]) -> None:
+        """Fetch what has changed of mission, fence and rally points."""
+        before = vehicle.plan_ids or (None, None, None)
         vehicle.plan_ids = ids
         for kind, now, then in zip(_PLANS, ids, before, strict=True):
             if now != then:
@@ -231,6 +235,7 @@ class Station:
             "parameters": {name: value for name, value in vehicle.parameters.items() if name in shown},
             "fence": vehicle.fence,
             "rally": vehicle.rally,
+            "waypoints": vehicle.waypoints,
         }
 
     # ---- exchanges
@@ -298,7 +303,9 @@ class Station:
         if operation.kind == mavlink.MAV_MISSION_TYPE_FENCE:
             vehicle.fence = fence_record(operation.items, home, vehicle.parameters)
         elif operation.kind == mavlink.MAV_MISSION_TYPE_RALLY:
-            vehicle.rally = [(n, e, d) for n, e, d in rally_record(operation.items, home)]
+            vehicle.rally = rally_record(operation.items, home)
+        else:
+            vehicle.waypoints = waypoints_record(operation.items, home)
         self._news.append(self._vehicle_record(vehicle))
 
 
@@ -316,4 +323,4 @@ def _first_questions(vehicle: WatchedVehicle) -> list[Operation]:
     return [*streams, home, *parameters]
 
 
-_PLANS = (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)
+_PLANS = (mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)

@@ -40,9 +40,10 @@ class WatchedVehicle:
         self.parameters: dict[str, float] = {}
         self.changed_parameters: dict[str, float] = {}  # since the page was told
         self.fence: dict[str, Any] | None = None
-        self.rally: list[Place] = []
+        self.rally: list[list[float]] = []
+        self.waypoints: list[list[float]] = []
         self._believed: deque[tuple[int, Place]] = deque(maxlen=_ESTIMATES)  # places of the load by time
-        self.plan_ids: tuple[int, int] | None = None  # versions of fence and rally points
+        self.plan_ids: tuple[int, int, int] | None = None  # versions of mission, fence and rally points
         self.told_texts = 0  # of view.texts
 
     def receive(self, one: Received, now_us: int) -> None:

@@ -138,6 +138,7 @@
     if (scene) {
       scene.setFence(record.fence);
       scene.setRally(record.rally);
+      scene.setWaypoints(record.waypoints);
     }
     controls.setParameters(record.parameters);
     enable();

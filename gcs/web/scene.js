@@ -169,6 +169,11 @@
       this.places.setRally(points);
     }
 
+    /** @param places [N, E, D] that the mission names, one after the other */
+    setWaypoints(places) {
+      this.places.setWaypoints(places);
+    }
+
     /** Marks the place that the load was asked to go to; null: none. */
     setGoal(place) {
       this.places.setGoal(place);

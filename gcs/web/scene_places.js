@@ -84,13 +84,14 @@
       this.fence = null;
       this.rally = [];
       this.goal = null;
+      this.waypoints = [];
       this.arrowSize = 1;
       this.setTheme(theme);
     }
 
     setTheme(theme) {
       this.theme = theme;
-      for (const group of [this.groundGroup, this.fenceGroup, this.rallyGroup, this.goalGroup, this.windGroup]) {
+      for (const group of this.groups) {
         if (group) remove(group);
       }
       this.buildGround();
@@ -98,6 +99,12 @@
       this.setFence(this.fence);
       this.setRally(this.rally);
       this.setGoal(this.goal);
+      this.setWaypoints(this.waypoints);
+    }
+
+    get groups() {
+      return [
+        this.groundGroup, this.fenceGroup, this.rallyGroup, this.goalGroup, this.windGroup, this.waypointGroup];
     }
 
     buildGround() {
@@ -181,6 +188,22 @@
       this.rallyGroup = group;
     }
 
+    /** Small marks at the places of the mission, and thin lines from each to the next. */
+    setWaypoints(places) {
+      this.waypoints = places || [];
+      if (this.waypointGroup) remove(this.waypointGroup);
+      this.waypointGroup = new THREE.Group();
+      this.world.add(this.waypointGroup);
+      const between = this.waypoints.slice(1).flatMap((place, index) => [...this.waypoints[index], ...place]);
+      if (between.length) this.waypointGroup.add(segments(between, this.theme.asked, 0.45));
+      for (const place of this.waypoints.slice(1)) {
+        const mark = new THREE.Mesh(
+          new THREE.OctahedronGeometry(0.045), new THREE.MeshBasicMaterial({ color: this.theme.asked }));
+        mark.position.set(...place);
+        this.waypointGroup.add(mark);
+      }
+    }
+
     /** A ring with a stem where the load was asked to go; null takes it away. */
     setGoal(place) {
       this.goal = place || null;
@@ -252,7 +275,7 @@
     }
 
     dispose() {
-      for (const group of [this.groundGroup, this.fenceGroup, this.rallyGroup, this.goalGroup, this.windGroup]) {
+      for (const group of this.groups) {
         remove(group);
       }
     }

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from autopilot.wire.convert import Home
+from autopilot.wire.items import encode_mission
 from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
 from gcs.clients.flight import FlightClient
@@ -22,6 +24,7 @@ from gcs.shell.display import say
 from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, pipe
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
+from gcs.view.places import waypoints_record
 from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.view import open_browser, tell_if_open
 from missions.model import Mission
@@ -151,6 +154,7 @@ def flight_page(mission: Mission, options: FlightOptions, page: PageOptions) -> 
 def _about(mission: Mission, options: FlightOptions) -> dict[str, Any]:
     own = options.connect is None
     record: dict[str, Any] = {"kind": "fly", "mission": mission.name, "title": mission.title}
+    record["waypoints"] = waypoints_record(encode_mission(mission, Home()), Home())
     if own:
         record |= {"law": options.law, "sensors": options.sensors, "vehicle_name": options.vehicle}
         record |= {"seed": options.seed, "speed": options.speed}

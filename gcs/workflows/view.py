@@ -160,6 +160,7 @@ def serve_feed(descriptor: int, options: ViewOptions) -> None:
             site.report = Path(event.pop("report"))
             event["report"] = "report/report.html"
         if "kind" in event:
+            station.known_waypoints = event.pop("waypoints", [])
             station.known_parameters.update(_known(event.get("vehicle_name"), event.pop("settings", {})))
         session.record = {**session.record, **event}
         for server in servers:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 import socket
@@ -13,11 +12,9 @@ from typing import Any
 import pytest
 from websockets.sync.client import connect
 
+import plumbline
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.tlog import TlogWriter
-from gcs.closed_loop import Conditions, fly
-from missions.fileformat import load_mission
 from tests.doubles.browser import Browser
 
 pytestmark = pytest.mark.processes
@@ -125,9 +122,9 @@ def test_a_lockstep_flight_is_the_same_with_the_page_open(start: Callable[..., A
                 break
     assert record["outcome"] == "completed"
     assert flight.process.wait(30.0) == 0
-    log = io.BytesIO()
-    fly(load_mission("hover"), Conditions(sensors="lab", seed=7), TlogWriter(log))
-    assert (out / "flight.tlog").read_bytes() == log.getvalue()
+    flown = plumbline.fly("hover", sensors="lab", seed=7, quiet=True)
+    logs = ("flight.tlog", "flight.plumbline.tlog")
+    assert [(out / name).read_bytes() for name in logs] == [flown.tlog, flown.dialect_tlog]
     assert max(heights) > 0.9  # the page has seen it fly
 
 

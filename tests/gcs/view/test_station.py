@@ -217,14 +217,20 @@ def test_ground_stations_and_loads_are_no_vehicles() -> None:
     assert station.vehicles == {}
 
 
-def test_a_fence_is_fetched_when_it_has_changed(watched: Watched) -> None:
+def test_mission_and_fence_are_fetched_when_they_have_changed(watched: Watched) -> None:
     vehicle = watched.world.vehicle
     corners = [(MAP[0] + a, MAP[1] + b) for a, b in ((900, 0), (0, 900), (-900, 0))]
     inside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
     outside = mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
     polygon = [WireItem(3, inside, 0, 1, 3.0, 0, 0, 0, x, y, 0.0) for x, y in corners]
     vehicle.areas[FENCE] = [*polygon, WireItem(3, outside, 0, 1, 2.5, 0, 0, 0, *MAP, 0.0)]
-    current = mavlink.MAVLink_mission_current_message(0, 0, 0, 0, 0, 77, 0)
+    vehicle.mission = [
+        WireItem(6, mavlink.MAV_CMD_NAV_TAKEOFF, 0, 1, 0, 0, 0, 0, *MAP, 2.0),
+        WireItem(6, mavlink.MAV_CMD_NAV_WAYPOINT, 0, 1, 0, 0, 0, 0, MAP[0] + 900, MAP[1], 3.0),
+        WireItem(6, mavlink.MAV_CMD_NAV_LAND, 0, 1, 0, 0, 0, 0, 0, 0, math.nan),
+        WireItem(6, mavlink.MAV_CMD_NAV_LAND, 0, 1, 0, 0, 0, 0, 0, 0, 0.0),
+    ]
+    current = mavlink.MAVLink_mission_current_message(0, 0, 0, 0, 5, 77, 0)
     watched.station.receive(FrameWriter(1, 1).frame(current), watched.world.now_us)
     watched.run(2.0)
     fence = watched.station.vehicles[1].fence
@@ -232,6 +238,12 @@ def test_a_fence_is_fetched_when_it_has_changed(watched: Watched) -> None:
     first, second = fence["zones"]
     assert first["kind"] == "inclusion"
     assert first["polygon"][0] == pytest.approx([10.0, 0.0], abs=0.05)
+    places = watched.station.vehicles[1].waypoints
+    assert places[1:] == [
+        [0, 0, -2],
+        [pytest.approx(10.0, abs=0.05), 0, -3],
+        [pytest.approx(10, abs=0.05), 0, 0],
+    ]
     assert second == {"kind": "exclusion", "centre": [0.0, 0.0], "radius": 2.5}
 
 

@@ -181,12 +181,13 @@ def test_fence_rally_points_wind_and_themes_are_drawn_without_a_word_on_the_cons
         scene.setFence({zones: [{kind: "exclusion", polygon: [[2, -2], [2, 2], [3, 2], [3, -2]]},
                                 {kind: "inclusion", centre: [0, 0], radius: 6}], radius: 8, height: 4});
         scene.setRally([[1, 1, 0]]);
+        scene.setWaypoints([[0, 0, 0], [0, 0, -2], [3, 3, -2]]);
         scene.setGoal([1, 1, -1]);
         scene.show({time: 0.1, vehicles: [vehicle()], wind: [3, 1, 0]});
         const fenced = at();
         scene.setTheme("light");
         const light = at();
-        scene.setFence(null); scene.setRally([]); scene.setGoal(null);
+        scene.setFence(null); scene.setRally([]); scene.setGoal(null); scene.setWaypoints([]);
         scene.show({time: 0.2, vehicles: []});
         scene.render();
         scene.dispose();
