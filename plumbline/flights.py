@@ -6,12 +6,11 @@ import io
 import time
 from collections.abc import Mapping
 from functools import cached_property
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
-from autopilot.wire.tlog import TlogPair, dialect_log, read_tlog
+from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError
 from gcs.workflows.flight_options import FlightOptions, meta_of
 from gcs.workflows.mission_file import load
@@ -72,30 +71,25 @@ def fly(
         overwrite=False,
         limit_s=timeout_s,
     )
-    logs = io.BytesIO(), io.BytesIO()
+    log = io.BytesIO()
     began_s = time.perf_counter()
-    outcome = fly_here(flown, options, TlogPair(*logs))
+    outcome = fly_here(flown, options, TlogWriter(log))
     wall_s = time.perf_counter() - began_s
-    tlog, dialect_tlog = (log.getvalue() for log in logs)
-    return Flight(flown, outcome, tlog, dialect_tlog, meta_of(flown, options, outcome, wall_s))
+    return Flight(flown, outcome, log.getvalue(), meta_of(flown, options, outcome, wall_s))
 
 
 class Flight:
     """A flight that is over.
 
     `mission` is what was flown; `outcome` is `completed`, `diverged`, `timeout` or `refused`, and `reason`
-    says why it was not completed; `tlog` and `dialect_tlog` are its telemetry as the bytes of `flight.tlog`
-    and `flight.plumbline.tlog`, those of `gcs fly`.
+    says why it was not completed; `tlog` is its telemetry as the bytes of a `.tlog`, those of `gcs fly`.
     """
 
-    def __init__(
-        self, mission: Mission, outcome: Outcome, tlog: bytes, dialect_tlog: bytes, meta: FlightMeta
-    ) -> None:
+    def __init__(self, mission: Mission, outcome: Outcome, tlog: bytes, meta: FlightMeta) -> None:
         self.mission = mission
         self.outcome = outcome.name
         self.reason = outcome.reason
         self.tlog = tlog
-        self.dialect_tlog = dialect_tlog
         self._meta = meta
 
     @cached_property
@@ -135,7 +129,6 @@ class Flight:
         folder = Path(out)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / TLOG_FILE).write_bytes(self.tlog)
-        dialect_log(folder / TLOG_FILE).write_bytes(self.dialect_tlog)
         make_report(folder / TLOG_FILE, folder, self._meta, quiet)
         return folder / PAGE_FILE
 
@@ -143,8 +136,7 @@ class Flight:
     def _received(self) -> Telemetry:
         from gcs.analysis.telemetry import telemetry_of
 
-        logs = map(io.BytesIO, (self.tlog, self.dialect_tlog))
-        return telemetry_of(chain.from_iterable(map(read_tlog, logs)))
+        return telemetry_of(read_tlog(io.BytesIO(self.tlog)))
 
     @cached_property
     def _samples(self) -> Samples:

@@ -142,8 +142,9 @@ def swing_angle(sideways: float, up: float, sideways_dot: float, up_dot: float) 
 
 
 @kernel
-def state_error(state: State, x_ref: Vec3, b1_d: Vec3) -> Row:
-    """x - x_ref of (4-6), for a vehicle that is to rest at x_ref with its nose along b1_d."""
+def state_error(state: State, x_ref: Vec3, b1_d: Vec3, turning: float) -> Row:
+    """x - x_ref of (4-6), for a vehicle that is to rest at x_ref with its nose along b1_d, which turns at
+    `turning` rad/s about the vertical."""
     H = heading_frame(b1_d)
     x = apply_transposed(H, sub(state.x_quad, x_ref))
     v = apply_transposed(H, state.v_quad)
@@ -166,7 +167,7 @@ def state_error(state: State, x_ref: Vec3, b1_d: Vec3) -> Row:
         v[2],
         angle_rates[0],
         angle_rates[1],
-        angle_rates[2],
+        angle_rates[2] - turning,
         phi_L_dot,
         theta_L_dot,
     )
@@ -190,10 +191,12 @@ def load_position(state: State, reference: Reference, regulator: Lqr) -> Command
     vehicle with level and at rest, nose along b1_d; so q_c and R_c do not move.
     """
     x_d, v_d = reference.jet[0], reference.jet[1]
-    error = state_error(state, axpy(regulator.cable_length, E3, x_d), reference.b1_d)
+    b1_d, b1_d_dot = reference.b1_d, reference.b1_d_dot
+    turning = b1_d[0] * b1_d_dot[1] - b1_d[1] * b1_d_dot[0]
+    error = state_error(state, axpy(regulator.cable_length, E3, x_d), b1_d, turning)
     K = regulator.K
     down, zero = neg(E3), (0.0, 0.0, 0.0)
-    R_c = heading_frame(reference.b1_d)
+    R_c = heading_frame(b1_d)
     return Command(
         regulator.f0 - feedback(K[0], error),
         (-feedback(K[1], error), -feedback(K[2], error), -feedback(K[3], error)),

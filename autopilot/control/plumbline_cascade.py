@@ -144,13 +144,14 @@ def no_longer(v: Vec3, greatest: float) -> Vec3:
 
 @kernel
 def commanded_attitude(
-    F: Vec3, F_dot: Vec3, F_ddot: Vec3, b1_d: Vec3, state: State, vehicle: Vehicle
+    F: Vec3, F_dot: Vec3, F_ddot: Vec3, reference: Reference, state: State, vehicle: Vehicle
 ) -> AttitudeCommand:
     """R_c of (3-27) with Omega_c, Omega_c', no faster than the rotors can turn the vehicle.
 
     Without the rates where F vanishes, lies along the heading or is more level than the vehicle may lean.
     """
     zero: Vec3 = (0.0, 0.0, 0.0)
+    b1_d = reference.b1_d
     sideways = norm((F[0], F[1], 0.0))
     upward = max(F[2], _LEAST_LIFT * vehicle.quad_mass * vehicle.gravity)
     if sideways > _GREATEST_LEAN * upward:
@@ -161,7 +162,7 @@ def commanded_attitude(
     n = norm(F)
     if n < _LEAST_FORCE or norm(cross(F, b1_d)) < _LEAST_SINE * n:
         return AttitudeCommand(attitude_towards(F, b1_d, state.R), zero, zero)
-    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, zero, zero)
+    attitude = attitude_from_axes(F, F_dot, F_ddot, b1_d, reference.b1_d_dot, reference.b1_d_ddot)
     J = max(vehicle.inertia[0], vehicle.inertia[1])
     return AttitudeCommand(
         attitude.R_c,
@@ -333,7 +334,7 @@ def load_position(
     F_dot = scale(0.5 / STEP, sub(F_after, F_before))
     F_ddot = scale(1.0 / (STEP * STEP), sub(add(F_after, F_before), scale(2.0, F)))
 
-    attitude = commanded_attitude(F, F_dot, F_ddot, reference.b1_d, state, vehicle)
+    attitude = commanded_attitude(F, F_dot, F_ddot, reference, state, vehicle)
     result = attitude_moment(
         state.R, state.omega_body, attitude, gains.k_R, gains.k_Omega, 1.0, vehicle.inertia
     )

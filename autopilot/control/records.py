@@ -57,6 +57,16 @@ class Reference(NamedTuple):
 
     jet: Jet  # desired position and its six derivatives
     b1_d: Vec3  # desired heading, unit vector, not parallel to the thrust axis
+    b1_d_dot: Vec3 = (0.0, 0.0, 0.0)  # 1/s
+    b1_d_ddot: Vec3 = (0.0, 0.0, 0.0)  # 1/s^2
+
+
+class Nose(NamedTuple):
+    """Where the nose is to point: b_1d of (3-29), level, with two derivatives."""
+
+    b1_d: Vec3
+    b1_d_dot: Vec3  # 1/s
+    b1_d_ddot: Vec3  # 1/s^2
 
 
 class Command(NamedTuple):

@@ -168,6 +168,7 @@ class FlightCore:
             found,
             seen.pull_n if pulls else nan,
             seen.height_std,
+            state.R,
         )
 
     # ---- from tick to tick

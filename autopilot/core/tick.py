@@ -31,7 +31,7 @@ from autopilot.estimation.filter import (
 from autopilot.estimation.records import RECEIVER, Array, EstimatorState, EstimatorTuning, History
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import rows_in, taken
-from autopilot.geometry.linear import E1, E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
+from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
 from autopilot.geometry.packed import Each, Row, pack, unpack, with_field
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_POSITION
@@ -216,19 +216,21 @@ def fly_law(
     cable: Cable,
     vehicle: Vehicle,
 ) -> Any:
-    """The law in the mode that the stretch asks for: its memory and its command. The nose points east."""
+    """The law in the mode that the stretch asks for: its memory and its command."""
     kernels = kernels_of(law)
+    nose = stretch.nose
+    reference = Reference(jet, nose.b1_d, nose.b1_d_dot, nose.b1_d_ddot)
     if stretch.mode == LOAD_POSITION:
-        return kernels.load_position(law, memory, state, Reference(jet, E1), actuation, observed, cable)
+        return kernels.load_position(law, memory, state, reference, actuation, observed, cable)
     if stretch.mode == QUAD_POSITION:
-        return kernels.quad_position(law, memory, state, Reference(jet, E1), actuation, observed, cable)
+        return kernels.quad_position(law, memory, state, reference, actuation, observed, cable)
     lift = held_height(state, stretch.anchor_height, vehicle)
     if stretch.mode == LOAD_ATTITUDE:
         pull = cable_pull(lift, state.q_cable)
         return kernels.load_attitude(
-            law, memory, state, neg(stretch.upward), E1, pull, actuation, observed, cable
+            law, memory, state, neg(stretch.upward), nose.b1_d, pull, actuation, observed, cable
         )
-    R_d = attitude_towards(stretch.upward, E1, state.R)
+    R_d = attitude_towards(stretch.upward, nose.b1_d, state.R)
     thrust = tilted_thrust(lift, state.R) if isnan(stretch.thrust) else stretch.thrust
     return kernels.quad_attitude(law, memory, state, R_d, thrust, actuation, observed, cable)
 

@@ -25,11 +25,13 @@ on from the jet of the one before.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from math import atan, ceil, comb, cos, exp, inf, isnan, nan, sin, sqrt
+from dataclasses import dataclass, field, replace
+from math import atan, ceil, comb, cos, exp, inf, isnan, nan, radians, sin, sqrt
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import ZERO, Vec3, add, axpy, norm, scale, sub
+from autopilot.geometry import so3
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, column, mul, norm, scale, sub
+from autopilot.guidance.heading import LONGEST_STEP_S
 from autopilot.wire.dialect import plumbline as mavlink
 
 ORDER = 7  # of the smoother: x and its derivatives 1 ... 6 are continuous
@@ -38,6 +40,8 @@ K_V = 4.0 * K_P  # 1/s, critically damped with K_P
 BRAKE_SHARE = 0.7  # of the acceleration, with which braking is planned: the rest is for what is not planned
 SMOOTH_SHARE = 3.5  # rate of the smoother over that of the pendulum
 FADED = 40.0  # periods 1/w of the smoother, after which it has arrived but for rounding
+STEEPEST_DEG = 60.0  # lean that is asked of the vehicle at most
+_LEAST_UP = cos(radians(STEEPEST_DEG))
 FLOOR_M = 0.3  # height over home below which no setpoint takes the load
 
 _BINOMIAL = tuple(tuple(float(comb(k, j)) for j in range(k + 1)) for k in range(ORDER))
@@ -52,19 +56,32 @@ Point = tuple[Vec3, Vec3, Vec3]  # position, velocity, acceleration
 class PositionSetpoint:
     """What a stream asks of the load, ENU from home; NaN: nothing is asked on this axis.
 
-    A position with a velocity moves on with it from `since_us`.
+    A position with a velocity moves on with it from `since_us`. On an axis on which an acceleration alone is
+    asked for, nothing holds the load.
     """
 
     position: Vec3 = NOWHERE
     velocity: Vec3 = NOWHERE
     accel: Vec3 = NOWHERE
     since_us: int = 0
+    heading: float = nan  # rad, from east to north
+    turning: float = nan  # rad/s
 
     @property
     def is_place(self) -> bool:
         """Whether it asks for a place that does not move, and for nothing else."""
-        moves = any(v != 0.0 and not isnan(v) for v in (*self.velocity, *self.accel))
+        moves = any(v != 0.0 and not isnan(v) for v in (*self.velocity, *self.accel, self.turning))
         return not moves and not all(map(isnan, self.position))
+
+    def adrift(self, v: Vec3) -> Vec3:
+        """The parts of a vector along the axes on which it asks for an acceleration alone."""
+        x, y, z = (
+            v[axis]
+            if isnan(self.position[axis]) and isnan(self.velocity[axis]) and not isnan(self.accel[axis])
+            else 0.0
+            for axis in range(3)
+        )
+        return (x, y, z)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +113,18 @@ class Circle:
 @dataclass(frozen=True, slots=True)
 class AttitudeSetpoint:
     """An attitude asked of the vehicle: its thrust axis, ENU, and the thrust in newtons; None: what keeps the
-    height."""
+    height. Or, in place of an attitude, the rates with which it is to turn."""
 
     upward: Vec3
     thrust_n: float | None
+    heading: float = nan  # rad, from east to north
+    turning: float = nan  # rad/s
+    rates: Vec3 | None = None  # rad/s, body
+
+    @property
+    def is_too_steep(self) -> bool:
+        """Whether the vehicle would lean by more than STEEPEST_DEG."""
+        return not self.upward[2] >= _LEAST_UP
 
 
 Asked = PositionSetpoint | Circle | AttitudeSetpoint
@@ -268,6 +293,10 @@ def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLim
             distance = (distance[0], distance[1], FLOOR_M - x[2])
             along = (along[0], along[1], max(along[2], 0.0))
     wanted = add(along, _at_most(towards(distance, BRAKE_SHARE * pace.accel), pace.speed))
+    if isinstance(asked, PositionSetpoint):
+        # what an acceleration alone makes of the velocity in the time in which velocities are reached
+        wanted = add(wanted, _at_most(asked.adrift(axpy(1.0 / K_V, push, v)), pace.fastest))
+        push = sub(push, asked.adrift(push))
     # no faster down than stops at the floor
     height = max(x[2] - FLOOR_M, 0.0)
     slowest = -norm(towards((0.0, 0.0, height), BRAKE_SHARE * pace.accel))
@@ -284,10 +313,15 @@ def governed(x: Vec3, v: Vec3, asked: PositionSetpoint | Circle, pace: FollowLim
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """The vehicle follows an attitude setpoint; the position of the load is uncontrolled."""
+    """The vehicle follows an attitude setpoint; the position of the load is uncontrolled.
+
+    Where body rates are asked for, `attitude` is the one that turns with them, as it is at `at_us`.
+    """
 
     lean: AttitudeSetpoint
     anchor: Vec3
+    attitude: Mat3 | None = None
+    at_us: int = 0
     duration_s: float = inf
     control_mode: int = mavlink.PLUMBLINE_CONTROL_QUAD_ATTITUDE
 
@@ -297,7 +331,19 @@ class Posture:
 
     def upward(self, t: float) -> Vec3:
         """Unit vector, ENU: the thrust axis asked for."""
-        return self.lean.upward
+        return self.lean.upward if self.attitude is None else column(self.attitude, 2)
+
+    def onward(self, lean: AttitudeSetpoint, seen: Mat3, now_us: int) -> Posture:
+        """The same with what is asked at `now_us`, of a vehicle whose attitude is `seen`. Rates do not lean
+        it by more than a setpoint may."""
+        if lean.rates is None:
+            return replace(self, lean=lean, attitude=None)
+        if self.attitude is None:
+            return replace(self, lean=lean, attitude=seen, at_us=now_us)
+        elapsed_s = min((now_us - self.at_us) * 1e-6, LONGEST_STEP_S)
+        turned = mul(self.attitude, so3.exp(scale(elapsed_s, lean.rates)))
+        leaning = turned[2][2] < min(_LEAST_UP, self.attitude[2][2])
+        return replace(self, lean=lean, attitude=self.attitude if leaning else turned, at_us=now_us)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,7 @@ from autopilot.services.requests import (
     GetMessageInterval,
     Grab,
     Land,
+    LookAt,
     Orbit,
     Pause,
     Reboot,
@@ -45,6 +46,7 @@ from autopilot.services.requests import (
     StoreParameters,
     Takeoff,
     Terminate,
+    TurnNose,
     Winch,
 )
 from autopilot.wire.convert import Home, enu_from_geodetic
@@ -202,11 +204,20 @@ def _reposition(call: Call, context: Context) -> Request | Verdict:
     if place is None:
         return _refused("Reposition: no such place; must be latitude and longitude of a global frame")
     east, north, up = (None if math.isnan(value) else value for value in place)
-    if east is None and up is None:
+    yaw = _yaw(call, context)
+    if east is None and up is None and yaw is None:
         return Pause()  # what ground stations send for "hold here"
     flags = _whole(call.p[1]) or 0
     change_mode = bool(flags & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
-    return Reposition(east, north, up, change_mode, call.p[0] if call.p[0] > 0.0 else None)
+    speed_m_s = call.p[0] if call.p[0] > 0.0 else None
+    return Reposition(east, north, up, change_mode, speed_m_s, yaw)
+
+
+def _yaw(call: Call, context: Context) -> float | None:
+    """param4 as a heading from east to north [rad]; None for none. ArduPilot heeds none: clients say 0."""
+    if not context.flavour.heeds_yaw or not math.isfinite(call.p[3]):
+        return None
+    return 0.5 * math.pi - call.p[3]
 
 
 def _orbit(call: Call, context: Context) -> Request | Verdict:
@@ -342,6 +353,37 @@ def _winch(call: Call, context: Context) -> Request | Verdict:
     return Verdict(UNSUPPORTED, f"Winch: action {call.p[1]:g} is not offered; 1, 2, 5 and 6 are")
 
 
+def _condition_yaw(call: Call, context: Context) -> Request | Verdict:
+    angle, rate, sense, relative = call.p
+    if not math.isfinite(angle) or abs(angle) > 360.0:
+        return _refused(f"Yaw: param1 = {angle:g} deg; must be -360 ... 360")
+    if sense not in (-1.0, 0.0, 1.0) or relative not in (0.0, 1.0):
+        return _refused("Yaw: param3 must be -1, 0 or 1, param4 0 (from north) or 1 (from here)")
+    rate_rad_s = math.radians(rate) if rate > 0.0 else None
+    if relative:
+        # counter-clockwise is negative: of an angle without a sign param3 says it
+        clockwise = math.radians(abs(angle) * sense if sense else angle)
+        return TurnNose(-clockwise, relative=True, rate_rad_s=rate_rad_s)
+    return TurnNose(0.5 * math.pi - math.radians(angle), sense=-int(sense), rate_rad_s=rate_rad_s)
+
+
+def _roi_location(call: Call, context: Context) -> Request | Verdict:
+    place = _place(call._replace(z=0.0), context)
+    if place is None or math.isnan(place[0]):
+        return _refused("ROI: param5 and param6 must be latitude and longitude of a global frame")
+    return LookAt(place[0], place[1])
+
+
+def _roi(call: Call, context: Context) -> Request | Verdict:
+    """The command in which param1 says what is meant; ArduPilot and MAVProxy leave it 0 and give a place."""
+    named = not (math.isnan(call.x) or math.isnan(call.y)) and (call.x, call.y) != (0.0, 0.0)
+    if call.p[0] in (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION) and named:
+        return _roi_location(call, context)
+    if call.p[0] == mavlink.MAV_ROI_NONE:
+        return LookAt(None, None)
+    return Verdict(UNSUPPORTED, f"ROI: param1 = {call.p[0]:g}; 0 (none) and 3 (a place) are offered")
+
+
 def _enable_fence(call: Call, context: Context) -> Request | Verdict:
     if call.p[0] not in (0.0, 1.0):
         return _refused(f"Fence: param1 = {call.p[0]:g}; must be 0 (off) or 1 (on)")
@@ -367,8 +409,6 @@ def _never(text: str) -> Parser:
     return lambda call, context: Verdict(UNSUPPORTED, text)
 
 
-_NO_YAW = _never("Yaw: the nose is held east; headings are not flown")
-_NO_ROI = _never("ROI: there is no camera, and the nose is held east")
 _NO_ACTUATOR = _never("Actuators: there are rotors, gripper and winch; DO_GRIPPER and DO_WINCH move these")
 
 
@@ -405,11 +445,11 @@ PARSERS: dict[int, Parser] = {
     mavlink.MAV_CMD_GET_HOME_POSITION: _plain(RequestMessage(mavlink.MAVLINK_MSG_ID_HOME_POSITION, 0.0)),
     mavlink.MAV_CMD_DO_FENCE_ENABLE: _enable_fence,
     mavlink.MAV_CMD_INJECT_FAILURE: _inject_failure,
-    mavlink.MAV_CMD_CONDITION_YAW: _NO_YAW,
-    mavlink.MAV_CMD_DO_SET_ROI: _NO_ROI,
-    mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _NO_ROI,
-    mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET: _NO_ROI,
-    mavlink.MAV_CMD_DO_SET_ROI_NONE: _NO_ROI,
+    mavlink.MAV_CMD_CONDITION_YAW: _condition_yaw,
+    mavlink.MAV_CMD_DO_SET_ROI_LOCATION: _roi_location,
+    mavlink.MAV_CMD_DO_SET_ROI_NONE: _plain(LookAt(None, None)),
+    mavlink.MAV_CMD_DO_SET_ROI: _roi,
+    mavlink.MAV_CMD_NAV_ROI: _roi,
     mavlink.MAV_CMD_DO_SET_ACTUATOR: _NO_ACTUATOR,
     mavlink.MAV_CMD_DO_SET_SERVO: _NO_ACTUATOR,
     mavlink.MAV_CMD_DO_SET_RELAY: _NO_ACTUATOR,
@@ -526,7 +566,7 @@ def _ack(command: int, result: int, peer: Peer) -> Output:
         target_system=peer.system,
         target_component=peer.component,
     )
-    return Send(peer.link, message)
+    return Send(peer.link, message, peer.addressed)
 
 
 def _answer(command: int, verdict: Verdict, peer: Peer) -> list[Output]:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from autopilot.services.commands import CommandService
+from autopilot.services.components import ComponentService
 from autopilot.services.faults import Faults
 from autopilot.services.file_tree import FileTree
 from autopilot.services.files import Card, MemoryCard
@@ -23,7 +24,8 @@ from autopilot.services.ftp import FtpService
 from autopilot.services.guided import GuidedService
 from autopilot.services.identity import (
     AUTOPILOT_COMPONENT,
-    DIALECT_COMPONENT,
+    LOAD_COMPONENT,
+    WINCH_COMPONENT,
     Identity,
     available_modes_messages,
 )
@@ -43,12 +45,14 @@ from autopilot.services.records import (
     Peer,
     Say,
     Send,
+    Source,
     Verdict,
     WorldSaved,
 )
 from autopilot.services.requests import (
     FailRotors,
     FollowAttitude,
+    FollowRates,
     FollowSetpoint,
     FollowStick,
     GetMessageInterval,
@@ -66,12 +70,15 @@ from autopilot.services.statustext import TextWriter
 from autopilot.services.stream_frames import parts_of
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import (
+    COMPONENT_STREAMS,
     GROUPS,
     LOAD_STREAMS,
     LOAD_SYSTEM,
+    MESSAGE_ID,
     PROGRAM_INTERVALS_US,
     STREAMS,
     WATCHED,
+    WINCH_HEARTBEAT,
     Stream,
 )
 from autopilot.services.timesync import answer_ping, answer_timesync
@@ -97,7 +104,7 @@ _UNSUPPORTED = Verdict(mavlink.MAV_RESULT_UNSUPPORTED)
 _HEARTBEAT = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 _NO_INSTANT = np.zeros(0)
 
-_STREAMED = FollowSetpoint | FollowAttitude | FollowStick  # they change no mode
+_STREAMED = FollowSetpoint | FollowAttitude | FollowRates | FollowStick  # they change no mode
 _METADATA = {
     mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA: metadata_message,
     mavlink.MAVLINK_MSG_ID_COMPONENT_INFORMATION: information_message,
@@ -129,6 +136,7 @@ class VehicleEndpoint:
         self._reached_us: int | None = None
         self._parameters = ParameterService(parameters, identity.parameter_encoding)
         self._commands = CommandService(home, identity.flavour)
+        self._components = ComponentService(self._commands)
         self._guided = GuidedService(home, identity.system)
         made = made_files(identity, parameters, lambda: self._missions.mission)
         self.files = FileTree(MemoryCard() if card is None else card, made)
@@ -145,7 +153,8 @@ class VehicleEndpoint:
         self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
         self._learned: dict[Link, LinkState] = {}  # of these the ones that were not configured
-        table: dict[int, Stream] = STREAMS | (LOAD_STREAMS if identity.load_system else {})
+        load: dict[int, Stream] = LOAD_STREAMS if identity.load_system else {}
+        table = STREAMS | COMPONENT_STREAMS | load
         intervals_us = {key: stream.interval_us for key, stream in table.items()}
         self._defaults = (
             intervals_us,
@@ -155,7 +164,12 @@ class VehicleEndpoint:
             key: ((identity.load_system if key & LOAD_SYSTEM else identity.system, row.component), row.build)
             for key, row in table.items()
         }
-        self._own = (identity.system, AUTOPILOT_COMPONENT)
+        self._own: Source = (identity.system, AUTOPILOT_COMPONENT)
+        # streams by message id, as each part of the vehicle is asked for them; the autopilot knows nearly all
+        self._streams_of: dict[Source, dict[int, int]] = {}
+        for key, (source, _) in self._built_by.items():
+            self._streams_of.setdefault(source, {})[key & MESSAGE_ID] = key
+        self._streams_of[self._own] = {key: key for key in STREAMS}
         self._watched: dict[int, Any] = {}
         self._seen: tuple[object, Any] = (None, ())  # of the snapshot that was watched last
         self._asked_mode: int | None = None
@@ -215,8 +229,14 @@ class VehicleEndpoint:
                 continue
             state = self._heard(link, now_us, program)
             handler = self.handlers.get(message_id)
-            if handler and self._is_for_us(message_id, received.message):
-                peer = Peer(link, received.system, received.component)
+            addressed = self._addressed(message_id, received.message) if handler else None
+            if handler and addressed:
+                others = addressed != self._own
+                peer = Peer(link, received.system, received.component, addressed if others else None)
+                if others:
+                    handler = self._components.receive
+                if addressed[1] == WINCH_COMPONENT and state.streams.interval(WINCH_HEARTBEAT) == OFF:
+                    state.streams.set_interval(WINCH_HEARTBEAT, DEFAULT, now_us)
                 wrapped = self._decider(state, peer, now_us, decide)
                 try:
                     outputs = handler(received.message, peer, now_us, wrapped)
@@ -332,7 +352,7 @@ class VehicleEndpoint:
         instant = _NO_INSTANT if snapshot is None or snapshot.instant is None else snapshot.instant
         datagrams: list[tuple[Link, bytes]] = []
         for link, state, keys in due:
-            outgoing: list[Outgoing | int] = [(self._own, message) for message in state.queue]
+            outgoing: list[Outgoing | int] = [*state.queue]
             state.queue.clear()
             if snapshot is not None:
                 outgoing += self._streams(state, keys, snapshot, built)
@@ -407,15 +427,15 @@ class VehicleEndpoint:
         """Carry out what a service returned; events are added to `events`."""
         for output in outputs:
             match output:
-                case Send(link, message):
+                case Send(link, message, source):
                     for state in self._states(link):
-                        state.queue.append(message)
+                        state.queue.append((source or self._own, message))
                 case Say(severity, text):
                     if self.on_text is not None:
                         self.on_text(severity, text)
                     for message in self._texts.messages(severity, text):
                         for state in self._links.values():
-                            state.queue.append(message)
+                            state.queue.append((self._own, message))
                 case Announce(link, keys):
                     for key in keys:
                         self._announce(link, key)
@@ -430,7 +450,9 @@ class VehicleEndpoint:
         number = next(number for number in range(len(taken) + 1) if number not in taken)
         signer, system = self._signing.signer, self.identity.system
         defaults = self._defaults[program]
-        return LinkState(defaults, now_us, number & 0xFF, signer, system, self._home)
+        state = LinkState(defaults, now_us, number & 0xFF, signer, system, self._home)
+        state.streams.set_interval(WINCH_HEARTBEAT, OFF, now_us)
+        return state
 
     def _heard(self, link: Link, now_us: int, program: bool) -> LinkState:
         state = self._links.get(link)
@@ -457,17 +479,19 @@ class VehicleEndpoint:
 
     def _is_own(self, received: Received) -> bool:
         """Our own words come back where a link is looped."""
-        own_components = (AUTOPILOT_COMPONENT, DIALECT_COMPONENT)
-        own = received.system == self.identity.system and received.component in own_components
+        own = (received.system, received.component) in self._streams_of
         return own or received.system == self.identity.load_system != 0
 
-    def _is_for_us(self, message_id: int, message: Any) -> bool:
-        """Addressed to the autopilot, or to all (0); what has no address is for all."""
+    def _addressed(self, message_id: int, message: Any) -> Source | None:
+        """The part of the vehicle to which a message is addressed: the autopilot where it is to all (0) or
+        has no address; None: somebody else."""
         if message_id == mavlink.MAVLINK_MSG_ID_PING:
-            return True  # its target says whether it is a question
-        system = getattr(message, "target_system", 0)
+            return self._own  # its target says whether it is a question
+        system = getattr(message, "target_system", 0) or self.identity.system
         component = getattr(message, "target_component", 0)
-        return system in (0, self.identity.system) and component in (0, AUTOPILOT_COMPONENT)
+        if component == 0:
+            component = AUTOPILOT_COMPONENT if system == self.identity.system else LOAD_COMPONENT
+        return (system, component) if (system, component) in self._streams_of else None
 
     def _decider(self, state: LinkState, peer: Peer, now_us: int, decide: Decide) -> Decide:
         """`decide` for the supervisor's requests, joined with what is answered here."""
@@ -495,9 +519,9 @@ class VehicleEndpoint:
                 case RequestMessage(message_id, argument):
                     return self._request_message(state, peer, message_id, argument, now_us)
                 case GetMessageInterval(message_id):
-                    return self._request_interval(state, message_id)
+                    return self._request_interval(state, peer, message_id)
                 case SetMessageInterval(message_id, interval_us):
-                    return self._set_interval(state, message_id, interval_us, now_us)
+                    return self._set_interval(state, peer, message_id, interval_us, now_us)
             verdict = decide(request)
             if verdict.result == mavlink.MAV_RESULT_ACCEPTED and isinstance(request, ResetParameters):
                 self._consequences += [*self._parameters.reset(), ParametersSaved(), WorldSaved({})]
@@ -515,39 +539,48 @@ class VehicleEndpoint:
         self, state: LinkState, peer: Peer, message_id: int, argument: float, now_us: int
     ) -> Verdict:
         if message_id == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
-            return self._request_interval(state, int(argument) if 0.0 <= argument <= _UINT16 else -1)
+            number = int(argument) if 0.0 <= argument <= _UINT16 else -1
+            return self._request_interval(state, peer, number)
+        source = peer.addressed or self._own
         where = _METADATA.get(message_id)
-        if where is not None:
-            state.queue.append(where(self.identity, self._parameters.table, now_us))
+        if where is not None and source == self._own:
+            state.queue.append((source, where(self.identity, self._parameters.table, now_us)))
             return _ACCEPTED
-        if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
+        if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES and source == self._own:
             modes = available_modes_messages(self.identity)
             if not 0.0 <= argument <= len(modes):
                 return Verdict(mavlink.MAV_RESULT_DENIED)
             which = int(argument)  # 0: all
-            state.queue += modes[which - 1 : which] if which else modes
+            state.queue += [(source, mode) for mode in (modes[which - 1 : which] if which else modes)]
             return _ACCEPTED
-        if message_id not in STREAMS:
+        key = self._streams_of[source].get(message_id)
+        if key is None:
             return _UNSUPPORTED
-        self._do([Announce(peer.link, (message_id,))], [])
+        self._do([Announce(peer.link, (key,))], [])
         return _ACCEPTED
 
-    def _request_interval(self, state: LinkState, message_id: int) -> Verdict:
+    def _request_interval(self, state: LinkState, peer: Peer, message_id: int) -> Verdict:
         if not 0 <= message_id <= _UINT16:
             return _UNSUPPORTED
-        interval = state.streams.interval(message_id) or 0  # 0: not available
-        state.queue.append(mavlink.MAVLink_message_interval_message(message_id, min(interval, _INT32)))
+        source = peer.addressed or self._own
+        key = self._streams_of[source].get(message_id)
+        interval = 0 if key is None else state.streams.interval(key) or 0  # 0: not available
+        message = mavlink.MAVLink_message_interval_message(message_id, min(interval, _INT32))
+        state.queue.append((source, message))
         return _ACCEPTED
 
-    def _set_interval(self, state: LinkState, message_id: int, interval_us: int, now_us: int) -> Verdict:
-        if message_id not in STREAMS:
+    def _set_interval(
+        self, state: LinkState, peer: Peer, message_id: int, interval_us: int, now_us: int
+    ) -> Verdict:
+        key = self._streams_of[peer.addressed or self._own].get(message_id)
+        if key is None:
             return _UNSUPPORTED
         slowest = STREAMS[_HEARTBEAT].interval_us
         if message_id == _HEARTBEAT and (interval_us == OFF or interval_us > slowest):
             return Verdict(
                 mavlink.MAV_RESULT_DENIED, f"HEARTBEAT interval {interval_us} us; at most {slowest} us"
             )
-        state.streams.set_interval(message_id, interval_us, now_us)
+        state.streams.set_interval(key, interval_us, now_us)
         return _ACCEPTED
 
     def _set_origin(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:

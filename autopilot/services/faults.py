@@ -6,8 +6,8 @@ import sys
 import traceback
 from typing import Any
 
-from autopilot.services.ftp import refusal_of
-from autopilot.services.records import Output, Peer, Say, Send, ServiceFailed
+from autopilot.services.records import Output, Peer, Say, ServiceFailed
+from autopilot.services.refusals import refusals
 from autopilot.wire.dialect import plumbline as mavlink
 
 AGAIN_US = 10_000_000  # between two words about one service
@@ -32,23 +32,5 @@ class Faults:
 
     def answered(self, message: Any, peer: Peer, now_us: int) -> list[Output]:
         """The words, and what the asker waits for: that nothing was done."""
-        return [*self.told(message.get_type(), now_us), *_refusals(message, peer)]
-
-
-def _refusals(message: Any, peer: Peer) -> list[Output]:
-    """The answer of a protocol that knows one."""
-    system, component = peer.system, peer.component
-    match message.get_msgId():
-        case mavlink.MAVLINK_MSG_ID_COMMAND_LONG | mavlink.MAVLINK_MSG_ID_COMMAND_INT:
-            failed = mavlink.MAV_RESULT_FAILED
-            answer: Any = mavlink.MAVLink_command_ack_message(
-                message.command, failed, 0, 0, system, component
-            )
-        case mavlink.MAVLINK_MSG_ID_MISSION_COUNT | mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT:
-            kind = message.mission_type
-            answer = mavlink.MAVLink_mission_ack_message(system, component, mavlink.MAV_MISSION_ERROR, kind)
-        case mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
-            answer = refusal_of(message, peer)
-        case _:
-            return []
-    return [Send(peer.link, answer)]
+        refused = refusals(message, peer, mavlink.MAV_RESULT_FAILED, mavlink.MAV_MISSION_ERROR)
+        return [*self.told(message.get_type(), now_us), *refused]

@@ -372,4 +372,4 @@ def _message(packet: Packet, peer: Peer) -> Send:
     message = mavlink.MAVLink_file_transfer_protocol_message(
         0, peer.system, peer.component, list(payload_of(packet))
     )
-    return Send(peer.link, message)
+    return Send(peer.link, message, peer.addressed)

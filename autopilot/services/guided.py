@@ -1,8 +1,8 @@
 """Setpoints and sticks: messages that are repeated many times a second and are never acknowledged.
 
 What they ask becomes a request in ENU. A message that asks for nothing that can be flown is refused by a
-STATUSTEXT, once in COMPLAIN_US for each reason. The nose is held east by the control law: yaw and yaw rate
-are not followed, and body axes are those of the nose.
+STATUSTEXT, once in COMPLAIN_US for each reason. Body axes are level, and those of the heading; a yaw that is
+no number is not asked for.
 """
 
 from __future__ import annotations
@@ -10,16 +10,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from autopilot.geometry.frames import enu_from_ned
+from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
 from autopilot.services.records import Decide, Output, Peer, Say, Verdict
-from autopilot.services.requests import FollowAttitude, FollowSetpoint, FollowStick
+from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
 COMPLAIN_US = 5_000_000
-STEEPEST_DEG = 60.0  # lean of an attitude setpoint
+FASTEST_RAD_S = 10.0  # of a body rate
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS, _FORCE = 0x7, 0x38, 0x1C0, 0x200
+_NO_YAW, _NO_YAW_RATE = 0x400, 0x800
+_RATE_BITS = 0x7  # of an attitude setpoint: about forward, right, down
 _NO_ATTITUDE = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 _NO_THRUST = mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _NO_STICK = 32767  # INT16_MAX: the axis is not there
@@ -32,7 +34,7 @@ _ABOVE_HOME = (
 )
 _ABOVE_SEA = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 
-Asking = FollowSetpoint | FollowAttitude | FollowStick
+Asking = FollowSetpoint | FollowAttitude | FollowRates | FollowStick
 
 
 def _masked(values: tuple[float, float, float], mask: int, shift: int) -> Vec3:
@@ -46,9 +48,14 @@ def _asks_badly(values: tuple[float, float, float], mask: int, shift: int) -> bo
     return any(not mask >> (shift + i) & 1 and not math.isfinite(v) for i, v in enumerate(values))
 
 
-def _from_body(v: Vec3) -> Vec3:
-    """Forward, right, down of a nose that points east, as ENU."""
-    return (v[0], -v[1], -v[2])
+def _heading(m: Any) -> float:
+    """Heading that a position setpoint asks for, from east to north; NaN: none."""
+    return math.nan if m.type_mask & _NO_YAW else 0.5 * math.pi - m.yaw
+
+
+def _turning(m: Any) -> float:
+    """Rate (rad/s) at which the heading is to turn; NaN: none."""
+    return math.nan if m.type_mask & _NO_YAW_RATE else -m.yaw_rate
 
 
 def _problem(m: Any, place: tuple[float, float, float]) -> str:
@@ -57,11 +64,13 @@ def _problem(m: Any, place: tuple[float, float, float]) -> str:
     # the bit says what an acceleration that is used means; MAVProxy sets it and uses none
     if mask & _FORCE and mask & _ACCELERATION_BITS != _ACCELERATION_BITS:
         return "Setpoint refused: forces are not followed"
-    if mask & _POSITION_BITS == _POSITION_BITS and mask & _VELOCITY_BITS == _VELOCITY_BITS:
-        return "Setpoint refused: neither position nor velocity is asked for"
+    if all(mask & bits == bits for bits in (_POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS)):
+        return "Setpoint refused: neither position nor velocity nor acceleration is asked for"
     used = ((place, 0), ((m.vx, m.vy, m.vz), 3), ((m.afx, m.afy, m.afz), 6))
     if any(_asks_badly(values, mask, shift) for values, shift in used):
         return "Setpoint refused: a value that is to be used is no number"
+    if math.isinf(_heading(m)) or math.isinf(_turning(m)):
+        return "Setpoint refused: yaw is infinite"
     return ""
 
 
@@ -74,12 +83,16 @@ def read_local(m: Any) -> FollowSetpoint | Verdict:
     problem = _problem(m, place)
     if problem:
         return _refused(problem)
-    turned = _from_body if frame in _BODY_FRAMES else enu_from_ned
+    body = frame in _BODY_FRAMES
+    turned = flu_from_frd if body else enu_from_ned
     return FollowSetpoint(
         turned(_masked(place, mask, 0)),
         turned(_masked((m.vx, m.vy, m.vz), mask, 3)),
         turned(_masked((m.afx, m.afy, m.afz), mask, 6)),
         relative=frame != mavlink.MAV_FRAME_LOCAL_NED,
+        body=body,
+        heading_rad=_heading(m),
+        turning_rad_s=_turning(m),
     )
 
 
@@ -103,13 +116,27 @@ def read_global(m: Any, home: Home) -> FollowSetpoint | Verdict:
         enu_from_ned(_masked((m.vx, m.vy, m.vz), mask, 3)),
         enu_from_ned(_masked((m.afx, m.afy, m.afz), mask, 6)),
         relative=False,
+        heading_rad=_heading(m),
+        turning_rad_s=_turning(m),
     )
 
 
-def read_attitude(m: Any) -> FollowAttitude | Verdict:
-    """SET_ATTITUDE_TARGET: the thrust axis of the quaternion, and the thrust as a share."""
-    if m.type_mask & _NO_ATTITUDE:
-        return _refused("Attitude setpoint refused: body rates alone are not followed")
+def read_attitude(m: Any) -> FollowAttitude | FollowRates | Verdict:
+    """SET_ATTITUDE_TARGET: thrust axis and heading of the quaternion, or body rates without one; thrust as a
+    share."""
+    mask = m.type_mask
+    if not mask & _NO_THRUST and not 0.0 <= m.thrust <= 1.0:
+        return _refused("Attitude setpoint refused: thrust must be 0 ... 1")
+    thrust = None if mask & _NO_THRUST else m.thrust
+    asked = (m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
+    if any(not mask >> i & 1 and not abs(rate) <= FASTEST_RAD_S for i, rate in enumerate(asked)):
+        limit = f"-{FASTEST_RAD_S:g} ... {FASTEST_RAD_S:g} rad/s"
+        return _refused(f"Attitude setpoint refused: rates must be {limit}")
+    if mask & _NO_ATTITUDE:
+        if mask & _RATE_BITS == _RATE_BITS:
+            return _refused("Attitude setpoint refused: neither attitude nor body rates are asked for")
+        p, q, r = (0.0 if mask >> i & 1 else rate for i, rate in enumerate(asked))
+        return FollowRates(flu_from_frd((p, q, r)), thrust)
     w, x, y, z = m.q
     size = math.sqrt(w * w + x * x + y * y + z * z)
     if not 0.5 < size < 2.0:
@@ -118,23 +145,19 @@ def read_attitude(m: Any) -> FollowAttitude | Verdict:
     # minus the third column of the rotation: NED
     up_ned = (-2.0 * (x * z + w * y), -2.0 * (y * z - w * x), -(w * w - x * x - y * y + z * z))
     upward = enu_from_ned(up_ned)
-    if not upward[2] >= math.cos(math.radians(STEEPEST_DEG)):
-        return _refused(f"Attitude setpoint refused: leans by more than {STEEPEST_DEG:g} deg")
-    thrust: float | None = m.thrust
-    if m.type_mask & _NO_THRUST:
-        thrust = None
-    elif not 0.0 <= m.thrust <= 1.0:
-        return _refused("Attitude setpoint refused: thrust must be 0 ... 1")
-    return FollowAttitude(upward, thrust)
+    # the first column: forward, of which the level part
+    yaw = math.atan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
+    turning = math.nan if mask & mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE else -m.body_yaw_rate
+    return FollowAttitude(upward, thrust, 0.5 * math.pi - yaw, turning)
 
 
 def read_stick(m: Any) -> FollowStick | Verdict:
-    """MANUAL_CONTROL: x forward, y right, z 0 ... 1000 with 500 for neither up nor down."""
-    level = [0.0 if v == _NO_STICK else v / 1000.0 for v in (m.x, m.y)]
+    """MANUAL_CONTROL: x forward, y right, z 0 ... 1000 with 500 for neither up nor down, r clockwise."""
+    level = [0.0 if v == _NO_STICK else v / 1000.0 for v in (m.x, m.y, m.r)]
     lift = 0.0 if m.z == _NO_STICK else (m.z - 500.0) / 500.0
     if max(map(abs, (*level, lift))) > 1.0:
-        return _refused("MANUAL_CONTROL refused: x, y must be -1000 ... 1000 and z 0 ... 1000")
-    return FollowStick(_from_body((level[0], level[1], -lift)))
+        return _refused("MANUAL_CONTROL refused: x, y, r must be -1000 ... 1000 and z 0 ... 1000")
+    return FollowStick((level[0], -level[1], lift), -level[2])
 
 
 def _refused(text: str) -> Verdict:

@@ -29,8 +29,17 @@ def heartbeat_message(snapshot: Snapshot, identity: Identity) -> mavlink.MAVLink
 
 def load_heartbeat_message(snapshot: Snapshot) -> mavlink.MAVLink_heartbeat_message:
     """HEARTBEAT of the load as a system of its own: no autopilot, nothing to command."""
+    return _heartbeat_of(mavlink.MAV_TYPE_AIRSHIP, snapshot)
+
+
+def winch_heartbeat_message(snapshot: Snapshot) -> mavlink.MAVLink_heartbeat_message:
+    """HEARTBEAT of the winch as a component of the vehicle."""
+    return _heartbeat_of(mavlink.MAV_TYPE_WINCH, snapshot)
+
+
+def _heartbeat_of(kind: int, snapshot: Snapshot) -> mavlink.MAVLink_heartbeat_message:
     return mavlink.MAVLink_heartbeat_message(
-        type=mavlink.MAV_TYPE_AIRSHIP,
+        type=kind,
         autopilot=mavlink.MAV_AUTOPILOT_INVALID,
         base_mode=0,
         custom_mode=0,

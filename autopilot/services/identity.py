@@ -16,6 +16,7 @@ from autopilot.wire.parameter_table import ParameterTable
 AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 DIALECT_COMPONENT = mavlink.MAV_COMP_ID_USER1
 LOAD_COMPONENT = mavlink.MAV_COMP_ID_USER11
+WINCH_COMPONENT = mavlink.MAV_COMP_ID_WINCH
 
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _AUTO_FLAGS = (
@@ -109,6 +110,11 @@ class Flavour:
     def home_is_item(self) -> bool:
         """Item 0 of every mission is home, so that there always is one: ArduPilot's habit."""
         return self.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+
+    @property
+    def heeds_yaw(self) -> bool:
+        """The yaw of a place to go to is flown: PX4's habit."""
+        return self.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
     @property
     def modes_are_packed(self) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 from autopilot.geometry.packed import Row
 from autopilot.services.identity import AUTOPILOT_COMPONENT, DIALECT_COMPONENT
+from autopilot.services.records import Source
 from autopilot.services.stream_frames import StreamFrames
 from autopilot.services.streams import Streams
 from autopilot.wire.codec import FrameWriter, split
@@ -18,8 +19,7 @@ DATAGRAM_BYTES = 1400  # below the MTU of any common network, with headers
 
 SignerOf = Callable[[int], Sign | None]  # what signs the frames of a link, by its number
 
-# (system, component) that speaks, and what it says
-Outgoing = tuple[tuple[int, int], Any]
+Outgoing = tuple[Source, Any]  # who speaks, and what
 
 
 class LinkState:
@@ -49,18 +49,18 @@ class LinkState:
         self.signer = signer
         self.heard_us = now_us
         self.streams = Streams(defaults, now_us)
-        self.writers: dict[tuple[int, int], FrameWriter] = {}
+        self.writers: dict[Source, FrameWriter] = {}
         own, dialect = self._writer((system, AUTOPILOT_COMPONENT)), self._writer((system, DIALECT_COMPONENT))
         self._streams = StreamFrames(own, dialect, home)
-        self.queue: list[Any] = []  # answers of the autopilot
+        self.queue: list[Outgoing] = []  # answers
         # streamed messages out of turn, in their order
         self.announced: dict[int, None] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: None}
 
-    def frame(self, source: tuple[int, int], message: Any) -> bytes:
-        """The next frame of a source, (system, component), on this link."""
+    def frame(self, source: Source, message: Any) -> bytes:
+        """The next frame of a source on this link."""
         return self._writer(source).frame(message, self.signer(self.number))
 
-    def _writer(self, source: tuple[int, int]) -> FrameWriter:
+    def _writer(self, source: Source) -> FrameWriter:
         writer = self.writers.get(source)
         if writer is None:
             writer = self.writers[source] = FrameWriter(*source)

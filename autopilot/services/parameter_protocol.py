@@ -82,7 +82,7 @@ class ParameterService:
                 return [Send(peer.link, self.value_message(message.param_id))]
         elif 0 <= index < len(names):
             return [Send(peer.link, self.value_message(names[index]))]
-        return [self._error(message.param_id, index, DOES_NOT_EXIST, peer)]
+        return [no_such_parameter(message.param_id, index, peer)]
 
     def receive_set(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         """Store a value, or say why not; either way the answer is the value in force."""
@@ -91,7 +91,7 @@ class ParameterService:
             self._lists.pop(peer.link, None)
             return []
         if name not in self.table:
-            return [self._error(name, _BY_NAME, DOES_NOT_EXIST, peer)]
+            return [no_such_parameter(name, _BY_NAME, peer)]
         kind = self._carried(name)[1]
         if message.param_type not in (kind, mavlink.MAV_PARAM_TYPE_REAL32):
             why = f"{name}: type {message.param_type} was sent; it is {_TYPE_NAMES[kind]} ({kind})"
@@ -208,15 +208,21 @@ class ParameterService:
         """The link is gone: no list for it."""
         self._lists.pop(link, None)
 
-    def _error(self, name: str, index: int, error: int, peer: Peer) -> Output:
-        message = mavlink.MAVLink_param_error_message(
-            peer.system, peer.component, name.encode("ascii", errors="replace"), index, error
-        )
-        return Send(peer.link, message)
-
     def _refused(self, name: str, error: int, why: str, peer: Peer) -> list[Output]:
         return [
             Say(mavlink.MAV_SEVERITY_WARNING, why),
-            self._error(name, self.table.index(name), error, peer),
+            _error(name, self.table.index(name), error, peer),
             Send(peer.link, self.value_message(name)),
         ]
+
+
+def no_such_parameter(name: str, index: int, peer: Peer) -> Output:
+    """PARAM_ERROR for a parameter that whoever was addressed does not have."""
+    return _error(name, index, DOES_NOT_EXIST, peer)
+
+
+def _error(name: str, index: int, error: int, peer: Peer) -> Output:
+    message = mavlink.MAVLink_param_error_message(
+        peer.system, peer.component, name.encode("ascii", errors="replace"), index, error
+    )
+    return Send(peer.link, message, peer.addressed)

@@ -17,20 +17,26 @@ from autopilot.wire.items import WireItem
 Link = Hashable  # opaque name of a way to a client, chosen by the shell
 
 
+Source = tuple[int, int]  # system and component that speak
+
+
 class Peer(NamedTuple):
-    """Who sent a message, and over which link."""
+    """Who sent a message, over which link, and to which part of the vehicle (None: the autopilot), which is
+    the one to answer."""
 
     link: Link
     system: int
     component: int
+    addressed: Source | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """A message for one link, or for all of them (None)."""
+    """A message for one link, or for all of them (None), by a part of the vehicle (None: the autopilot)."""
 
     link: Link | None
     message: Any
+    source: Source | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ The first group is decided by the supervisor, the second is answered by the endp
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import nan
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.items import LocatedStep
@@ -103,17 +104,40 @@ class Reposition:
     altitude_m: float | None
     change_mode: bool
     speed_m_s: float | None = None
+    heading_rad: float | None = None  # from east to north
+
+
+@dataclass(frozen=True, slots=True)
+class TurnNose:
+    """Turn to a heading, from east to north, or by an angle (`relative`). `sense`: 1 counter-clockwise seen
+    from above, -1 clockwise, 0 whichever is shorter; `rate_rad_s` None: as fast as MPC_YAWRAUTO_MAX."""
+
+    angle_rad: float
+    relative: bool = False
+    sense: int = 0
+    rate_rad_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LookAt:
+    """Keep the nose turned to a place, ENU from home; None: no more."""
+
+    east_m: float | None
+    north_m: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class FollowSetpoint:
     """One setpoint of a stream, ENU from home; NaN: not asked for. `relative`: the position is one from
-    where the load is asked to be now."""
+    where the load is asked to be now. `body`: the axes are those of the nose, forward, left and up."""
 
     position: Vec3
     velocity: Vec3
     accel: Vec3
     relative: bool
+    body: bool = False
+    heading_rad: float = nan  # from east to north; of a `body` setpoint from the present heading on
+    turning_rad_s: float = nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,13 +146,25 @@ class FollowAttitude:
 
     upward: Vec3
     thrust: float | None
+    heading_rad: float = nan  # from east to north
+    turning_rad_s: float = nan
+
+
+@dataclass(frozen=True, slots=True)
+class FollowRates:
+    """One set of body rates of a stream, rad/s about the axes forward, left and up; thrust as above."""
+
+    rates: Vec3
+    thrust: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class FollowStick:
-    """One position of the stick: each component of the velocity, ENU, as a share of its greatest."""
+    """One position of the stick: each component of the velocity, forward, left and up, and the yaw rate,
+    counter-clockwise, as a share of its greatest."""
 
     share: Vec3
+    turning: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,7 +297,10 @@ Decided = (
     | Reposition
     | FollowSetpoint
     | FollowAttitude
+    | FollowRates
     | FollowStick
+    | TurnNose
+    | LookAt
     | Orbit
     | ChangeAltitude
     | ChangeSpeed

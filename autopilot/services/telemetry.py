@@ -12,13 +12,19 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import cross, dot
-from autopilot.services.heartbeat import HEARTBEAT_US, heartbeat_message, load_heartbeat_message
+from autopilot.services.heartbeat import (
+    HEARTBEAT_US,
+    heartbeat_message,
+    load_heartbeat_message,
+    winch_heartbeat_message,
+)
 from autopilot.services.identity import (
     AUTO,
     AUTO_MISSION,
     AUTOPILOT_COMPONENT,
     DIALECT_COMPONENT,
     LOAD_COMPONENT,
+    WINCH_COMPONENT,
     Identity,
     autopilot_version_message,
     protocol_version_message,
@@ -329,6 +335,10 @@ def _load_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     return (load_heartbeat_message(s),)
 
 
+def _winch_heartbeat(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return (winch_heartbeat_message(s),)
+
+
 def _load_global_position_int(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     return (global_position_int_message(s.now_us, s.x_load, s.v_load, None, s.home),)
 
@@ -392,7 +402,7 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: Stream(_AUTOPILOT, _rate(5), _servo_output_raw),
     mavlink.MAVLINK_MSG_ID_DEBUG_VECT: Stream(_AUTOPILOT, _rate(10), _debug_vect),
     mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Stream(_AUTOPILOT, _rate(10), _named_value_float),
-    mavlink.MAVLINK_MSG_ID_WINCH_STATUS: Stream(_AUTOPILOT, _rate(2), _winch_status),
+    mavlink.MAVLINK_MSG_ID_WINCH_STATUS: Stream(WINCH_COMPONENT, _rate(2), _winch_status),
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: Stream(_AUTOPILOT, OFF, _autopilot_version),
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(_AUTOPILOT, OFF, _gps_global_origin),
     mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION: Stream(_AUTOPILOT, OFF, _protocol_version),
@@ -447,7 +457,16 @@ _GROUPED: dict[int, tuple[int, ...]] = {
 # What REQUEST_DATA_STREAM means by its groups
 GROUPS = _GROUPED | {mavlink.MAV_DATA_STREAM_ALL: tuple(sum(_GROUPED.values(), ()))}
 
-# The load as a MAVLink system of its own. The keys stand beside those above: a message id has 24 bits.
+# What other parts of the vehicle send under an id that the autopilot uses as well: the keys stand
+# beside those above, since a message id has 24 bits
+MESSAGE_ID = (1 << 24) - 1
+# The winch's HEARTBEAT is sent on a link from the first message on that is addressed to it there: DroneKit
+# and `set_mode` of pymavlink take the last HEARTBEAT for that of the vehicle
+WINCH_HEARTBEAT = 1 << 25 | mavlink.MAVLINK_MSG_ID_HEARTBEAT
+COMPONENT_STREAMS: dict[int, Stream] = {
+    WINCH_HEARTBEAT: Stream(WINCH_COMPONENT, HEARTBEAT_US, _winch_heartbeat)
+}
+# The load as a MAVLink system of its own
 LOAD_SYSTEM = 1 << 24
 LOAD_STREAMS: dict[int, Stream] = {
     LOAD_SYSTEM | mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(LOAD_COMPONENT, HEARTBEAT_US, _load_heartbeat),

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.guidance.legs import top_of
+from autopilot.supervisor.heading import heading_onward
 from autopilot.supervisor.machine import must_happen
 from autopilot.supervisor.mission import RELEASED_TEXT, legs_done
 from autopilot.supervisor.settings import Settings
@@ -35,6 +36,7 @@ WATCHES: tuple[Watch, ...] = (
 
 def advance(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:
     """The flight at `view.now_us`: the first watch that finds something decides, else the legs go on."""
+    flight = heading_onward(flight, view, settings)
     for watch in WATCHES:
         watched = watch(flight, view, settings)
         flight = watched.flight

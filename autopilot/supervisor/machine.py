@@ -62,6 +62,7 @@ def _rewound(flight: Flight) -> Flight:
     return replace(
         flight,
         selected=Selected.NOTHING,
+        heading=flight.heading.at_rest(),
         mission=replace(flight.mission, active=False, waiting=False, step=0, step_anchor=None),
         cable=replace(flight.cable, reel_to_m=None),
     )

@@ -78,7 +78,8 @@ def _return(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
 def _guided(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
     asked = asked_of(flight)
     if isinstance(asked, AttitudeSetpoint):
-        return (Posture(asked, asked_motion(flight, view, settings)[0]),)
+        begun = Posture(asked, asked_motion(flight, view, settings)[0])
+        return (begun.onward(asked, view.attitude, view.now_us),)
     jet, rate = setpoint(flight, view.now_us), pace_of(flight, settings).rate
     if jet is None or flight.legs[0].control_mode != position_mode(flight):
         x, v, a = asked_motion(flight, view, settings)

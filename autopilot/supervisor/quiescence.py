@@ -12,10 +12,11 @@ from __future__ import annotations
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
-from autopilot.control.records import State
+from autopilot.control.records import Nose, State
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, norm, sub
+from autopilot.geometry.linear import ZERO, Vec3, column, norm, sub
 from autopilot.geometry.packed import Each
+from autopilot.guidance.heading import EAST_NOSE
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Calm, Catch, Creep, Leg, Swing, top_of
 from autopilot.guidance.setpoint_follower import Posture
 from autopilot.supervisor.motion import position_mode
@@ -62,6 +63,7 @@ class Stretch(NamedTuple):
     anchor_height: float  # m, that is held while an attitude is tracked
     upward: Vec3  # attitude modes: where the thrust, or the cable seen from the load, is to point
     thrust: float  # N, asked for with an attitude; NaN: what holds the height
+    nose: Nose  # where the nose is to point
 
 
 def at_rest(until_us: int, now_us: int, idle: bool) -> Stretch:
@@ -85,6 +87,7 @@ def at_rest(until_us: int, now_us: int, idle: bool) -> Stretch:
         anchor_height=0.0,
         upward=ZERO,
         thrust=nan,
+        nose=EAST_NOSE,
     )
 
 
@@ -129,6 +132,7 @@ def next_stretch(
         anchor_height=anchor_height,
         upward=upward,
         thrust=thrust,
+        nose=_nose(flight, leg, preview_s),
     )
 
 
@@ -150,6 +154,7 @@ def _is_decided_at_every_tick(flight: Flight, leg: Leg, settings: Settings) -> b
         or flight.cable.slack_since_us >= 0
         or flight.phase == Phase.GUIDED
         or top_of(leg) is not None
+        or not flight.heading.rests
         or (fenced and settings.fence.action != NO_ACTION and flight.phase in CARRYING)
     )
 
@@ -184,6 +189,13 @@ def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:
         return 0.0, ZERO, nan
     asked = leg.lean.thrust_n if isinstance(leg, Posture) else None
     return leg.anchor[2], leg.upward(t), nan if asked is None else asked
+
+
+def _nose(flight: Flight, leg: Leg, ahead_s: float) -> Nose:
+    """Where the nose is to point `ahead_s` seconds from now; of an attitude that is led by body rates, b1."""
+    if isinstance(leg, Posture) and leg.attitude is not None:
+        return Nose(column(leg.attitude, 0), ZERO, ZERO)
+    return flight.heading.nose(ahead_s)
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, inf, radians
 
+from autopilot.guidance.heading import HeadingLimits
 from autopilot.guidance.legs import least_move_s
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import Limits
@@ -83,6 +84,7 @@ class Settings:
     ramp_lag_s: float  # by which a sinking load keeps behind its setpoint, by the law
     limits: Limits  # of the paths of missions
     motion: MotionSettings
+    heading: HeadingLimits
     failsafe: FailsafeSettings
     setpoints: SetpointSettings
     fence: FenceSettings
@@ -112,6 +114,11 @@ def settings_from(table: ParameterTable, ramp_lag_s: float, reels: bool, follows
             taut_speed_m_s=min(table["MIS_TAUT_SPEED"], table["MIS_SNAP_SPEED"]),
             snap_speed_m_s=table["MIS_SNAP_SPEED"],
             return_altitude_m=table["RTL_RETURN_ALT"],
+        ),
+        heading=HeadingLimits(
+            rate=radians(table["MPC_YAWRAUTO_MAX"]),
+            fastest=radians(table["MPC_MAN_Y_MAX"]),
+            accel=radians(table["MPC_YAWRAUTO_ACC"]),
         ),
         failsafe=FailsafeSettings(
             load_error_limit_m=table["FS_LOAD_ERR"],

@@ -8,7 +8,8 @@ from math import hypot, nan, sqrt
 from typing import NamedTuple
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3
+from autopilot.guidance.heading import EASTWARD, Heading
 from autopilot.guidance.legs import Leg
 from autopilot.guidance.setpoint_follower import SILENT, SMOOTH_SHARE, Circle, FollowLimits, Stream
 from autopilot.supervisor.settings import Settings
@@ -137,6 +138,7 @@ class Setpoints:
     offboard: Stream = SILENT
     manual: Stream = SILENT
     circle: Circle | None = None
+    heeded_us: int = -1  # when the setpoint was heard whose heading is flown to
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +170,7 @@ class Flight:
     cable: CableState = CableState()
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
+    heading: Heading = EASTWARD
     returning: bool = False  # home, or landing there
     hindrances: tuple[str, ...] = ()  # reasons not to arm that lie beside the flight: the storage, the clock
 
@@ -185,6 +188,7 @@ class View(NamedTuple):
     complaints: tuple[str, ...]
     pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
     height_std: float = 0.0  # m, of heights over home, where a receiver tells them
+    attitude: Mat3 = IDENTITY
 
 
 class Report(NamedTuple):

@@ -1,7 +1,6 @@
 """Telemetry logs: records of 8 bytes (big-endian microseconds since 1970) and one raw frame.
 
 The format of MAVProxy, Mission Planner and QGroundControl; `pymavlink.mavutil.mavlink_connection` reads it.
-Some tools end at a message that they do not know, so those of the private dialect have a log of their own.
 """
 
 from __future__ import annotations
@@ -16,18 +15,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 _STAMP = struct.Struct(">Q")
 _CHUNK = 1 << 16
-_MAGIC_V2 = MAGICS[1]
-_DIALECT_ID = mavlink.MAVLINK_MSG_ID_LOAD_STATE >> 8  # the middle byte of every id of the dialect, 60100 ...
-
-
-def dialect_log(tlog: Path) -> Path:
-    """The log beside `tlog` that has the messages of the private dialect."""
-    return tlog.with_name(f"{tlog.stem}.plumbline.tlog")
-
-
-def is_of_dialect(frame: bytes) -> bool:
-    """Whether a whole frame holds a message of the private dialect."""
-    return frame[8] == _DIALECT_ID and frame[0] == _MAGIC_V2
+_DIALECT_ID = mavlink.MAVLINK_MSG_ID_LOAD_STATE >> 8  # of every message of the dialect, 60100 ...
 
 
 class TlogWriter:
@@ -42,27 +30,13 @@ class TlogWriter:
         self._file.write(b"".join([stamp + frame for frame in frames]))
 
 
-class TlogPair:
-    """Appends records to two such files: messages that every tool knows, and those of the private dialect."""
-
-    def __init__(self, standard: BinaryIO, dialect: BinaryIO) -> None:
-        self._standard = TlogWriter(standard)
-        self._dialect = TlogWriter(dialect)
-
-    def write(self, unix_us: int, *frames: bytes) -> None:
-        """A record for each frame, all of the same time."""
-        known = [frame for frame in frames if not is_of_dialect(frame)]
-        self._standard.write(unix_us, *known)
-        if len(known) < len(frames):
-            self._dialect.write(unix_us, *filter(is_of_dialect, frames))
-
-
-def read_both(tlog: Path) -> Iterator[tuple[int, Received]]:
-    """`read_tlog` of a log and then, if there is one, of that of the private dialect beside it."""
-    beside = dialect_log(tlog)
-    yield from read_tlog(tlog)
-    if beside.is_file():
-        yield from read_tlog(beside)
+def write_common(source: Path, target: Path) -> None:
+    """Copy a log without the messages of the private dialect, at which some tools end."""
+    with target.open("wb") as file:
+        writer = TlogWriter(file)
+        for unix_us, received in read_tlog(source):
+            if received.id >> 8 != _DIALECT_ID:
+                writer.write(unix_us, received.frame)
 
 
 def read_tlog(source: Path | str | BinaryIO) -> Iterator[tuple[int, Received]]:

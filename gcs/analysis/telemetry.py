@@ -37,10 +37,10 @@ _MICRO = 1e-6
 
 
 def load_telemetry(tlog: Path) -> Telemetry:
-    """The flight in a .tlog file and in that of the dialect beside it; a torn tail is left out."""
-    from autopilot.wire.tlog import read_both
+    """The flight in a .tlog file; a torn tail is left out."""
+    from autopilot.wire.tlog import read_tlog
 
-    return telemetry_of(read_both(tlog))
+    return telemetry_of(read_tlog(tlog))
 
 
 _READ = (

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from autopilot.wire.tlog import dialect_log
 from gcs.batch.reuse import Origin, origin_of
 from gcs.experiments.plan import SEED, SENSORS, Experiment
 from gcs.report.build import META_FILE, ReportError, load_meta
@@ -35,12 +34,7 @@ def is_flown(directory: Path, origin: Origin) -> bool:
     settings = _settings(meta.mission, meta.law, meta.vehicle, meta.sensors, meta.seed, meta.settings)
     code = mark.get("code") if isinstance(mark, dict) else None
     stored = {"settings": settings, "version": meta.version, "code": code}
-    return not origin.differences(stored) and meta.outcome in _WHOLE and _has_logs(directory)
-
-
-def _has_logs(directory: Path) -> bool:
-    tlog = directory / TLOG_FILE
-    return tlog.is_file() and dialect_log(tlog).is_file()
+    return not origin.differences(stored) and meta.outcome in _WHOLE and (directory / TLOG_FILE).is_file()
 
 
 def begin(directory: Path) -> None:

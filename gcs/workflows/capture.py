@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from autopilot.wire.tlog import TlogPair, dialect_log
+from autopilot.wire.tlog import TlogWriter
 from gcs.clients import command
 from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
@@ -30,11 +30,11 @@ def capture_to(out: Path | None, address: Address, duration_s: float | None) -> 
         target = session.find()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            files = path.open("wb"), dialect_log(path).open("wb")
+            file = path.open("wb")
         except OSError as error:
             raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
-        with files[0], files[1]:
-            capture = Capture(TlogPair(*files), unix_us() - monotonic_us())
+        with file:
+            capture = Capture(TlogWriter(file), unix_us() - monotonic_us())
 
             def received(datagram: bytes, now_us: int) -> None:
                 capture.on_vehicle(datagram)

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.wire.tlog import TlogPair, dialect_log, read_both
+from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import (
     EXIT_DONE,
     EXIT_ERROR,
@@ -81,8 +81,8 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
         ):
             watch = Stopwatch()
             tlog = out / TLOG_FILE
-            with tlog.open("wb") as file, dialect_log(tlog).open("wb") as beside:
-                log = TlogPair(file, beside)
+            with tlog.open("wb") as file:
+                log = TlogWriter(file)
                 if options.connect is None:
                     client = _fly_own(mission, options, log, out, stop, watch, page)
                 else:
@@ -118,7 +118,7 @@ def _page(
 def _fly_own(
     mission: Mission,
     options: FlightOptions,
-    log: TlogPair,
+    log: TlogWriter,
     out: Path,
     stop: StopRequest,
     watch: Stopwatch,
@@ -139,7 +139,7 @@ def _fly_running(
     mission: Mission,
     options: FlightOptions,
     address: Address,
-    log: TlogPair,
+    log: TlogWriter,
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None,
@@ -185,7 +185,7 @@ def _too_slow(tlog: Path) -> str:
     from autopilot.wire.dialect import plumbline as mavlink
 
     sent = missed = 0
-    for _, received in read_both(tlog):
+    for _, received in read_tlog(tlog):
         if received.id == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
             status = received.message
             sent, missed = round(status.time_usec * 1e-6 * status.rate_hz), status.missed
@@ -199,7 +199,7 @@ def _too_slow(tlog: Path) -> str:
 class _Folder:
     """The output directory; if the flight came to nothing, what we put there is taken away again."""
 
-    _OURS = (TLOG_FILE, dialect_log(Path(TLOG_FILE)).name, ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG)
+    _OURS = (TLOG_FILE, ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG)
 
     def __init__(self, path: Path, overwrite: bool) -> None:
         self._path = path
@@ -223,9 +223,9 @@ class _Folder:
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:
         trouble, tlog = disk_trouble(error), self._path / TLOG_FILE
         if trouble:
-            size = sum(log.stat().st_size for log in (tlog, dialect_log(tlog)) if log.exists())
+            size = tlog.stat().st_size if tlog.exists() else 0
             raise GcsError(
-                f"--out {self._path}: {trouble}; {size} bytes of telemetry are kept there"
+                f"--out {self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}"
             ) from None
         if self._kept:
             return

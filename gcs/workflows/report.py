@@ -6,13 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.wire.tlog import dialect_log, is_of_dialect, read_tlog
+from autopilot.wire.tlog import read_tlog, write_common
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
 
+COMMON_FILE = "flight.common.tlog"
 TLOG_FILE = "flight.tlog"  # in a directory of gcs fly or gcs capture
 
 
@@ -43,9 +44,6 @@ def find_log(source: Path) -> Path:
         raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
     if next(read_tlog(tlog), None) is None:
         raise GcsError(f"{tlog}: holds no telemetry; must be a .tlog, or a directory that holds {TLOG_FILE}")
-    beside = dialect_log(tlog)
-    if not beside.is_file() and not any(is_of_dialect(received.frame) for _, received in read_tlog(tlog)):
-        raise GcsError(f"{tlog}: says nothing of the load; {beside.name}, which does, must be beside it")
     return tlog
 
 
@@ -66,6 +64,16 @@ def make_mcap(source: Path, folder: Path) -> Path:
         raise GcsError(str(error)) from None
     except OSError as error:
         raise GcsError(f"{error.filename or folder}: {error.strerror}") from None
+
+
+def make_common(source: Path, folder: Path) -> Path:
+    """flight.common.tlog of a log: without the private dialect."""
+    path = folder / COMMON_FILE
+    try:
+        write_common(find_log(source), path)
+    except OSError as error:
+        raise GcsError(f"{error.filename or path}: {error.strerror}") from None
+    return path
 
 
 def print_record(record: Record) -> None:

@@ -63,6 +63,7 @@ class Witness:
     asked: list[tuple[float, Place]] = field(default_factory=list)  # where the carried load shall be
     phases: list[int] = field(default_factory=list)
     tilt: float = 0.0  # greatest of all, rad
+    yaw: float = 0.0  # the last one, rad from north
     texts: list[str] = field(default_factory=list)
     attitudes: list[float] = field(default_factory=list)  # wall clock at which ATTITUDE came, s
     _over: threading.Event = field(default_factory=threading.Event)
@@ -86,6 +87,7 @@ class Witness:
             case mavlink.MAVLINK_MSG_ID_ATTITUDE:
                 self.attitudes.append(time.monotonic())
                 self.tilt = max(self.tilt, abs(message.roll), abs(message.pitch))
+                self.yaw = message.yaw
             case mavlink.MAVLINK_MSG_ID_STATUSTEXT:
                 self.texts.append(message.text)
 

@@ -144,6 +144,25 @@ def test_a_ground_station_that_vanishes_disturbs_nobody(
 
 
 @staged
+def mavsdk_turns_and_winches(stage: Stage) -> tuple[Told, Witness]:
+    stage.begin(speed=SPEED)
+    steps = ("ready", "take_off", "winch", "yaw", "accelerate", "body_rates", "come_back")
+    finished = stage.program("mavsdk_flight.py", f"udpin://{LOOPBACK}:{stage.api}", *steps)
+    return finished(), stage.witness
+
+
+def test_mavsdk_turns_the_nose_and_works_the_winch(
+    mavsdk_turns_and_winches: Callable[[], tuple[Told, Witness]],
+) -> None:
+    told, witness = mavsdk_turns_and_winches()
+    # the last word of the plug-in is about what no winch here does
+    assert [line for line in complaints(told.output) if "action 4 is not offered" not in line] == []
+    assert "UNSUPPORTED" in told.value["deliver"]
+    assert {1, m.MAV_COMP_ID_WINCH} <= set(told.value["components"])
+    assert FAILSAFE not in witness.phases
+
+
+@staged
 def mavsdk_over_a_bad_link(stage: Stage) -> tuple[Told, Witness]:
     stage.begin("--set", "SIM_LOSS_PCT=30")
     steps = ("ready", "upload", "arm", "fly_mission", "land")
@@ -205,6 +224,8 @@ def mavproxy_and_a_survey(stage: Stage) -> Surveyed:
     program.type("arm throttle")
     program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
     program.expect("Cable taut, lifting the load")
+    program.type("setyaw 0 30 0")
+    program.expect("Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
     program.expect("Landed, disarmed", LONG_S)
     program.type("ftp list /fs/microsd/log")
     program.expect(".ulg")
@@ -389,6 +410,9 @@ def clients_of_ardupilot(stage: Stage) -> Ardupilot:
     program.expect("Got COMMAND_ACK: NAV_TAKEOFF: ACCEPTED")
     program.expect("Cable taut, lifting the load")
     stage.wait_until(lambda: stage.witness.phases[-1] == m.PLUMBLINE_PHASE_HOLD)
+    program.type("setyaw 0 30 0")
+    program.expect("Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
+    stage.wait_until(lambda: abs(stage.witness.yaw) < 0.05)
     program.type("mode AUTO")
     program.expect("AUTO>")
     for item in (3, 1, 2):

@@ -22,6 +22,7 @@ MOST_LOST_PERCENT = 0.5
 COUNTED_M_S = 3.0  # mavflighttime's own threshold
 FLOAT32_REL = 1e-6
 SHOWN = 5e-7  # six decimals
+OURS = {kind.msgname for number, kind in m.mavlink_map.items() if 60100 <= number < 60200}
 
 
 @pytest.fixture(scope="module")
@@ -75,14 +76,16 @@ def test_mavflighttime_counts_the_fast_part_of_the_flight(flight: Path) -> None:
     assert float(metres) == pytest.approx(80.0, abs=2.0)
 
 
-def test_mavtomfile_writes_all_of_it(flight: Path, tmp_path: Path) -> None:
-    shutil.copy(flight / "flight.tlog", tmp_path)  # it writes beside the log
-    tool("mavtomfile", "flight.tlog", cwd=tmp_path)
-    written = (tmp_path / "flight.m").read_text()
+def test_mavtomfile_writes_all_of_the_log_for_common_tools(flight: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "gcs", "report", str(flight), "--out", str(tmp_path), "--common-tlog"]
+    subprocess.run(command, capture_output=True, timeout=120.0, check=True)
+    tool("mavtomfile", "flight.common.tlog", cwd=tmp_path)
+    written = (tmp_path / "flight_common.m").read_text()
     counts: dict[str, int] = {}
-    for _, one in read_tlog(tmp_path / "flight.tlog"):
+    for _, one in read_tlog(tmp_path / "flight.common.tlog"):
         name = one.message.get_type()
         counts[name] = counts.get(name, 0) + 1
+    assert counts.keys() == {one.message.get_type() for _, one in read_tlog(flight / "flight.tlog")} - OURS
     for name, count in counts.items():
         assert f"{name}.columns = {{'timestamp'" in written
         assert f"\n{name}.data({count},:) = [" in written
@@ -116,6 +119,6 @@ def test_the_others_say_what_they_say_of_other_logs(
     assert says in tool(name, *arguments, "flight.tlog", cwd=tmp_path)
 
 
-def test_the_log_of_the_dialect_is_read_as_one_of_unknown_messages(flight: Path) -> None:
-    said = tool("mavlogdump", "--types", "UNKNOWN_60101", "flight.plumbline.tlog", cwd=flight)
+def test_messages_of_the_dialect_are_read_as_unknown_ones(flight: Path) -> None:
+    said = tool("mavlogdump", "--types", "UNKNOWN_60101", "flight.tlog", cwd=flight)
     assert set(re.findall(r"UNKNOWN_\d+", said)) == {"UNKNOWN_60101"}

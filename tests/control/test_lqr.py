@@ -109,7 +109,7 @@ def sensed(state: PlantState) -> State:
 
 
 def coordinates(state: State) -> Array:
-    return np.array(lqr.state_error(state, CALM, EAST))
+    return np.array(lqr.state_error(state, CALM, EAST, 0.0))
 
 
 def still(x_d: tuple[float, float, float], heading: tuple[float, float, float] = EAST) -> Reference:

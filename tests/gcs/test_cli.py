@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
-from autopilot.wire.tlog import dialect_log, read_both, read_tlog
+from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
@@ -467,12 +467,11 @@ def test_capture(live, tmp_path):
     path = tmp_path / "new" / "flight.tlog"
     result = run("capture", "--duration", "0.3", "--out", str(path), "--connect", port)
     assert result.exit_code == EXIT_DONE, result.output
-    records = list(read_both(path))
+    records = list(read_tlog(path))
     assert f"{len(records)} messages" in result.stdout
     assert {one.system for _, one in records} == {1, 2, 255}
-    for log in (path, dialect_log(path)):
-        stamps = [stamp for stamp, _ in read_tlog(log)]
-        assert stamps == sorted(stamps)
+    stamps = [stamp for stamp, _ in records]
+    assert stamps == sorted(stamps)
     told = {one.message.param_id for _, one in records if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE}
     assert told == set(vehicle.parameters)
 

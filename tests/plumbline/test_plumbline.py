@@ -32,7 +32,7 @@ def test_a_mission_made_in_python_is_flown(flight: plumbline.Flight) -> None:
 
 def test_the_same_seed_is_the_same_flight(flight: plumbline.Flight) -> None:
     again = plumbline.fly(SHORT, sensors="ideal", seed=2, settings={"SIM_ACT_DELAY_MS": 4}, quiet=True)
-    assert (again.tlog, again.dialect_tlog) == (flight.tlog, flight.dialect_tlog)
+    assert again.tlog == flight.tlog
     assert plumbline.fly(SHORT, sensors="ideal", seed=2, quiet=True).tlog != flight.tlog
 
 
@@ -49,7 +49,6 @@ def test_pictures_and_report(flight: plumbline.Flight, tmp_path: Path) -> None:
     page = flight.report(tmp_path / "out")
     assert page == tmp_path / "out" / "report.html" and "short" in page.read_text(encoding="utf-8")
     assert (tmp_path / "out" / "flight.tlog").read_bytes() == flight.tlog
-    assert (tmp_path / "out" / "flight.plumbline.tlog").read_bytes() == flight.dialect_tlog
 
 
 def test_progress_is_told_unless_it_is_not_wanted(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
-from autopilot.services.identity import AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
+from autopilot.services.identity import ARDUPILOT, AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
 from autopilot.services.records import ParameterChanged, ParametersSaved, Verdict, WorldSaved
 from autopilot.services.requests import (
     Arm,
@@ -18,6 +18,7 @@ from autopilot.services.requests import (
     EnableFence,
     Grab,
     Land,
+    LookAt,
     Orbit,
     Pause,
     Reboot,
@@ -32,6 +33,7 @@ from autopilot.services.requests import (
     StartMission,
     Takeoff,
     Terminate,
+    TurnNose,
     Winch,
 )
 from autopilot.wire.convert import geodetic_from_enu
@@ -80,6 +82,7 @@ LONG = [
     (224, (7,), SetCurrent(7), OK),
     (224, (NAN,), None, DENIED),
     (192, (-1, 1, 0, NAN, NAN, NAN, NAN), Pause(), OK),  # QGroundControl's pause
+    (192, (-1, 1, 0, 0, NAN, NAN, NAN), Reposition(None, None, None, True, heading_rad=0.5 * math.pi), OK),
     (192, (-1, 1, 0, NAN, 200, 0, 5), None, DENIED),
     (192, (-1, 1, 0, NAN, NAN, NAN, 5), Reposition(None, None, 5.0, True), OK),
     (192, (-1, 0, 0, NAN, NAN, NAN, math.inf), None, DENIED),
@@ -113,11 +116,32 @@ LONG = [
     (420, (101, 1, 1), None, DENIED),  # of a simulator that has told of no parameters
     (420, (101, 5, 1), None, UNSUPPORTED),
     (420, (0, 1, 0), None, UNSUPPORTED),
-    (115, (90,), None, UNSUPPORTED),
-    (201, (), None, UNSUPPORTED),
-    (195, (), None, UNSUPPORTED),
+    (115, (90,), TurnNose(0.0), OK),  # east
+    (115, (90, NAN), TurnNose(0.0), OK),
+    (115, (90, 180, -1), TurnNose(0.0, sense=1, rate_rad_s=math.pi), OK),
+    (115, (180, 0, 1), TurnNose(-0.5 * math.pi, sense=-1), OK),
+    (115, (180, 0, 0, 1), TurnNose(-math.pi, relative=True), OK),
+    (115, (180, 0, -1, 1), TurnNose(math.pi, relative=True), OK),
+    (115, (-180, 0, 0, 1), TurnNose(math.pi, relative=True), OK),
+    (115, (NAN,), None, DENIED),
+    (115, (361,), None, DENIED),
+    (115, (90, 0, 2), None, DENIED),
+    (115, (90, 0, 0, NAN), None, DENIED),
+    (195, (0, 0, 0, 0, NAN, 0, 0), None, DENIED),
+    (195, (0, 0, 0, 0, 91, 0, 0), None, DENIED),
+    (197, (), LookAt(None, None), OK),
+    *[
+        (command, params, *answer)
+        for command in (80, 201)
+        for params, *answer in [
+            ((), LookAt(None, None), OK),
+            ((0, 0, 0, 0, NAN, NAN, NAN), LookAt(None, None), OK),
+            ((3, 0, 0, 0, 91, 0, 0), None, DENIED),
+            ((1,), None, UNSUPPORTED),
+            ((NAN,), None, UNSUPPORTED),
+        ]
+    ],
     (196, (), None, UNSUPPORTED),
-    (197, (), None, UNSUPPORTED),
     (187, (), None, UNSUPPORTED),
     (183, (), None, UNSUPPORTED),
     (181, (), None, UNSUPPORTED),
@@ -228,7 +252,7 @@ def test_broadcast_and_own_address_execute(rig, system, component):
     assert acks(rig.replies(long(20, system=system, component=component))) == [(20, OK)]
 
 
-@pytest.mark.parametrize(("system", "component"), [(2, 1), (2, 0), (1, 169), (1, 25), (255, 190)])
+@pytest.mark.parametrize(("system", "component"), [(2, 1), (2, 0), (1, 99), (255, 190)])
 def test_for_somebody_else_there_is_silence(rig, system, component):
     assert rig.replies(long(400, (1,), system=system, component=component)) == []
     assert rig.replies(as_int(400, 0, (1, 0, 0, 0), system=system, component=component)) == []
@@ -268,6 +292,25 @@ def test_reposition_by_int_is_metres_from_home(rig, snap, frame, up):
     (request,) = rig.asked
     assert (request.east_m, request.north_m) == pytest.approx((30.0, -20.0), abs=0.01)  # 1e-7 degrees
     assert (request.altitude_m, request.change_mode) == (up, True)
+
+
+@pytest.mark.parametrize(
+    ("command", "first"), [(195, 0.0), (201, 3.0), (201, 0.0), (80, 3.0)], ids=lambda value: f"{value:g}"
+)
+def test_a_place_to_look_at_is_metres_from_home(rig, snap, command, first):
+    latitude, longitude, _ = geodetic_from_enu((30.0, -20.0, 0.0), snap().home)
+    rig.replies(as_int(command, 6, (first, 0, 0, 0), latitude, longitude, NAN))
+    (request,) = rig.asked
+    assert (request.east_m, request.north_m) == pytest.approx((30.0, -20.0), abs=0.01)  # 1e-7 degrees
+
+
+def test_the_yaw_of_a_place_is_heeded_as_the_identity_does(rig_with):
+    """PX4 turns to it; ArduPilot does not, and its clients leave it 0."""
+    for identity, heading in ((Identity(), 0.0), (Identity(flavour=ARDUPILOT), None)):
+        rig = rig_with(identity=identity)
+        rig.replies(as_int(192, 6, (-1, 1, 0, 0.5 * math.pi), 2**31 - 1, 2**31 - 1, 5.0))
+        (request,) = rig.asked
+        assert request.heading_rad == (heading if heading is None else pytest.approx(heading, abs=1e-6))
 
 
 def test_set_mode_message_is_acknowledged_as_the_command(rig):

@@ -7,7 +7,14 @@ import math
 import pytest
 
 from autopilot.services.endpoint import LINK_SILENCE_US, MAX_LINKS, VehicleEndpoint
-from autopilot.services.identity import AUTO, AUTO_MISSION, DIALECT_COMPONENT, LOAD_COMPONENT, Identity
+from autopilot.services.identity import (
+    AUTO,
+    AUTO_MISSION,
+    DIALECT_COMPONENT,
+    LOAD_COMPONENT,
+    WINCH_COMPONENT,
+    Identity,
+)
 from autopilot.services.links import DATAGRAM_BYTES
 from autopilot.services.records import TimesyncAnswered, Verdict
 from autopilot.services.snapshot import Sensed, Snapshot
@@ -88,7 +95,7 @@ def test_every_stream_comes_when_it_is_asked_for(rig):
 def test_messages_of_the_dialect_come_from_their_own_component(rig):
     components = {r.message.get_msgId(): r.component for r in rig.run(1_000_000)}
     assert {c for i, c in components.items() if i >= 60000} == {DIALECT_COMPONENT}
-    assert {c for i, c in components.items() if i < 60000} == {1}
+    assert {c for i, c in components.items() if i < 60000} == {1, WINCH_COMPONENT}
 
 
 def test_sequence_counters_run_by_link_and_component(rig):
@@ -98,7 +105,8 @@ def test_sequence_counters_run_by_link_and_component(rig):
         for link, received in rig.poll().items():
             for one in received:
                 seen.setdefault((link, one.component), []).append(one.sequence)
-    assert len(seen) == 4
+    assert {component for _, component in seen} == {1, DIALECT_COMPONENT, WINCH_COMPONENT}
+    assert len(seen) == 6
     for numbers in seen.values():
         assert numbers == [n % 256 for n in range(len(numbers))]
 

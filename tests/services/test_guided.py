@@ -13,6 +13,7 @@ from autopilot.services.records import Verdict
 from autopilot.services.requests import (
     ChangeAltitude,
     FollowAttitude,
+    FollowRates,
     FollowSetpoint,
     FollowStick,
     Orbit,
@@ -26,14 +27,14 @@ HOME = Home()
 POSITION, VELOCITY, BOTH = 0x9F8, 0xDC7, 0xDC0  # as MAVSDK sends them, MAVLink's bits
 
 
-def local(frame, mask, x=0.0, y=0.0, z=0.0, vx=0.0, vy=0.0, vz=0.0):
+def local(frame, mask, x=0.0, y=0.0, z=0.0, vx=0.0, vy=0.0, vz=0.0, a=(0.0, 0.0, 0.0), yaw=0.0, rate=0.0):
     return m.MAVLink_set_position_target_local_ned_message(
-        0, 1, 1, frame, mask, x, y, z, vx, vy, vz, 0.0, 0.0, 0.0, 0.0, 0.0
+        0, 1, 1, frame, mask, x, y, z, vx, vy, vz, *a, yaw, rate
     )
 
 
-def attitude(q, thrust, mask=7):
-    return m.MAVLink_set_attitude_target_message(0, 1, 1, mask, q, 0.0, 0.0, 0.0, thrust)
+def attitude(q, thrust, mask=7, rates=(0.0, 0.0, 0.0)):
+    return m.MAVLink_set_attitude_target_message(0, 1, 1, mask, q, *rates, thrust)
 
 
 def same(a, b):
@@ -50,7 +51,7 @@ NOTHING = (math.nan,) * 3
         (local(1, VELOCITY, vx=1.0, vy=2.0, vz=-3.0), NOTHING, (2.0, 1.0, 3.0), False),
         (local(1, BOTH, 1.0, 2.0, -3.0, 4.0, 5.0, 6.0), (2.0, 1.0, 3.0), (5.0, 4.0, -6.0), False),
         (local(7, POSITION, 1.0, 2.0, -3.0), (2.0, 1.0, 3.0), NOTHING, True),
-        # the nose points east: forward is east, right is south
+        # of the nose: forward, left, up
         (local(8, VELOCITY, vx=1.0, vy=2.0, vz=-3.0), NOTHING, (1.0, -2.0, 3.0), True),
         (local(9, POSITION, 1.0, 2.0, -3.0), (1.0, -2.0, 3.0), NOTHING, True),
         # north and down ignored
@@ -62,6 +63,7 @@ def test_local_setpoints(message, position, velocity, relative):
     assert isinstance(asked, FollowSetpoint)
     assert same(asked.position, position) and same(asked.velocity, velocity)
     assert asked.relative == relative
+    assert asked.body == (message.coordinate_frame in (8, 9, 12))
 
 
 def test_global_setpoints_are_above_home_or_above_the_sea():
@@ -85,6 +87,9 @@ def test_global_setpoints_are_above_home_or_above_the_sea():
         local(1, POSITION, math.nan),
         local(1, VELOCITY, vx=math.inf),
         local(1, 0x200, 1.0),  # a force
+        local(1, 0x9F8, yaw=math.inf),
+        local(1, 0x5F8, rate=-math.inf),
+        local(1, 0xC3F, a=(math.nan, 0.0, 0.0)),
     ],
 )
 def test_setpoints_that_ask_for_nothing_are_refused(message):
@@ -99,6 +104,52 @@ def test_a_velocity_as_mavproxy_asks_for_it_is_followed():
     assert isinstance(asked, FollowSetpoint)
     assert same(asked.velocity, (2.0, 1.0, 0.5))
     assert all(map(math.isnan, (*asked.position, *asked.accel)))
+
+
+def test_an_acceleration_alone_is_followed():
+    asked = read_local(local(1, 0xC3F, a=(1.0, 2.0, -0.5)))
+    assert isinstance(asked, FollowSetpoint)
+    assert same(asked.accel, (2.0, 1.0, 0.5))
+    assert all(map(math.isnan, (*asked.position, *asked.velocity)))
+
+
+@pytest.mark.parametrize(
+    ("mask", "yaw", "rate", "heading", "turning"),
+    [
+        (0x9F8, 0.0, 9.0, 0.5 * math.pi, math.nan),  # north
+        (0x9F8, 0.5 * math.pi, 9.0, 0.0, math.nan),  # east
+        (0x9F8, math.nan, 9.0, math.nan, math.nan),  # MAVSDK: as it is
+        (0x5F8, 9.0, 0.3, math.nan, -0.3),  # clockwise
+        (0x1F8, math.pi, -0.3, -0.5 * math.pi, 0.3),
+        (0xDF8, 9.0, 9.0, math.nan, math.nan),
+    ],
+)
+def test_yaw_is_from_north_and_clockwise(mask, yaw, rate, heading, turning):
+    place = HOME.latitude_deg * 1e7, HOME.longitude_deg * 1e7
+    globally = m.MAVLink_set_position_target_global_int_message(
+        0, 1, 1, 6, mask, round(place[0]), round(place[1]), 5.0, 0, 0, 0, 0, 0, 0, yaw, rate
+    )
+    for asked in (read_local(local(1, mask, yaw=yaw, rate=rate)), read_global(globally, HOME)):
+        assert isinstance(asked, FollowSetpoint)
+        assert same((asked.heading_rad, asked.turning_rad_s), (heading, turning))
+
+
+def test_an_attitude_has_a_heading():
+    half = 0.5 * math.radians(120.0)
+    asked = read_attitude(attitude((math.cos(half), 0.0, 0.0, math.sin(half)), 0.5, 3, (9.0, 9.0, 0.2)))
+    assert isinstance(asked, FollowAttitude)
+    assert same((asked.heading_rad, asked.turning_rad_s), (math.radians(-30.0), -0.2))
+    assert math.isnan(read_attitude(attitude((1.0, 0.0, 0.0, 0.0), 0.5)).turning_rad_s)
+
+
+def test_body_rates_without_an_attitude():
+    asked = read_attitude(attitude((math.nan,) * 4, 0.5, 128, (0.1, 0.2, 0.3)))
+    assert isinstance(asked, FollowRates)
+    assert same(asked.rates, (0.1, -0.2, -0.3))
+    assert asked.thrust == pytest.approx(0.5)
+    some = read_attitude(attitude((math.nan,) * 4, 9.0, 128 | 64 | 3, (math.nan, math.nan, 0.3)))
+    assert isinstance(some, FollowRates)
+    assert same(some.rates, (0.0, 0.0, -0.3)) and some.thrust is None
 
 
 def test_an_attitude_is_its_thrust_axis():
@@ -117,10 +168,11 @@ def test_an_attitude_is_its_thrust_axis():
 @pytest.mark.parametrize(
     "message",
     [
-        attitude((1.0, 0.0, 0.0, 0.0), 0.5, mask=128),
+        attitude((1.0, 0.0, 0.0, 0.0), 0.5, mask=128 | 7),
+        attitude((1.0, 0.0, 0.0, 0.0), 0.5, mask=128, rates=(11.0, 0.0, 0.0)),
+        attitude((1.0, 0.0, 0.0, 0.0), 0.5, mask=3, rates=(0.0, 0.0, math.nan)),
         attitude((0.0, 0.0, 0.0, 0.0), 0.5),
         attitude((math.nan, 0.0, 0.0, 0.0), 0.5),
-        attitude((0.0, 1.0, 0.0, 0.0), 0.5),
         attitude((1.0, 0.0, 0.0, 0.0), 1.5),
         attitude((1.0, 0.0, 0.0, 0.0), math.nan),
     ],
@@ -134,7 +186,11 @@ def test_attitudes_that_cannot_be_followed_are_refused(message):
 def test_the_stick():
     asked = read_stick(m.MAVLink_manual_control_message(1, 500, -1000, 750, 0, 0))
     assert isinstance(asked, FollowStick)
-    assert same(asked.share, (0.5, 1.0, 0.5))
+    assert same((*asked.share, asked.turning), (0.5, 1.0, 0.5, 0.0))
+    turning = read_stick(m.MAVLink_manual_control_message(1, 0, 0, 500, 250, 0))
+    assert isinstance(turning, FollowStick)
+    assert turning.turning == -0.25  # clockwise
+    assert isinstance(read_stick(m.MAVLink_manual_control_message(1, 0, 0, 500, 2000, 0)), Verdict)
     centred = read_stick(m.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0))
     assert isinstance(centred, FollowStick)
     assert same(centred.share, (0.0, 0.0, 0.0))
@@ -194,11 +250,11 @@ any_float = st.floats(width=32)
 
 @settings(max_examples=200, deadline=None)
 @given(
-    frame=st.integers(0, 21), mask=st.integers(0, 0xFFF), values=st.lists(any_float, min_size=6, max_size=6)
+    frame=st.integers(0, 21), mask=st.integers(0, 0xFFF), values=st.lists(any_float, min_size=11, max_size=11)
 )
 def test_what_is_read_is_finite_wherever_it_is_asked(frame, mask, values):
-    asked = read_local(local(frame, mask, *values))
+    asked = read_local(local(frame, mask, *values[:6], a=values[6:9], yaw=values[9], rate=values[10]))
     if isinstance(asked, FollowSetpoint):
-        used = (*asked.position, *asked.velocity)
-        assert not any(map(math.isinf, used))
+        used = (*asked.position, *asked.velocity, *asked.accel)
+        assert not any(map(math.isinf, (*used, asked.heading_rad, asked.turning_rad_s)))
         assert not all(map(math.isnan, used))

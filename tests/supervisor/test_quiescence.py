@@ -28,6 +28,7 @@ from autopilot.services.requests import (
     FollowSetpoint,
     FollowStick,
     Land,
+    LookAt,
     Orbit,
     Pause,
     Release,
@@ -36,6 +37,7 @@ from autopilot.services.requests import (
     SetMode,
     StartMission,
     Terminate,
+    TurnNose,
 )
 from autopilot.services.requests import Takeoff as TakeoffRequest
 from autopilot.services.requests import Winch as WinchRequest
@@ -268,6 +270,21 @@ def attitudes() -> Watched:
     return landed(sky)
 
 
+def turns() -> Watched:
+    """Ticks pass while the nose rests, and all are decided upon while it turns."""
+    sky = after(Watched(), TurnNose(1.5), wait_s=10.0)
+    passed = sky.passed[Phase.HOLD]
+    assert passed > 0
+    sky.wait(1.0)
+    assert sky.passed[Phase.HOLD] > passed
+    assert sky.ask(LookAt(3.0, 3.0)).result == ACCEPTED
+    sky.tick()  # the last stretch is over with what was asked
+    passed = sky.passed[Phase.HOLD]
+    sky.wait(1.0)
+    assert sky.passed[Phase.HOLD] == passed
+    return landed(sky)
+
+
 def offboard_rise() -> Watched:
     sky = Watched()
     low, high = (FollowSetpoint((0.0, 0.0, z), NOWHERE, NOWHERE, False) for z in (0.0, 1.5))
@@ -330,6 +347,7 @@ SKIES: dict[Callable[[], Watched], set[Phase]] = {
     winch_to_its_end: TO_GROUND | {Phase.HOLD},
     circle_and_stick: TO_GROUND | {Phase.HOLD},
     attitudes: TO_GROUND | {Phase.HOLD},
+    turns: {Phase.DISARMED, Phase.HOLD, Phase.LIFT},
     offboard_rise: {Phase.DISARMED, Phase.HOLD, Phase.LOWER, Phase.SET_DOWN},
     fenced: {Phase.DISARMED, Phase.TAUTEN, Phase.SET_DOWN},
     never_taut: {Phase.TAUTEN, Phase.SET_DOWN, Phase.DISARMED},

@@ -7,17 +7,15 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.wire.codec import FrameWriter, layout_of
+from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.tlog import TlogPair, TlogWriter, dialect_log, is_of_dialect, read_both, read_tlog
+from autopilot.wire.tlog import TlogWriter, read_tlog, write_common
 
-XML = Path(str(mavlink.__file__)).with_name("plumbline.xml")
 BOOT_US = 1_767_225_600_000_000  # 2026-01-01, as in lockstep flights
 quick = settings(max_examples=100, deadline=None, derandomize=True)
 
@@ -51,37 +49,6 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
     path.write_bytes(_written(records))
     for source in (path, str(path)):
         assert [(unix_us, received.frame) for unix_us, received in read_tlog(source)] == records
-
-
-def test_the_private_dialect_has_a_log_of_its_own_that_is_read_with_the_other(tmp_path: Path) -> None:
-    """Tools of others end at a message that they do not know."""
-    records = _records(500)
-    tlog = tmp_path / "some.flight.tlog"
-    with tlog.open("wb") as standard, dialect_log(tlog).open("wb") as dialect:
-        pair = TlogPair(standard, dialect)
-        for unix_us, frame in records:
-            pair.write(unix_us, frame)
-    assert dialect_log(tlog) == tmp_path / "some.flight.plumbline.tlog"
-    assert {received.id for _, received in read_tlog(tlog)} == {mavlink.MAVLINK_MSG_ID_ATTITUDE}
-    assert {r.id for _, r in read_tlog(dialect_log(tlog))} == {mavlink.MAVLINK_MSG_ID_ROTOR_STATE}
-    both = [(unix_us, received.frame) for unix_us, received in read_both(tlog)]
-    assert sorted(both) == sorted(records)
-    dialect_log(tlog).unlink()
-    assert {received.id for _, received in read_both(tlog)} == {mavlink.MAVLINK_MSG_ID_ATTITUDE}
-
-
-def test_a_message_is_of_the_dialect_where_the_xml_says_so() -> None:
-    own = {f"{message.get('name')}" for message in ElementTree.parse(XML).iter("message")}
-    assert "LOAD_STATE" in own
-    for kind in mavlink.mavlink_map.values():
-        values = kind.unpacker.unpack(bytes(kind.unpacker.size))
-        frame = FrameWriter(1, 1).frame((layout_of(kind), values))
-        assert is_of_dialect(frame) == (kind.msgname in own), kind.msgname
-
-
-def test_a_frame_of_mavlink_1_is_never_of_the_dialect() -> None:
-    # whatever stands where the other version has its message id
-    assert not any(is_of_dialect(bytes((0xFE, 9, 0, 1, 1, 0, low, low, low, low))) for low in range(256))
 
 
 def test_a_record_is_a_big_endian_time_and_the_frame() -> None:
@@ -154,3 +121,19 @@ def test_pymavlink_with_our_dialect_reads_our_messages(tmp_path: Path, mavutil: 
     log = mavutil.mavlink_connection(str(path))
     seen = [m.force[3] for m in iter(lambda: log.recv_match(type="ROTOR_STATE"), None)]
     assert seen == [float(i) for i in range(50)]
+
+
+def test_a_log_for_common_tools_is_the_same_without_the_dialect(tmp_path: Path) -> None:
+    writer = FrameWriter(1, 1)
+    ours = mavlink.MAVLink_rotor_state_message(1, [0.0] * 4, 0.0, 1.96, 0, 2)
+    known = mavlink.MAVLink_attitude_message(1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    whole, common = tmp_path / "flight.tlog", tmp_path / "flight.common.tlog"
+    with whole.open("wb") as file:
+        log = TlogWriter(file)
+        for unix_us in range(3):
+            log.write(unix_us, writer.frame(known), writer.frame(ours))
+    write_common(whole, common)
+    records = [
+        (unix_us, one.frame) for unix_us, one in read_tlog(whole) if one.message.get_type() == "ATTITUDE"
+    ]
+    assert [(unix_us, one.frame) for unix_us, one in read_tlog(common)] == records and len(records) == 3

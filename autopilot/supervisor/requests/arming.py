@@ -7,6 +7,7 @@ import math
 from autopilot.geometry.linear import norm
 from autopilot.services.records import Verdict
 from autopilot.services.requests import Arm, RunPrearmChecks, Terminate
+from autopilot.supervisor.heading import heading_before_flight
 from autopilot.supervisor.machine import happen, must_happen
 from autopilot.supervisor.requests.mission import begin_mission
 from autopilot.supervisor.requests.takeoff import take_off
@@ -59,7 +60,7 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
     complaints = arming_complaints(flight, view, settings)
     if complaints and not request.force:
         return flight, denied(f"Arming denied: {complaints[0]}")
-    after = must_happen(flight, Event.ARM, view, settings)
+    after = must_happen(heading_before_flight(flight, view), Event.ARM, view, settings)
     if flight.selected == Selected.MISSION:
         begun, verdict = begin_mission(after, view, settings)
         return (begun if verdict.result == ACCEPTED.result else flight), verdict

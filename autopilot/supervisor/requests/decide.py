@@ -12,10 +12,12 @@ from autopilot.services.requests import (
     Continue,
     EnableFence,
     FollowAttitude,
+    FollowRates,
     FollowSetpoint,
     FollowStick,
     Grab,
     Land,
+    LookAt,
     Orbit,
     Pause,
     Release,
@@ -29,10 +31,12 @@ from autopilot.services.requests import (
     StartMission,
     Takeoff,
     Terminate,
+    TurnNose,
     Winch,
 )
 from autopilot.supervisor.requests.arming import arm, run_checks, terminate
-from autopilot.supervisor.requests.guided import follow_attitude, follow_setpoint, follow_stick
+from autopilot.supervisor.requests.guided import follow_attitude, follow_rates, follow_setpoint, follow_stick
+from autopilot.supervisor.requests.heading import look_at, turn_nose
 from autopilot.supervisor.requests.mission import (
     continue_mission,
     replace_mission,
@@ -72,7 +76,10 @@ HANDLERS: dict[type, Handler] = {
     Reposition: reposition,
     FollowSetpoint: follow_setpoint,
     FollowAttitude: follow_attitude,
+    FollowRates: follow_rates,
     FollowStick: follow_stick,
+    TurnNose: turn_nose,
+    LookAt: look_at,
     Orbit: orbit,
     ChangeAltitude: change_altitude,
     SetHome: set_home,

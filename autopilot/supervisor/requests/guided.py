@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from math import cos, isnan, pi, sin
 from typing import Any
 
-from autopilot.geometry.linear import add, scale
+from autopilot.geometry.linear import E3, Vec3, add, scale
 from autopilot.guidance.legs import top_of
-from autopilot.guidance.setpoint_follower import AttitudeSetpoint, PositionSetpoint, Stream
-from autopilot.services.requests import FollowAttitude, FollowSetpoint, FollowStick
+from autopilot.guidance.setpoint_follower import STEEPEST_DEG, AttitudeSetpoint, PositionSetpoint, Stream
+from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick
 from autopilot.supervisor.machine import happen
 from autopilot.supervisor.motion import asked_motion
 from autopilot.supervisor.requests.limits import FARTHEST_M
@@ -25,6 +27,7 @@ from autopilot.supervisor.state import (
     off_mission,
 )
 
+_BY_POSITION = denied("Attitude setpoint refused: the load is released, fly by position")
 STREAM_US = 500_000  # a stream is there where its last setpoint is no older: two a second
 
 
@@ -58,16 +61,50 @@ def begin_guided(flight: Flight, guide: Guide, what: str, view: View, settings: 
     return (after, ACCEPTED) if after else (flight, wrong_phase(flight, what))
 
 
+def _yaw_origin(flight: Flight, request: FollowSetpoint, settings: Settings) -> float:
+    """Angle (rad) by which the heading of a setpoint is to be turned: ArduPilot counts it from the nose where
+    the axes are those of the nose, PX4 from north in any frame."""
+    from_nose = request.body and settings.setpoints.guided_mode
+    return flight.heading.angle - 0.5 * pi if from_nose else 0.0
+
+
+def _as_it_is(v: Vec3) -> Vec3:
+    return v
+
+
+def _body_turned(heading: float) -> Callable[[Vec3], Vec3]:
+    """What turns a vector of the nose's axes into ENU; of its level parts one that is NaN counts as nothing,
+    where the other is a number."""
+    c, s = cos(heading), sin(heading)
+
+    def turned(v: Vec3) -> Vec3:
+        x, y, z = v
+        if isnan(x) and isnan(y):
+            return v
+        x, y = 0.0 if isnan(x) else x, 0.0 if isnan(y) else y
+        return (c * x - s * y, s * x + c * y, z)
+
+    return turned
+
+
 def follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, settings: Settings) -> Decision:
     """Take a position setpoint."""
-    position = request.position
+    turned = _body_turned(flight.heading.angle) if request.body else _as_it_is
+    position = turned(request.position)
     if request.relative:
         position = add(position, asked_motion(flight, view, settings)[0])
     elif settings.setpoints.guides_vehicle and not flight.cable.released:
         position = (position[0], position[1], position[2] - settings.cable_length_m)
     if any(abs(value) > FARTHEST_M for value in position):
         return flight, denied(f"Setpoint refused: more than {FARTHEST_M:g} m away")
-    asked = PositionSetpoint(position, request.velocity, request.accel, view.now_us)
+    asked = PositionSetpoint(
+        position,
+        turned(request.velocity),
+        turned(request.accel),
+        view.now_us,
+        request.heading_rad + _yaw_origin(flight, request, settings),
+        request.turning_rad_s,
+    )
     return _heed(flight, asked, view, settings), ACCEPTED
 
 
@@ -85,16 +122,31 @@ def _heed(
 def follow_attitude(flight: Flight, request: FollowAttitude, view: View, settings: Settings) -> Decision:
     """Take an attitude setpoint."""
     if flight.cable.released:
-        return flight, denied("Attitude setpoint refused: the load is released, fly by position")
-    thrust = None
-    if request.thrust is not None:
-        thrust = request.thrust / settings.setpoints.hover_share * settings.weight_n
-    asked = AttitudeSetpoint(request.upward, thrust)
+        return flight, _BY_POSITION
+    thrust = _thrust_n(request.thrust, settings)
+    asked = AttitudeSetpoint(request.upward, thrust, request.heading_rad, request.turning_rad_s)
+    if asked.is_too_steep:
+        return flight, denied(f"Attitude setpoint refused: leans by more than {STEEPEST_DEG:g} deg")
     return _heed(flight, asked, view, settings), ACCEPTED
+
+
+def follow_rates(flight: Flight, request: FollowRates, view: View, settings: Settings) -> Decision:
+    """Take a setpoint of body rates."""
+    if flight.cable.released:
+        return flight, _BY_POSITION
+    asked = AttitudeSetpoint(E3, _thrust_n(request.thrust, settings), rates=request.rates)
+    return _heed(flight, asked, view, settings), ACCEPTED
+
+
+def _thrust_n(share: float | None, settings: Settings) -> float | None:
+    """Thrust in newtons of a share of it; None stays None."""
+    return None if share is None else share / settings.setpoints.hover_share * settings.weight_n
 
 
 def follow_stick(flight: Flight, request: FollowStick, view: View, settings: Settings) -> Decision:
     """Take the stick, as a velocity setpoint."""
-    velocity = scale(settings.setpoints.stick_speed_m_s, request.share)
-    asked = PositionSetpoint(velocity=velocity, since_us=view.now_us)
+    along = _body_turned(flight.heading.angle)(request.share)
+    velocity = scale(settings.setpoints.stick_speed_m_s, along)
+    turning = request.turning * settings.heading.fastest
+    asked = PositionSetpoint(velocity=velocity, since_us=view.now_us, turning=turning)
     return replace(flight, setpoints=replace(flight.setpoints, manual=Stream(asked, view.now_us))), ACCEPTED

@@ -6,8 +6,10 @@ import math
 from dataclasses import replace
 
 from autopilot.geometry.linear import Vec3, norm, sub
+from autopilot.guidance.heading import Towards, nearest
 from autopilot.guidance.legs import Hold, carry_leg
 from autopilot.services.requests import ChangeAltitude, ChangeSpeed, Reposition
+from autopilot.supervisor.heading import pointed
 from autopilot.supervisor.motion import as_flown
 from autopilot.supervisor.requests.limits import FASTEST_M_S, LEAST_ALTITUDE_M, SLOWEST_M_S
 from autopilot.supervisor.requests.modes import hold
@@ -28,9 +30,15 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
         return flight, denied(f"Reposition denied: {speed:.2f} m/s; must be {SLOWEST_M_S} ... {FASTEST_M_S}")
     held, verdict = hold(flight, request, view, settings)
     asked = (request.east_m, request.north_m, request.altitude_m)
-    if verdict.result != mavlink.MAV_RESULT_ACCEPTED or asked == (None, None, None):
+    if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
         return held, verdict
     resting = held.legs[-1]
+    if not isinstance(resting, Hold) and asked != (None, None, None):
+        return flight, later("Reposition denied while the load swings: hold first")
+    if request.heading_rad is not None:
+        held = pointed(held, Towards(nearest(request.heading_rad, held.heading)), view)
+    if asked == (None, None, None):
+        return held, verdict
     assert isinstance(resting, Hold)
     here = resting.position
     there: Vec3 = (

@@ -55,7 +55,7 @@ def watch_setpoints(flight: Flight, view: View, settings: Settings) -> Watched:
     asked, leg = asked_of(flight), flight.legs[0]
     if isinstance(leg, Posture):
         if isinstance(asked, AttitudeSetpoint):
-            return Watched(replace(flight, legs=(replace(leg, lean=asked),)))
+            return Watched(replace(flight, legs=(leg.onward(asked, view.attitude, view.now_us),)))
         return Watched(flight, Event.OTHER_SETPOINT)
     if isinstance(leg, Follow):
         if isinstance(asked, AttitudeSetpoint):

@@ -23,9 +23,18 @@ from mavsdk.plugins.log_files import LogFiles, LogFilesResult
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
 from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.mission_raw import MissionRaw
-from mavsdk.plugins.offboard import Offboard, PositionNedYaw, VelocityNedYaw
+from mavsdk.plugins.offboard import (
+    AccelerationNed,
+    Attitude,
+    AttitudeRate,
+    Offboard,
+    PositionNedYaw,
+    VelocityBodyYawspeed,
+    VelocityNedYaw,
+)
 from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
+from mavsdk.plugins.winch import Winch, WinchError
 
 LONG_S = 120.0  # of a busy machine
 LOST_ON_THE_WAY = ("TIMEOUT", "BUSY", "NOT_RECEIVED_YET")
@@ -291,6 +300,80 @@ class Pilot:
         self.until("rest", lambda: abs(velocities().velocity.east_m_s) < 0.1)
         offboard.stop()
         self.mode("HOLD")
+
+    def heading(self, degrees: float) -> None:
+        """Wait until the nose points there, as the application sees it."""
+
+        def there() -> bool:
+            return abs(math.remainder(self.telemetry.heading().heading_deg - degrees, 360.0)) < 3.0
+
+        self.until(f"heading {degrees:g}", there)
+
+    def yaw(self) -> None:
+        """A place with a yaw, then every setpoint of MAVSDK's that turns."""
+        home, offboard = self.telemetry.home(), Offboard(self.system)
+        self.heading(90.0)
+        height = home.absolute_altitude_m + 2.5
+        self.action.goto_location(home.latitude_deg, home.longitude_deg, height, 0.0)
+        self.heading(0.0)
+        self.mode("HOLD")
+        offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -2.5, 0.0))
+        offboard.start()
+        self.mode("OFFBOARD")
+        offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -2.5, 215.0))
+        self.heading(215.0)
+        offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.0, 0.0, 180.0))
+        self.heading(180.0)
+        offboard.set_velocity_body(VelocityBodyYawspeed(0.4, 0.0, 0.0, 0.0))
+        seen = self.telemetry.position_velocity_ned
+        self.until("the velocity along the nose", lambda: seen().velocity.north_m_s < -0.3)
+        offboard.set_velocity_body(VelocityBodyYawspeed(0.0, 0.0, 0.0, 30.0))
+        rates = self.telemetry.attitude_angular_velocity_body
+        self.until("the yaw rate", lambda: abs(rates().yaw_rad_s - math.radians(30.0)) < 0.03)
+        offboard.stop()
+        self.mode("HOLD")
+        self.until("no yaw rate", lambda: abs(rates().yaw_rad_s) < 0.02)
+
+    def accelerate(self) -> None:
+        """An acceleration alone, there and back to rest."""
+        offboard, seen = Offboard(self.system), self.telemetry.position_velocity_ned
+        offboard.set_acceleration_ned(AccelerationNed(0.0, 0.3, 0.0))
+        offboard.start()
+        self.mode("OFFBOARD")
+        self.until("speed", lambda: seen().velocity.east_m_s > 0.5)
+        offboard.set_acceleration_ned(AccelerationNed(0.0, -0.3, 0.0))
+        self.until("rest", lambda: seen().velocity.east_m_s < 0.1)
+        offboard.stop()
+        self.mode("HOLD")
+
+    def body_rates(self) -> None:
+        """A yaw rate with a thrust, then an attitude with a yaw."""
+        offboard, rates = Offboard(self.system), self.telemetry.attitude_angular_velocity_body
+        offboard.set_attitude_rate(AttitudeRate(0.0, 0.0, 20.0, 0.5))
+        offboard.start()
+        self.mode("OFFBOARD")
+        self.until("the yaw rate", lambda: abs(rates().yaw_rad_s - math.radians(20.0)) < 0.03)
+        offboard.set_attitude(Attitude(0.0, 0.0, 90.0, 0.5))
+        self.heading(90.0)
+        offboard.stop()
+        self.mode("HOLD")
+
+    def winch(self) -> None:
+        """The load lowered and raised by the plug-in that speaks with the component of the winch."""
+        winch, lengths = Winch(self.system), []
+        winch.subscribe_status(lambda status, *_: lengths.append(status.line_length_m))
+        self.until("a winch", lambda: bool(lengths))
+        self.told["components"] = sorted(self.system.component_ids())
+        begun = lengths[-1]
+        winch.relative_length_control(1, 0.3, 0.2)
+        self.until("a longer cable", lambda: lengths[-1] > begun + 0.25)
+        winch.rate_control(1, -0.1)
+        self.until("a shorter cable", lambda: lengths[-1] < begun + 0.2)
+        winch.hold(1)
+        try:
+            winch.deliver(1)
+        except WinchError as error:
+            self.told["deliver"] = str(error)
 
     def hold(self) -> None:
         self.action.hold()

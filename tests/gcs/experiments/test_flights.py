@@ -87,9 +87,6 @@ class Flight:
         self.sky.in_the_air.pop(self.core, None)
 
 
-LOGS = ("flight.tlog", "flight.plumbline.tlog")
-
-
 def leave(directory, experiment, outcome="completed", **changes):
     meta = {
         "mission": experiment.case,
@@ -103,8 +100,7 @@ def leave(directory, experiment, outcome="completed", **changes):
         **changes,
     }
     (directory / "meta.json").write_text(json.dumps(meta))
-    for name in LOGS:
-        (directory / name).write_bytes(b"")
+    (directory / "flight.tlog").write_bytes(b"")
 
 
 def fly(sky, directory, plan=None, fresh=False, stop=lambda: False, tell=lambda ended, running: None):
@@ -160,7 +156,7 @@ def test_a_flight_of_other_settings_is_not_this_one(tmp_path, changes):
     assert not is_stored(tmp_path, A)
 
 
-@pytest.mark.parametrize("file", ["meta.json", *LOGS, "flown.json"])
+@pytest.mark.parametrize("file", ["meta.json", "flight.tlog", "flown.json"])
 def test_a_directory_that_lacks_a_file_is_flown_again(tmp_path, file):
     fly(Sky(), tmp_path)
     (tmp_path / A.name / file).unlink()

@@ -1,0 +1,82 @@
+"""Where the nose is to point: what is asked of it, and its way there from tick to tick."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isnan, radians
+
+from autopilot.geometry.linear import apply
+from autopilot.guidance.heading import Aim, Heading, Spin, Towards, heading_of, nearest, turn
+from autopilot.guidance.setpoint_follower import AttitudeSetpoint, PositionSetpoint, Posture, Stream
+from autopilot.supervisor.motion import asked_motion
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import IN_AIR, Flight, Guide, Phase, View
+
+ASKEW = radians(30.0)  # between heading and nose of a vehicle that stands, beyond which the nose is believed
+
+
+def pointed(flight: Flight, aim: Aim, view: View) -> Flight:
+    """The flight with another aim of its heading."""
+    return replace(flight, heading=flight.heading.asked(aim, view.now_us))
+
+
+def heading_kept(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight whose nose stays where it points, as soon as it can."""
+    return replace(flight, heading=flight.heading.stopped(view.now_us, settings.heading))
+
+
+def heading_before_flight(flight: Flight, view: View) -> Flight:
+    """The flight of a vehicle that is armed: its heading is the one it was left with, unless it was moved."""
+    nose, heading = heading_of(view.attitude), flight.heading.at_rest()
+    if not abs(turn(nose - heading.angle)) <= ASKEW and not isnan(nose):
+        heading = Heading(nose, aim=Towards(nose))
+    return replace(flight, heading=heading)
+
+
+def heading_onward(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight with its heading as it is to be at this tick."""
+    if flight.phase not in IN_AIR:
+        return flight
+    flight = _heeded(flight, view, settings)
+    leg = flight.legs[0] if flight.legs else None
+    if isinstance(leg, Posture) and leg.attitude is not None:
+        assert leg.lean.rates is not None
+        angle = nearest(heading_of(leg.attitude), flight.heading)
+        rate = apply(leg.attitude, leg.lean.rates)[2]
+        led = Heading(angle, rate, 0.0, view.now_us)
+        stop = Towards(led.stop_angle(settings.heading))
+        return replace(flight, heading=replace(led, aim=stop))
+    if flight.heading.rests:
+        return flight
+    place, velocity, _ = asked_motion(flight, view, settings)
+    onward = flight.heading.onward(view.now_us, place, velocity, settings.heading)
+    return replace(flight, heading=onward)
+
+
+def _heeded(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight with the aim of the setpoint that it follows, which is taken once; turning on and on lasts
+    as long as it is asked for."""
+    stream = _followed(flight)
+    spins = isinstance(flight.heading.aim, Spin)
+    if stream is None:
+        return heading_kept(flight, view, settings) if spins else flight
+    if stream.at_us == flight.setpoints.heeded_us:
+        return flight
+    flight = replace(flight, setpoints=replace(flight.setpoints, heeded_us=stream.at_us))
+    asked = stream.asked
+    assert isinstance(asked, PositionSetpoint | AttitudeSetpoint)
+    if not isnan(asked.heading):
+        along = 0.0 if isnan(asked.turning) else asked.turning
+        return pointed(flight, Towards(nearest(asked.heading, flight.heading), along, stream.at_us), view)
+    if not isnan(asked.turning):
+        return pointed(flight, Spin(asked.turning), view)
+    return heading_kept(flight, view, settings) if spins else flight
+
+
+def _followed(flight: Flight) -> Stream | None:
+    """The stream of setpoints that is followed, if there is one."""
+    if flight.phase != Phase.GUIDED or flight.setpoints.guide == Guide.ORBIT:
+        return None
+    manual = flight.setpoints.guide == Guide.MANUAL
+    stream = flight.setpoints.manual if manual else flight.setpoints.offboard
+    return None if stream.asked is None else stream
