@@ -45,10 +45,10 @@ def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | N
     return Onboard(table, identity_of(table), Options(home, LOCKSTEP_BOOT_UNIX_US), mission)
 
 
-def build_simulator(conditions: Conditions, home: Home) -> HilSimulator:
+def build_simulator(conditions: Conditions, home: Home, lockstep: bool = True) -> HilSimulator:
     """A world under these conditions."""
     return HilSimulator.build(
-        conditions.vehicle, conditions.sensors, conditions.seed, conditions.settings, home, lockstep=True
+        conditions.vehicle, conditions.sensors, conditions.seed, conditions.settings, home, lockstep
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import select
 import signal
 import socket
@@ -138,6 +139,7 @@ class Link:
                 return False
             self._say(f"serving the autopilot at {shown(sender)}")
             self.peer = sender
+        simulator.introduce()
         return True
 
 
@@ -417,7 +419,14 @@ def main(
 
         def build() -> HilSimulator:
             return HilSimulator.build(
-                vehicle, sensors, seed, dict(settings), home, not real_time, truth_every
+                vehicle,
+                sensors,
+                seed,
+                dict(settings),
+                home,
+                not real_time,
+                truth_every,
+                boot_id=secrets.randbits(63),
             )
 
         compiled = SIMULATOR.ready

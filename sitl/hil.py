@@ -84,8 +84,12 @@ class HilSimulator:
         home: Home,
         lockstep: bool,
         truth_every: int = 2,
+        boot_id: int = 0,
     ) -> None:
-        """`truth` as its file has it; `table` holds the SIM_* parameters, which may change in flight."""
+        """`truth` as its file has it; `table` holds the SIM_* parameters, which may change in flight.
+
+        `boot_id`: number of this run of the world, one that no other has; a reboot begins the next.
+        """
         self.pacing = PacingFigures()
         self._file_truth = truth
         self._profile = profile
@@ -94,6 +98,7 @@ class HilSimulator:
         self._home = home
         self._lockstep = lockstep
         self._truth_every = truth_every
+        self._boot_id = boot_id
         # machine code, once it was asked for
         self._put_sensors: Callable[..., tuple[int, int]] | None = None
         self._put_truth: Callable[..., int] | None = None
@@ -115,6 +120,7 @@ class HilSimulator:
         self.core = core
         self._statement = self._stating(settings.noise_scale)
         self._command: Rotors = STOPPED
+        self._rotors = mavlink.PLUMBLINE_ROTORS_DISARMED
         self._gripper_open = False
         self._reel_rate = 0.0
         self._command_us = -1  # the tick that the last command answers
@@ -124,6 +130,7 @@ class HilSimulator:
         # a frame of each reading that can be on its way, and HIL_SENSOR
         self._buffer = np.zeros((sensors * waiting + 1) * FRAME_ROOM, np.uint8)
         self._written = self._buffer.data
+        self._introduced = False  # at the next tick too
         self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
         self._truth_made = False
@@ -140,6 +147,7 @@ class HilSimulator:
         home: Home | None = None,
         lockstep: bool = True,
         truth_every: int = 2,
+        boot_id: int = 0,
     ) -> HilSimulator:
         """From the command line's options.
 
@@ -152,7 +160,7 @@ class HilSimulator:
             if name.startswith("SIM_") and name != "SIM_LOSS_PCT":
                 table.set(name, value)
         table.freeze()
-        return cls(truth, table, load_profile(sensors), seed, home or Home(), lockstep, truth_every)
+        return cls(truth, table, load_profile(sensors), seed, home or Home(), lockstep, truth_every, boot_id)
 
     @property
     def now_us(self) -> int:
@@ -186,6 +194,12 @@ class HilSimulator:
             one.system == VEHICLE_SYSTEM and one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT
             for one in decode(datagram)[0]
         )
+
+    def introduce(self) -> None:
+        """Say with the sensors of this tick and the next which run of the world this is."""
+        if not self._introduced:
+            self._introduced = True
+            self._sensors = self._sensor_writer.frame(self._boot()) + self._sensors
 
     def receive(self, datagram: bytes) -> bool:
         """Take the command out of a datagram; True if the present tick has its answer now.
@@ -231,6 +245,8 @@ class HilSimulator:
             self.rejected += 1
         else:
             self._command = forces if armed else STOPPED
+            obeying, disarmed = mavlink.PLUMBLINE_ROTORS_OBEYING, mavlink.PLUMBLINE_ROTORS_DISARMED
+            self._rotors = obeying if armed else disarmed
         self._gripper_open = gripper_open
         self._reel_rate = reel_rate
         self._command_us = time_us
@@ -261,6 +277,7 @@ class HilSimulator:
     def advance(self) -> None:
         """Move the world to the next tick under the last command, or back to its beginning if so asked."""
         if self._reboot:
+            self._boot_id += 1
             self._begin()
             return
         if not self._lockstep:
@@ -268,6 +285,8 @@ class HilSimulator:
                 self.missed += 1
             if self.core.now_us - self._command_us > COMMAND_TIMEOUT_US:
                 self._command = STOPPED
+                if self._rotors == mavlink.PLUMBLINE_ROTORS_OBEYING:
+                    self._rotors = mavlink.PLUMBLINE_ROTORS_UNHEARD
         self.answered = False
         self.core.tick(self._command, self._gripper_open, self._reel_rate)
         self._sensors = self._sensor_frames()
@@ -276,6 +295,9 @@ class HilSimulator:
     def _sensor_frames(self) -> bytes:
         writer, core = self._sensor_writer, self.core
         aside = self.parameters.take()
+        if self._introduced or core.now_us % SECOND_US == 0:
+            self._introduced = False
+            aside.append(self._boot())
         if not self._lockstep and core.now_us % SECOND_US == 0:  # how punctual the answers are
             aside.append(self._status())
         first = b"".join(map(writer.frame, aside)) if aside else b""
@@ -325,6 +347,14 @@ class HilSimulator:
         if status_due:
             messages.append(self._status())
         return messages
+
+    def _boot(self) -> Any:
+        """Which run of the world this is, and what an autopilot finds that starts now."""
+        core = self.core
+        reeled_m = core.cable_length - core.truth.cable_length
+        return mavlink.MAVLink_sim_boot_message(
+            core.now_us, self._boot_id, self._command, reeled_m, self._rotors, int(core.released)
+        )
 
     def _status(self) -> object:
         pacing, state = self.pacing, self.core.state

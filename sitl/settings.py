@@ -18,6 +18,7 @@ class Settings(NamedTuple):
     noise_scale: float
     sensor_latency_us: int  # added to that of each sensor
     sensor_loss: float  # 0 ... 1, added to that of each sensor but the IMU
+    failed_sensors: tuple[bool, ...]  # in the order of the rows in `sitl.world`
     wind: Vec3  # mean, ENU, m/s
     gust_std: float  # m/s, each axis
     gust_tau_s: float
@@ -43,6 +44,7 @@ def settings_of(table: ParameterTable) -> Settings:
         noise_scale=table["SIM_NOISE_SCALE"],
         sensor_latency_us=round(table["SIM_SENS_LAT_MS"] * 1000.0),
         sensor_loss=table["SIM_DROP_PCT"] / 100.0,
+        failed_sensors=tuple(bool(int(table["SIM_SENS_FAIL"]) >> bit & 1) for bit in range(7)),
         wind=(table["SIM_WIND_E"], table["SIM_WIND_N"], table["SIM_WIND_U"]),
         gust_std=table["SIM_GUST_STD"],
         gust_tau_s=table["SIM_GUST_TAU_S"],

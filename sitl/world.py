@@ -359,11 +359,13 @@ def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: in
 
 
 def losses(profile: Profile, settings: Settings) -> list[float]:
-    """Share of each sensor's readings that is lost singly; the inertial unit is wired to the autopilot and is
-    spared what is lost on the way."""
+    """Share of each sensor's readings that is lost singly, all of a failed one; the inertial unit is wired to
+    the autopilot and is spared what is lost on the way."""
     found = []
     for sensor, table in enumerate(fitted_sensors(profile)):
         extra = 0.0 if sensor == IMU else settings.sensor_loss
+        if settings.failed_sensors[sensor]:
+            extra = 1.0
         found.append(0.0 if table is None else min(table.loss + extra, 1.0))
     return found
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
-from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of
+from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of, steady
 from autopilot.control.laws.interface import law_of, new_rows
 from autopilot.control.load_motion import Drag
 from autopilot.control.records import Cable, Command, State, Vehicle
@@ -31,7 +31,7 @@ from autopilot.core.tick import (
     Winch,
     fly_tick,
 )
-from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints
+from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints, loss
 from autopilot.estimation.inbox import new_inbox
 from autopilot.estimation.records import (
     Array,
@@ -48,9 +48,10 @@ from autopilot.guidance.legs import Catch, Leg, least_move_s, top_of
 from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.quiescence import RESTING, Stretch, at_rest, next_stretch
+from autopilot.supervisor.recovery import Found, broken_off, take_up
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, Report, View, carries, leg_time_s
+from autopilot.supervisor.state import Flight, Report, Text, View, carries, leg_time_s
 
 LAID_OUT = 250  # setpoints that a process lays out at once, a second of them; a sweep takes more
 _NO_ROWS = np.zeros((1, COLUMNS))
@@ -154,8 +155,12 @@ class FlightCore:
         seen = unpack(Seen, self.rows.seen, 0)
         carried = carries(self.flight)
         found: tuple[str, ...] = ()
+        lost = ""
         if seen.vehicle_complaint or (carried and seen.load_complaint):
-            found = complaints(self.estimator, self.settings.failsafe.sensor_age_limit_s, carried)
+            estimator, silent_s = self.estimator, seen.inertial_age
+            oldest_s = self.settings.failsafe.sensor_age_limit_s
+            found = complaints(estimator, oldest_s, carried, silent_s)
+            lost = loss(estimator, silent_s)
         state = seen.state
         return View(
             now_us,
@@ -169,6 +174,7 @@ class FlightCore:
             seen.pull_n if pulls else nan,
             seen.height_std,
             state.R,
+            lost,
         )
 
     # ---- from tick to tick
@@ -279,6 +285,22 @@ class FlightCore:
             self._dirty = True
             self.interrupt()
 
+    def take_up(self, found: Found, now_us: int) -> None:
+        """Go on with a flight that is under way."""
+        rotors = steady(found.thrust_n, len(self.rows.commands))
+        self.rows.commands[:] = rotors.queue
+        pack(self.pilot._replace(thrust=rotors.thrust), self.rows.pilot, 0)
+        self.change(take_up(self.flight, found, self.view(now_us), self.settings))
+
+    def begin_anew(self, why: str, now_us: int) -> tuple[Text, ...]:
+        """Forget the estimate, and end a flight, which could not be controlled; the texts about it."""
+        flight, texts = broken_off(self.flight, why, self.view(now_us), self.settings)
+        self.change(flight)
+        pack(blank_state(), self.rows.estimator, 0)
+        for row, blank in zip(self.rows.history, new_history(), strict=True):
+            row[:] = blank
+        return texts
+
     def interrupt(self) -> None:
         """Let the supervisor look at the next tick."""
         stretch = unpack(Stretch, self.rows.stretch, 0)
@@ -350,4 +372,4 @@ def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
 
 
 _REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
-_BLIND = Seen(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD)  # before the first reading
+_BLIND = Seen(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0)  # before the first reading

@@ -16,6 +16,7 @@ from autopilot.estimation.inbox import (
     IMU,
     KIND,
     LOAD,
+    LONG_AGO,
     NOT_MEASURED,
     POSE,
     READING,
@@ -37,6 +38,8 @@ from autopilot.geometry.packed import Row, pack, packed, unpack, width
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.compiled import PAYLOAD_ROOM, Bytes, frame_end, holds, taken
 from autopilot.wire.convert import (
+    ACCEL,
+    GYRO,
     MAG,
     PRESSURE,
     HilGps,
@@ -60,6 +63,7 @@ _SENSORS = (
     mavlink.MAVLINK_MSG_ID_LOAD_SENSOR,
     mavlink.MAVLINK_MSG_ID_HIL_GPS,
 )
+INERTIAL = ACCEL | GYRO  # of HIL_SENSOR.fields_updated: a sample that is new
 
 
 class SlowSensors(NamedTuple):
@@ -171,7 +175,8 @@ def _read(
         return (_NO_TICK, 0, 0, False)
     now_us = sensor.time_us
     sample = ImuReading(sensor.gyro_body, sensor.accel_body)
-    count = _put(inbox, count, IMU, now_us, sample)
+    new = sensor.fields & INERTIAL == INERTIAL
+    count = _put(inbox, count, IMU, now_us if new else LONG_AGO, sample)
     if fixed and gps.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX:
         count = _put_fix(inbox, count, gps)
     if sensor.fields & PRESSURE:

@@ -25,10 +25,19 @@ from autopilot.control.thesis_cascade import attitude_towards
 from autopilot.estimation.filter import (
     control_state,
     estimate,
+    inertial_complaint,
     load_complaint,
     vehicle_complaint,
 )
-from autopilot.estimation.records import RECEIVER, Array, EstimatorState, EstimatorTuning, History
+from autopilot.estimation.inbox import IMU, KIND, READING, SHOWS, is_sane
+from autopilot.estimation.records import (
+    RECEIVER,
+    Array,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+    ImuReading,
+)
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import rows_in, taken
 from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
@@ -91,6 +100,7 @@ class Seen(NamedTuple):
     height_std: float  # m, of heights over home, where a receiver tells them
     vehicle_complaint: int
     load_complaint: int
+    inertial_age: float  # s, since the last new sample of the inertial unit
 
 
 class CoreRows(NamedTuple):
@@ -166,14 +176,23 @@ def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
     )
     pack(estimator, rows.estimator, 0)
     state = control_state(estimator, winch.cable)
+    silent_s = unpack(Seen, rows.seen, 0).inertial_age + dt
+    for i in range(count):
+        new = rows.inbox[i, KIND] == IMU and rows.inbox[i, SHOWS] == now_us
+        if new and is_sane(unpack(ImuReading, rows.inbox[i], READING)):
+            silent_s = 0.0
+    complaint = inertial_complaint(silent_s)
+    if complaint == 0:
+        complaint = vehicle_complaint(estimator, constants.sensor_age_s)
     seen = Seen(
         state,
         estimator.load.taut > 0.0,
         tilt_angle(state.R),
         felt_pull(pilot, state, constants),
         estimator.doubt.vertical if estimator.vehicle.source == RECEIVER else 0.0,
-        vehicle_complaint(estimator, constants.sensor_age_s),
+        complaint,
         load_complaint(estimator, constants.sensor_age_s),
+        silent_s,
     )
     pack(seen, rows.seen, 0)
 

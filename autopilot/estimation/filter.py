@@ -1,7 +1,7 @@
 """The estimator as the core sees it: one call for each tick's readings.
 
-`control_state` is the state passed to the control laws, `complaints` says what keeps the estimate from being
-flown on.
+`control_state` is the state passed to the control laws; `complaints` says what keeps the estimate from
+being flown on, `loss` what keeps it from being landed on.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from autopilot.estimation.measurements.tautened import correct_tautened
 from autopilot.estimation.predict import predict
 from autopilot.estimation.records import (
     CAMERA,
+    NOBODY,
     RECEIVER,
     Array,
     EstimatorState,
@@ -58,6 +59,9 @@ HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 LOAD_STD_TO_FLY = 0.1  # m from the vehicle, of a load that a camera sees
 PROMISE = 1.2  # times the deviation that the receiver states
 COASTING_S = 2.0  # that the IMU bridges between fixes
+TILT_STD_TO_LAND = 0.2  # rad
+POSITION_STD_TO_LAND = 10.0  # m
+INERTIAL_S = 0.1  # for which an inertial sample stands for those that are missing
 
 
 def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
@@ -157,7 +161,7 @@ def estimate(
         if inbox[i, KIND] == FIX:
             believed, fix = fix_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
             if believed:
-                state = correct_gnss(state, history, fix, tuning)
+                state = correct_gnss(state, history, fix, tuning, thrust)
     for i in range(count):
         if inbox[i, KIND] == HEIGHT and isfinite(inbox[i, READING]):
             state = correct_barometer(state, history, inbox[i, READING], tuning.barometer_age, tuning)
@@ -206,6 +210,7 @@ def control_state(state: EstimatorState, cable: Cable) -> State:
 # what keeps the estimate from being flown on; 0 nothing
 NO_POSE, NO_FIX, POSITION_VAGUE, FIX_VAGUE, ATTITUDE_VAGUE, HEADING_VAGUE = 1, 2, 3, 4, 5, 6
 NO_LOAD, NO_SIGHT, LOAD_VAGUE = 7, 8, 9
+NO_INERTIAL = 10
 _COMPLAINTS = {
     NO_POSE: "no vehicle pose from a tracker",
     NO_FIX: "no position from the receiver",
@@ -216,7 +221,14 @@ _COMPLAINTS = {
     NO_LOAD: "no load position from a tracker",
     NO_SIGHT: "no direction to the load from the camera",
     LOAD_VAGUE: "load position not settled",
+    NO_INERTIAL: "no reading of the inertial unit",
 }
+
+
+@kernel
+def inertial_complaint(silent_s: float) -> int:
+    """What is wrong with the inertial unit, whose last new sample is so old; 0 if nothing is."""
+    return 0 if silent_s <= INERTIAL_S else NO_INERTIAL
 
 
 @kernel
@@ -256,12 +268,28 @@ def load_complaint(state: EstimatorState, oldest_s: float) -> int:
     return 0 if doubt.load <= POSITION_STD_TO_FLY else LOAD_VAGUE
 
 
-def complaints(state: EstimatorState, oldest_s: float, carries: bool = True) -> tuple[str, ...]:
+def complaints(
+    state: EstimatorState, oldest_s: float, carries: bool = True, silent_s: float = 0.0
+) -> tuple[str, ...]:
     """What keeps the estimate from being flown on, in words for the operator; empty if nothing does.
 
-    Where nothing is carried the load need not be known.
+    Where nothing is carried the load need not be known. `silent_s`: age of the last new inertial sample.
     """
-    found = [vehicle_complaint(state, oldest_s)]
+    found = [inertial_complaint(silent_s) or vehicle_complaint(state, oldest_s)]
     if carries:
         found.append(load_complaint(state, oldest_s))
     return tuple(_COMPLAINTS[code].format(state.doubt.horizontal) for code in found if code)
+
+
+def loss(state: EstimatorState, silent_s: float) -> str:
+    """Why not even a landing is possible by the estimate, in words; empty if one is. Written so that NaN
+    tells."""
+    doubt = state.doubt
+    if inertial_complaint(silent_s):
+        return _COMPLAINTS[NO_INERTIAL]
+    if state.vehicle.source == NOBODY or not doubt.tilt <= TILT_STD_TO_LAND:
+        return _COMPLAINTS[ATTITUDE_VAGUE]
+    slow = state.aids.horizontal_slow if state.vehicle.source == RECEIVER else 0.0
+    if not (doubt.horizontal <= POSITION_STD_TO_LAND + PROMISE * slow):
+        return _COMPLAINTS[FIX_VAGUE].format(doubt.horizontal)
+    return ""

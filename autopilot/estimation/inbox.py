@@ -45,6 +45,7 @@ FARTHEST_M, FASTEST_M_S = 1e6, 1e4
 GREATEST_STD = 1e4  # m, m/s, rad: who states more has measured nothing
 UNIT_TOLERANCE = 0.02  # of the square of a quaternion's length
 NOT_MEASURED = -1.0  # deviation of a velocity that was not measured
+LONG_AGO = -1  # what an inertial sample shows that is only the last one again
 
 
 def new_inbox(rows: int = ROOM) -> Array:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from math import comb, inf, pi, sqrt
 
 from autopilot.control.records import Jet
-from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, sub
+from autopilot.geometry.linear import E3, ZERO, Vec3, add, axpy, dot, norm, scale, sub
 from autopilot.guidance.setpoint_follower import Follow, Posture
 from autopilot.trajectory.shaping import Shaped
 from autopilot.trajectory.swing import swing
@@ -381,7 +381,39 @@ class Calm:
         return (x, y, sqrt(1.0 - x * x - y * y))
 
 
-Leg = Hold | Transfer | Brake | Slow | Catch | Creep | Reel | Run | Pass | Swing | Calm | Follow | Posture
+@dataclass(frozen=True, slots=True)
+class Steady:
+    """The vehicle is kept level by its gyroscope, with a thrust (N), while nothing else is known."""
+
+    thrust_n: float
+    duration_s: float = inf
+    control_mode: int = QUAD_ATTITUDE
+
+    def jet(self, t: float) -> Jet:
+        """Home at rest: no position is controlled."""
+        return _rest(ZERO)
+
+    def upward(self, t: float) -> Vec3:
+        """Unit vector, ENU: the thrust axis asked for."""
+        return E3
+
+
+Leg = (
+    Hold
+    | Transfer
+    | Brake
+    | Slow
+    | Catch
+    | Creep
+    | Reel
+    | Run
+    | Pass
+    | Swing
+    | Calm
+    | Follow
+    | Posture
+    | Steady
+)
 
 
 def asked_jet(leg: Leg, t: float) -> Jet:

@@ -29,6 +29,7 @@ from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, packed
 from autopilot.onboard.flight_log import FlightLog, LogChunk
+from autopilot.onboard.ground_watch import BACK_TEXT, LOST_TEXT, GroundWatch
 from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, Loss
 from autopilot.onboard.punctuality import Punctuality
@@ -51,6 +52,7 @@ from autopilot.services.records import (
 )
 from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome, StartMission
 from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.recovery import Found
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import MissionPlan, Phase, off_mission
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
@@ -73,7 +75,25 @@ _REBOOT = mavlink.MAVLink_command_long_message(
     1, SIMULATOR_COMPONENT, mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 )
 MOST_NAMED = 8  # items in one text
-LEAP_US = 5_000_000  # larger jumps are rejected
+LEAP_US = 5_000_000  # a single tick that lies farther ahead is not believed
+GAP_US = 500_000  # without a tick, in which a vehicle in the air has long been out of control
+FIRST_TICKS = 1  # in which the rate of the ticks is found
+BELIEVED = 3  # ticks in a row that say the same of the clock are
+LEAST_THRUST = 0.3  # of the vehicle's weight: rotors that were asked for less did not carry it
+
+
+class Gains(NamedTuple):
+    """What is derived from the parameters, the gains of the law above all; for another process, as `Work`."""
+
+    parameters: ParameterTable
+    control_every: int
+
+    def done(self) -> Setup:
+        """What comes of it; takes up to half a second."""
+        return build_setup(self.parameters, self.control_every)
+
+    def failed(self, why: str) -> None:
+        """What comes of it where it could not be done: nothing."""
 
 
 class Work(NamedTuple):
@@ -87,6 +107,22 @@ class Work(NamedTuple):
     def done(self) -> Prepared:
         """What comes of it; takes from a millisecond to some seconds."""
         return prepare(self.steps, self.sequence, self.limits, self.home)
+
+    def failed(self, why: str) -> Prepared:
+        """What comes of it where it could not be done."""
+        return Prepared(refusal=why, notes=(why,))
+
+
+class Rehearsal(NamedTuple):
+    """Work for nothing, by which a process loads what work needs."""
+
+    paths: Work
+    gains: Gains
+
+    def done(self) -> None:
+        """Do it."""
+        self.paths.done()
+        self.gains.done()
 
 
 def build_setup(table: ParameterTable, control_every: int) -> Setup:
@@ -155,18 +191,24 @@ class Onboard:
         self._shortest_us = 0  # between two ticks so far
         self._version = parameters.version
         self.out_of_time = 0  # ticks in a row that lay in the past or far ahead
+        self.restarted = False  # the simulator has; this autopilot is of no use any more
+        self._boot_id: int | None = None  # of the simulator, if it has told
         self._received_loss, self._sent_loss = Loss(0), Loss(1)
         self._next_question_us = 0
         self._world = WorldParameters(parameters)
         self._punctuality = Punctuality()
-        self._lost: tuple[str, ...] = ()  # what of the storage cannot be read
+        self._ground = GroundWatch()
         self._world_told = False  # what parameters it has
         self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is asked to begin anew
         self.core = FlightCore(build_setup(parameters, 1))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
         self._moments = Moments(self.core, options, parameters, self._health, self._sensors)
-        self.work: Work | None = None  # what waits for `finish`
+        # what waits for `finish`
+        self._paths: Work | None = None
+        self._gains: Gains | None = None
+        # values of our parameters that are in force, or will be, and the period of the ticks
+        self._followed: tuple[dict[str, float], int] = ({}, 0)
         self._prepared_for = self.core.setup.settings.limits
         self._take_plan(self.endpoint.mission)
         self.logged = False  # since the log was taken last
@@ -188,9 +230,16 @@ class Onboard:
         if tick is None:
             return None
         now_us = tick.now_us
-        if now_us < before_us or (begun and now_us > before_us + LEAP_US):
-            self.out_of_time += 1
+        if tick.aside and self._is_another_run(tick.aside):
+            self.restarted = True
             return None
+        late, ahead = now_us < before_us, begun and now_us > before_us + LEAP_US
+        if late or ahead:
+            self.out_of_time += 1
+            if late or self.out_of_time < BELIEVED:
+                # a simulator that does not tell its runs apart is known by its clock
+                self.restarted = late and self._boot_id is None and self.out_of_time >= BELIEVED
+                return None
         self.out_of_time = 0
         if now_us == before_us and begun:
             return self._answer
@@ -202,6 +251,11 @@ class Onboard:
             answer += b"".join(map(self._writer.frame, aside))
         self._answer = answer
         return answer
+
+    def _is_another_run(self, messages: tuple[Any, ...]) -> bool:
+        """Whether the simulator says that it has started again since it was heard first."""
+        runs = [m.boot_id for m in messages if m.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_BOOT]
+        return self._boot_id is not None and any(run != self._boot_id for run in runs)
 
     def _put_answer(self, tick: Tick, dt: float) -> bytes:
         """HIL_ACTUATOR_CONTROLS of this tick, to which the vehicle's condition is brought."""
@@ -250,6 +304,10 @@ class Onboard:
         elif self.parameters.version != self._version:
             self._follow_parameters()
         dt = period_us * 1e-6
+        if period_us > GAP_US:
+            self._bridge(period_us)
+        if self._ground.changed(now_us, self.endpoint.ground_us):
+            self._miss_ground()
         if self.fault:
             return self._put_answer(tick, dt)
         core, sensors = self.core, self._sensors
@@ -269,17 +327,52 @@ class Onboard:
             self.endpoint.files.protected = log.path
         return answer
 
+    def _miss_ground(self) -> None:
+        """Act upon a ground station that fell silent, once the phase allows it; or say that it is back."""
+        if self._ground.lost:
+            self._ground.lost = False
+            self.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, BACK_TEXT)
+            return
+        asked = self._ground.request(self.phase)
+        if asked is not None and self.core.ask(asked[0], self.now_us).result == mavlink.MAV_RESULT_ACCEPTED:
+            self._ground.lost = True
+            self.endpoint.state_changed()
+            self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, LOST_TEXT.format(asked[1]))
+
+    def _bridge(self, period_us: int) -> None:
+        """Ticks were lost for so long that nothing is known any more, and no command has been given."""
+        why = f"no tick of the simulator for {period_us * 1e-6:.1f} s"
+        for severity, text in self.core.begin_anew(why, self.now_us):
+            self.endpoint.say(severity, text)
+
     def _hear_simulator(self, message: Any) -> None:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
             self.endpoint.say(message.severity, message.text)
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
-            self._punctuality.hear(message, self.tick)
-            self._look_for_hindrances()
+            self._hinder("clock", self._punctuality.hear(message, self.tick))
+            return
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_BOOT:
+            if self._boot_id is None:
+                self._boot_id = message.boot_id
+                self._find(message)
             return
         name = self._world.receive(message)
         if name is not None:
             self.endpoint.parameter_changed(name)
+
+    def _find(self, boot: Any) -> None:
+        """Take up a flight that is under way, which this autopilot has begun before it was started again."""
+        if boot.rotors == mavlink.PLUMBLINE_ROTORS_DISARMED:
+            return
+        vehicle, thrust_n = self.core.setup.vehicle, float(sum(boot.force))
+        if boot.rotors == mavlink.PLUMBLINE_ROTORS_UNHEARD:
+            text = "Restarted in flight after the rotors had stopped: disarmed"
+            self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, text)
+        elif thrust_n < LEAST_THRUST * vehicle.quad_mass * vehicle.gravity:
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, "Restarted on the ground: disarmed")
+        else:
+            self.core.take_up(Found(thrust_n, boot.reeled, bool(boot.released)), self.now_us)
 
     # ---- flight log
 
@@ -327,9 +420,21 @@ class Onboard:
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
             return
         self.fault = ""
-        self.core.follow(build_setup(self.parameters, every))
+        self._ground.follow(self.parameters)
         self._moments.battery = battery_constants(self.parameters)
         pack(self._moments.battery, self._battery_row, 0)
+        gains = Gains(self.parameters, every)
+        if self._options.clock_waits or self.tick <= FIRST_TICKS:
+            self._take_setup(gains.done())
+        values, learned = self.parameters.values(), self.parameters.learned
+        followed = {name: value for name, value in values.items() if name not in learned}, self._shortest_us
+        if followed != self._followed and self.tick > FIRST_TICKS and not self._options.clock_waits:
+            self._gains = gains
+        self._followed = followed
+
+    def _take_setup(self, setup: Setup) -> None:
+        """Fly by other parameters from the next tick on."""
+        self.core.follow(setup)
         # a mission under way keeps the paths that it began with
         if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.mission.active:
             self._prepare()
@@ -395,11 +500,12 @@ class Onboard:
         return self.endpoint.datagram(link, heartbeat_message(snapshot, self.endpoint.identity))
 
     @property
-    def rehearsal(self) -> Work:
+    def rehearsal(self) -> Rehearsal:
         """Work for nothing, by which a process loads what work needs."""
         path = Signals(1.0, (Term("x", 0.01, 0.0, 0.5, None, 0.0),))
         steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0), path)
-        return Work(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
+        paths = Work(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
+        return Rehearsal(paths, Gains(self.parameters, self.core.setup.control_every))
 
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
@@ -463,15 +569,13 @@ class Onboard:
 
     def take_losses(self, lost: tuple[str, ...]) -> None:
         """What of the storage cannot be read: the vehicle is not armed until that is made good."""
-        self._lost = lost
-        self._look_for_hindrances()
+        self._hinder("storage", lost)
 
-    def _look_for_hindrances(self) -> None:
-        """What keeps the vehicle from being armed besides what the supervisor sees."""
-        late = self._punctuality.complaint
-        hindrances = (*self._lost, *((late,) if late else ()))
-        if hindrances != self.core.flight.hindrances:
-            self.core.change(replace(self.core.flight, hindrances=hindrances))
+    def _hinder(self, source: str, reasons: tuple[str, ...]) -> None:
+        """What this source says keeps the vehicle from being armed."""
+        hindrances = self.core.flight.hindrances
+        if hindrances.get(source, ()) != reasons:
+            self.core.change(replace(self.core.flight, hindrances={**hindrances, source: reasons}))
 
     def _take_plan(self, mission: StoredMission) -> None:
         plan = plan_of(mission, self._options.home, None, self.core.flight.area.home)
@@ -486,16 +590,32 @@ class Onboard:
         """Have the paths of the plan made: at once where the clock waits, else by who takes `work`."""
         plan, limits = self.core.flight.mission.plan, self.core.setup.settings.limits
         self._prepared_for = limits
-        self.work = Work(plan.steps, plan.sequence, limits, self.core.flight.area.home)
+        work = self._paths = Work(plan.steps, plan.sequence, limits, self.core.flight.area.home)
         self._have_prepared(PENDING)
         if self._options.clock_waits or not plan.steps:
-            self.finish(self.work, self.work.done())
+            self.finish(work, work.done())
 
-    def finish(self, work: Work, prepared: Prepared) -> None:
-        """Take what came of `work`, unless there is other work by now."""
-        if work is not self.work:
-            return
-        self.work = None
+    @property
+    def work(self) -> Work | Gains | None:
+        """What is to be done by another process, and then waits for `finish`."""
+        return self._gains or self._paths
+
+    def finish(self, work: Work | Gains, done: Any) -> None:
+        """Take what came of `work`, unless there is other work of its kind by now."""
+        if work is self._gains:
+            self._gains = None
+            if done is None:
+                self.endpoint.say(
+                    mavlink.MAV_SEVERITY_WARNING, "Gains not designed: the old ones are in force"
+                )
+            else:
+                self._take_setup(done)
+        elif work is self._paths:
+            self._paths = None
+            self._take_paths(done)
+
+    def _take_paths(self, prepared: Prepared) -> None:
+        """Take the paths of the plan, and begin the mission if it waited for them."""
         for note in prepared.notes:
             self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, note)
         self._have_prepared(prepared)

@@ -12,17 +12,16 @@ class Punctuality:
 
     def __init__(self) -> None:
         self._last: tuple[int, int, int] | None = None  # time, tick, missed commands
-        self.complaint = ""  # why the vehicle is not to be armed; empty: nothing
 
-    def hear(self, status: Any, tick: int) -> None:
-        """SIM_STATUS, at this tick of ours."""
+    def hear(self, status: Any, tick: int) -> tuple[str, ...]:
+        """Why the vehicle is not to be armed by SIM_STATUS, heard at this tick of ours; empty: nothing."""
         last, self._last = self._last, (status.time_usec, tick, status.missed)
         if last is None or status.time_usec <= last[0]:
-            return
+            return ()
         ticks, missed = max(tick - last[1], 1), status.missed - last[2]
-        self.complaint = ""
-        if missed > MOST_MISSED * ticks:
-            self.complaint = (
-                f"machine too slow: {missed} of {ticks} commands came too late in the last second; "
-                "start sitl without --real-time"
-            )
+        if missed <= MOST_MISSED * ticks:
+            return ()
+        return (
+            f"machine too slow: {missed} of {ticks} commands came too late in the last second; "
+            "start sitl without --real-time",
+        )

@@ -178,6 +178,7 @@ class VehicleEndpoint:
         self._stirred = False  # timers may have been set since it was noted:
         self._timer_us = self._next_us = 0  # when a service has something to do, and when anything is due
         self._events: list[Event] = []  # of `poll`, until they are taken
+        self.ground_us = NEVER_US  # when a ground station's HEARTBEAT came last
         self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
         self.handlers = self._handler_table()  # by message id
 
@@ -228,6 +229,8 @@ class VehicleEndpoint:
             if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
             state = self._heard(link, now_us, program)
+            if message_id == _HEARTBEAT and received.message.type == mavlink.MAV_TYPE_GCS:
+                self.ground_us = now_us
             handler = self.handlers.get(message_id)
             addressed = self._addressed(message_id, received.message) if handler else None
             if handler and addressed:

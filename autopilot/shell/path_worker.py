@@ -9,9 +9,8 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
-from autopilot.onboard.onboard import Onboard, Work
+from autopilot.onboard.onboard import Gains, Onboard, Rehearsal, Work
 from autopilot.supervisor.state import ON_GROUND
-from autopilot.trajectory.prepare import Prepared
 
 _LONGEST_IN_VAIN_S = 1.0  # about what another process takes to load
 
@@ -23,13 +22,13 @@ class Aside:
     """
 
     def __init__(self) -> None:
-        self._work: Work | None = None  # what it is at
+        self._work: Work | Gains | None = None  # what it is at
         self._since = 0.0  # when that began
         self._loaded = False
         self._process: SpawnProcess | None = None
         self._pipe: Connection | None = None
 
-    def start(self, rehearsal: Work) -> None:
+    def start(self, rehearsal: Rehearsal) -> None:
         """Have the process load what it needs, which it does by `rehearsal`."""
         context = get_context("spawn")
         self._pipe, theirs = context.Pipe()
@@ -59,19 +58,18 @@ class Aside:
 
     def _hear(self, pipe: Connection, onboard: Onboard) -> None:
         try:
-            prepared = pipe.recv()
+            done = pipe.recv()
         except (EOFError, OSError):
             work = self._work
             self.close()
             if work is not None:
-                text = "the process that prepares paths has died"
-                onboard.finish(work, Prepared(refusal=text, notes=(text,)))
+                onboard.finish(work, work.failed("the process that prepares paths has died"))
             return
         if not self._loaded:
             self._loaded, self._since = True, time.monotonic()  # its first word
         elif self._work is not None:
             work, self._work = self._work, None
-            onboard.finish(work, prepared)
+            onboard.finish(work, done)
 
     def close(self) -> None:
         """End what goes on."""
@@ -84,11 +82,11 @@ class Aside:
         self._loaded = False
 
 
-def _serve(rehearsal: Work, pipe: Connection) -> None:
+def _serve(rehearsal: Rehearsal, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
     rehearsal.done()
     with suppress(EOFError, OSError):  # our parent is gone
         pipe.send(None)  # ready
         while True:
-            work: Work = pipe.recv()
+            work: Work | Gains = pipe.recv()
             pipe.send(work.done())

@@ -7,8 +7,10 @@ import signal
 import socket
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import click
@@ -49,7 +51,9 @@ from autopilot.shell.options import (
     signing_key_option,
 )
 from autopilot.shell.path_worker import Aside
+from autopilot.shell.steady_clock import SteadyClock
 from autopilot.shell.storage import Storage, StorageError
+from autopilot.shell.storing import Storing
 from autopilot.shell.tcp_server import TcpServer
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
@@ -73,9 +77,11 @@ _TOGETHER = 4  # windows that are sent at once to a ground station that says not
 _LARGEST_HEARD = 2048  # bytes of a datagram from the ground; what is behind them is not heard
 _GROUND_BUDGET_S = 0.5e-3  # for all that the ground says between two ticks; a flood must not stop the clock
 _GROUND_GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
-_RESTART_TICKS = 3  # ticks out of time in a row: the simulator has started again
 _GROUND_LINK: Link = "ground"
 _LOG_BYTES = 32_768  # of the flight log that are stored at once
+
+
+SIMULATOR_RESTARTED = "Simulator restarted, vehicle on the ground: disarmed"
 
 
 class AutopilotError(Exception):
@@ -110,9 +116,16 @@ class GroundStations:
     """
 
     def __init__(
-        self, stations: tuple[Address, ...], programs: tuple[Address, ...] = (), tcp: TcpServer | None = None
+        self,
+        stations: tuple[Address, ...],
+        programs: tuple[Address, ...],
+        tcp: TcpServer | None,
+        storing: Storing,
     ) -> None:
+        """What is said waits for what is to be stored."""
         self._tcp = tcp
+        self._storing = storing
+        self._waiting: deque[tuple[int, Link, bytes]] = deque()  # until so much is stored
         addresses = (*stations, *programs)
         self._sockets = [_open(address, "ground station") for address in addresses]
         self._is_program = [i >= len(stations) for i in range(len(addresses))]
@@ -148,7 +161,10 @@ class GroundStations:
         self._send([(link, onboard.stranded_heartbeat(link)) for link in links], onboard)
 
     def _send(self, datagrams: list[tuple[Link, bytes]], onboard: Onboard) -> None:
-        for link, datagram in datagrams:
+        waiting, asked = self._waiting, self._storing.asked
+        waiting.extend((asked, link, datagram) for link, datagram in datagrams)
+        while waiting and waiting[0][0] <= self._storing.done:
+            _, link, datagram = waiting.popleft()
             i, address = link  # type: ignore[misc]
             if self._tcp is not None and i == "tcp":  # type: ignore[has-type]
                 self._tcp.send(link, datagram, onboard)
@@ -266,12 +282,15 @@ class Program:
         build: Callable[[StoredMission | None], Onboard],
         mission: StoredMission | None,
         storage: Storage,
+        storing: Storing,
         simulator: Address,
         ground: GroundStations | GroundInStep,
         say: Callable[[str], None],
     ) -> None:
         self._build = build
         self._storage = storage
+        self._storing = storing
+        self._clock = SteadyClock()
         self._simulator = simulator
         self._ground = ground
         self._say = say
@@ -320,6 +339,7 @@ class Program:
         while True:
             stop.check()
             self._aside.attend(self.onboard)
+            self._storing.attend()
             try:
                 datagram = receive_from_simulator(LARGEST_DATAGRAM)
             except OSError:  # nothing within the timeout, or nobody listens where we sent to
@@ -352,13 +372,14 @@ class Program:
                         lost = False
                         self.onboard.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again")
                 heard = time.monotonic()
-            elif onboard.out_of_time >= _RESTART_TICKS:
+            elif onboard.restarted:
                 self._say("the simulator has started again: so do I")
                 areas = self.onboard.endpoint.areas
                 self._end_log()
                 self.onboard = self._build(self.onboard.endpoint.mission)
                 self.take_areas(areas)
                 self._ground.join(self.onboard)
+                self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
 
     def _answer(self, answer: bytes, stop: StopRequest, new: bool) -> None:
         """Exchange with the ground before the answer where the ground shares our clock, else after it."""
@@ -368,7 +389,7 @@ class Program:
             send(self._socket, answer)
         else:
             send(self._socket, answer)
-            self.onboard.endpoint.tell_time(time.time_ns() // 1000)
+            self.onboard.endpoint.tell_time(self._clock.unix_us())
             self._keep_beating()
             self._ground.exchange(self.onboard, self._keep, stop)
         onboard = self.onboard
@@ -404,27 +425,19 @@ class Program:
 
     def _keep(self, events: list[Event]) -> None:
         for event in events:
-            try:
-                match event:
-                    case MissionChanged(mission):
-                        self._storage.keep_mission(mission)
-                    case AreasChanged(kind, items):
-                        self._storage.keep_areas(kind, items)
-                    case ParameterChanged(name, value):
-                        self._storage.keep_parameter(name, value)
-                    case ParametersSaved():
-                        self._storage.keep_parameters()
-                    case WorldSaved(values):
-                        self._storage.keep_world(values)
-                    case SigningChanged(key, timestamp):
-                        self._storage.keep_signing(key, timestamp)
-                    case ServiceFailed(what, trace):
-                        print(f"autopilot: internal error in {what}:\n{trace}", file=sys.stderr, flush=True)
-            except OSError as error:
-                self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
-                self._say(f"cannot store: {error}")
-        if events:  # some may make good what was lost
-            self.onboard.take_losses(self._storage.lost)
+            if isinstance(event, ServiceFailed):
+                text = f"autopilot: internal error in {event.what}:\n{event.trace}"
+                print(text, file=sys.stderr, flush=True)
+            elif (store := _stored_by(self._storage, event)) is not None:
+                self._storing.ask(store, self._not_stored, self._stored)
+
+    def _stored(self) -> None:
+        """Something lies on the disk, which may make good what was lost."""
+        self.onboard.take_losses(self._storage.lost)
+
+    def _not_stored(self, error: OSError) -> None:
+        self.onboard.endpoint.say(mavlink.MAV_SEVERITY_WARNING, f"Not stored: {error.strerror}")
+        self._say(f"cannot store: {error}")
 
     def _keep_log(self, least_bytes: int) -> None:
         chunk = self.onboard.take_log(least_bytes)
@@ -443,9 +456,28 @@ class Program:
     def close(self) -> None:
         """Store what is left of the flight log, close all sockets."""
         self._end_log()
+        self._storing.close()
         self._socket.close()
         self._ground.close()
         self._aside.close()
+
+
+def _stored_by(storage: Storage, event: Event) -> Callable[[], None] | None:
+    """What stores an event; None where nothing is to be stored."""
+    match event:
+        case MissionChanged(mission):
+            return partial(storage.keep_mission, mission)
+        case AreasChanged(kind, items):
+            return partial(storage.keep_areas, kind, items)
+        case ParameterChanged(name, value):
+            return partial(storage.keep_parameter, name, value)
+        case ParametersSaved():
+            return storage.keep_parameters
+        case WorldSaved(values):
+            return partial(storage.keep_world, values)
+        case SigningChanged(key, timestamp):
+            return partial(storage.keep_signing, key, timestamp)
+    return None
 
 
 def _begin_signing(kept: Storage, key: bytes) -> None:
@@ -576,7 +608,7 @@ def main(
         troubles += [trouble] if trouble else []
         if signing_key is not None:
             _begin_signing(kept, signing_key)
-        boot = LOCKSTEP_BOOT_UNIX_US if in_step else time.time_ns() // 1000
+        boot = LOCKSTEP_BOOT_UNIX_US if in_step else SteadyClock().unix_us()
         options = Options(place, boot, clock_waits=in_step, log=True, setup_signing=allow_setup_signing)
 
         troubles += kept.load_world()[1]
@@ -587,12 +619,13 @@ def main(
             return onboard
 
         stations, programs = (tuple(filter(None, addresses)) for addresses in (gcs, api))
+        storing = Storing(aside=not in_step)
         ground: GroundStations | GroundInStep
         if ground_lockstep:
             ground = GroundInStep(ground_lockstep)
         else:
-            ground = GroundStations(stations, programs, _listen(tcp) if tcp else None)
-        program = Program(build, mission, kept, sim, ground, say)
+            ground = GroundStations(stations, programs, _listen(tcp) if tcp else None, storing)
+        program = Program(build, mission, kept, storing, sim, ground, say)
         areas, unread = kept.load_areas(place)
         program.take_areas(areas)
         program.tell(troubles + unread)

@@ -13,9 +13,10 @@ from autopilot.supervisor.machine import must_happen
 from autopilot.supervisor.mission import RELEASED_TEXT, legs_done
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import IN_AIR, INFO, Flight, Report, Text, View, leg_time_s
-from autopilot.supervisor.watches.failsafe import watch_failsafe
+from autopilot.supervisor.watches.failsafe import watch_blind, watch_failsafe
 from autopilot.supervisor.watches.fence import watch_fence
 from autopilot.supervisor.watches.idle import watch_idle
+from autopilot.supervisor.watches.recovery import watch_recovery
 from autopilot.supervisor.watches.setpoints import watch_setpoints, watch_takeoff_setpoint
 from autopilot.supervisor.watches.slack import watch_slack
 from autopilot.supervisor.watches.tautening import watch_tautening
@@ -23,7 +24,9 @@ from autopilot.supervisor.watches.touchdown import watch_touchdown
 from autopilot.supervisor.watches.watched import Watch
 
 WATCHES: tuple[Watch, ...] = (
+    watch_recovery,
     watch_failsafe,
+    watch_blind,
     watch_idle,
     watch_slack,
     watch_fence,

@@ -88,9 +88,10 @@ def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...
         slow = slow_leg(leg, t, settings.motion.accel_m_s2, settings.least_move_s)
         return (slow,), slow.end
     accel, least_s = settings.motion.accel_m_s2, settings.least_move_s
-    if v[2] < -FALLING:  # out of a fall: there is no time to lose
-        accel, least_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * least_s
     brake = brake_leg(x, v, a, accel, least_s)
+    if v[2] < -FALLING or brake.end[2] < min(x[2], 0.0):  # out of a fall: there is no time to lose
+        accel, least_s = max(accel, RESCUE_SHARE * settings.gravity_m_s2), CALM_SHARE * least_s
+        brake = brake_leg(x, v, a, accel, least_s)
     return (brake,), brake.end
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from math import hypot
 
 from autopilot.geometry.linear import ZERO, Vec3, norm, scale, sub
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, transfer_leg
+from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Creep, Hold, Leg, carry_leg, transfer_leg
 from autopilot.guidance.setpoint_follower import AttitudeSetpoint, Follow, Posture, begin_following
 from autopilot.supervisor.guide import asked_of
 from autopilot.supervisor.motion import AT_REST, asked_motion, carry, position_mode, stop
@@ -25,6 +25,10 @@ CLEARANCE = 0.6  # height over the load, in cable lengths, at which the slack ve
 ASIDE = 0.5  # how far beside the load the vehicle is set down, in cable lengths
 SLACK_SPEED, SLACK_ACCEL = 0.6, 0.8  # m/s, m/s^2: the vehicle's transfers while the cable is slack
 TOUCH_HEIGHT = 0.12  # m over home at which lowering turns into creeping
+BLIND_HEIGHT, BLIND_HASTE = (
+    0.5,
+    2.0,
+)  # readings are missing: m, added to it; times speed and acceleration
 HEIGHT_SIGMAS = 3.0  # by which a height may be wrong
 TOUCH_SPEED = 0.2  # m/s, of creeping to the ground
 HOME_RADIUS = 1.0  # m about home, within which a return does not climb
@@ -101,10 +105,14 @@ def _lower(flight: Flight, view: View, settings: Settings) -> tuple[Leg, ...]:
             carry(clear, low, settings.motion.lift_speed_m_s, settings),
             Creep(low, (0.0, 0.0, -TOUCH_SPEED), QUAD_POSITION),
         )
-    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + HEIGHT_SIGMAS * view.height_std))
+    unsure, haste = HEIGHT_SIGMAS * view.height_std, 1.0
+    if view.complaints:  # by inertial navigation, which drifts
+        unsure, haste = BLIND_HEIGHT, BLIND_HASTE
+    low = (here[0], here[1], min(here[2], TOUCH_HEIGHT + unsure))
+    speed, accel = haste * settings.motion.lift_speed_m_s, haste * settings.motion.accel_m_s2
     return (
         *legs,
-        carry(here, low, settings.motion.lift_speed_m_s, settings),
+        carry_leg(here, low, speed, accel, settings.least_move_s),
         Creep(low, (0.0, 0.0, -TOUCH_SPEED), LOAD_POSITION),
     )
 

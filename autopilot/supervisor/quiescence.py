@@ -17,7 +17,17 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, column, norm, sub
 from autopilot.geometry.packed import Each
 from autopilot.guidance.heading import EAST_NOSE
-from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Calm, Catch, Creep, Leg, Swing, top_of
+from autopilot.guidance.legs import (
+    LOAD_POSITION,
+    QUAD_POSITION,
+    Calm,
+    Catch,
+    Creep,
+    Leg,
+    Steady,
+    Swing,
+    top_of,
+)
 from autopilot.guidance.setpoint_follower import Posture
 from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.phase_legs import CLEARANCE, TOUCH_SPEED
@@ -185,6 +195,8 @@ def _leg_ends_us(flight: Flight, leg: Leg) -> int:
 
 def _attitude(leg: Leg, t: float) -> tuple[float, Vec3, float]:
     """Height held, direction and thrust (N; NaN: what holds the height) that an attitude leg asks for."""
+    if isinstance(leg, Steady):
+        return 0.0, leg.upward(t), leg.thrust_n
     if not isinstance(leg, Swing | Calm | Posture):
         return 0.0, ZERO, nan
     asked = leg.lean.thrust_n if isinstance(leg, Posture) else None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from math import hypot, nan, sqrt
 from typing import NamedTuple
@@ -44,6 +45,7 @@ INFO, WARNING, CRITICAL = (
 ON_GROUND = frozenset({Phase.DISARMED, Phase.ARMED})
 CARRYING = frozenset({Phase.LIFT, Phase.HOLD, Phase.MISSION, Phase.RETURN, Phase.LOWER, Phase.GUIDED})
 IN_AIR = CARRYING | {Phase.TAUTEN, Phase.SET_DOWN}
+LANDING = frozenset({Phase.LOWER, Phase.SET_DOWN})
 
 
 class Event(Enum):
@@ -68,6 +70,7 @@ class Event(Enum):
     LOAD_DOWN = "load on the ground"
     VEHICLE_DOWN = "vehicle on the ground"
     FAIL = "give up"
+    FOUND = "found in flight"
 
 
 class Selected(Enum):
@@ -172,7 +175,8 @@ class Flight:
     area: Area = Area()
     heading: Heading = EASTWARD
     returning: bool = False  # home, or landing there
-    hindrances: tuple[str, ...] = ()  # reasons not to arm that lie beside the flight: the storage, the clock
+    # reasons not to arm that lie beside the flight, by their source: the storage, the clock
+    hindrances: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 class View(NamedTuple):
@@ -189,6 +193,7 @@ class View(NamedTuple):
     pull_n: float = nan  # of the cable on the vehicle, as the accelerometer tells; NaN: it does not
     height_std: float = 0.0  # m, of heights over home, where a receiver tells them
     attitude: Mat3 = IDENTITY
+    lost: str = ""  # why not even a landing is possible by these estimates
 
 
 class Report(NamedTuple):

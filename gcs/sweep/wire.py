@@ -129,6 +129,7 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
     """
     newest = _newest(IMU, now_us, rows)
     inbox[0, box.KIND] = box.IMU
+    inbox[0, box.SHOWS] = now_us if newest >= 0 else box.LONG_AGO
     if newest >= 0:
         row = rows.queue[IMU, newest]
         for i in range(3):

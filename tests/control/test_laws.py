@@ -453,7 +453,7 @@ core.change(
 )
 asked = []
 for now_us in (4000, 8000, 12000):
-    pack(Seen(state, True, 0.0, weight, 0.0, 0, 0), core.rows.seen, 0)
+    pack(Seen(state, True, 0.0, weight, 0.0, 0, 0, 0.0), core.rows.seen, 0)
     core.decide(now_us, 4000)
     control_tick(core.rows, core.law_rows, 0)
     asked.append([core.pilot.command.thrust, sum(core.forces)])

@@ -11,7 +11,7 @@ from fastcrc.crc16 import mcrf4xx
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.core.sensor_inbox import SensorInbox
+from autopilot.core.sensor_inbox import INERTIAL, SensorInbox
 from autopilot.estimation import inbox as box
 from autopilot.estimation.records import DirectionReading, GnssReading, ImuReading, LoadReading, PoseReading
 from autopilot.geometry.packed import unpack
@@ -125,6 +125,8 @@ def test_the_sensor_message_is_the_clock_and_the_inertial_sample() -> None:
     assert tick.imu is not None
     assert tick.imu.accel == pytest.approx((0.0, 0.5, 9.81), abs=SINGLE)
     assert tick.imu.gyro == pytest.approx((0.1, 0.2, 0.3), abs=SINGLE)
+    assert record(tick, box.IMU) == (box.LONG_AGO, tick.imu), "nothing of it was updated"
+    tick = tick_of(sensor(INERTIAL))
     assert record(tick, box.IMU) == (NOW_US, tick.imu)
 
 

@@ -44,6 +44,7 @@ class Craft:
         sensors: str = "lab",
         seed: int = 1,
         clock_waits: bool = True,
+        lockstep: bool = True,
         **settings_: float,
     ) -> None:
         conditions = Conditions(sensors=sensors, seed=seed, settings=settings_)
@@ -53,7 +54,7 @@ class Craft:
         if not clock_waits:
             table = self.onboard.parameters
             self.onboard = Onboard(table, identity_of(table), Options(Home(), 0, clock_waits=False), mission)
-        self.simulator: HilSimulator = build_simulator(conditions, Home())
+        self.simulator: HilSimulator = build_simulator(conditions, Home(), lockstep)
         self.onboard.add_link(GCS)
         self._writer = FrameWriter(255, 190)
         self.heard: list[Any] = []

@@ -65,7 +65,9 @@ def test_where_the_clock_waits_paths_are_made_at_once() -> None:
 
 
 def test_the_rehearsal_of_another_is_work_that_can_be_done() -> None:
-    prepared = Craft(CTL_LAW=PLUMBLINE).onboard.rehearsal.done()
+    rehearsal = Craft(CTL_LAW=PLUMBLINE).onboard.rehearsal
+    prepared = rehearsal.paths.done()
+    assert rehearsal.gains.done() == rehearsal.gains.done()
     assert not prepared.refusal
     assert {type(path) for path in prepared.made} >= {Passage, Shaped}
 
@@ -183,3 +185,40 @@ def test_a_landing_in_place_of_a_return_is_shown() -> None:
     assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
     craft.wait(1.1)
     assert modes(craft)[-1] == PX4_LAND
+
+
+def test_gains_are_designed_by_another_where_the_clock_does_not_wait_and_the_answer_is_prompt() -> None:
+    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+    onboard, name = craft.onboard, "PLB_DELAY_TOL"
+    craft.wait(1.0)
+    before = onboard.core.setup
+    asked = []
+    kind = mavlink.MAV_PARAM_TYPE_REAL32
+    for value in (14.0, 15.0):
+        craft.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
+        craft.tick()
+        told = [m.param_value for m in craft.heard if m.get_type() == "PARAM_VALUE" and m.param_id == name]
+        assert told[-1] == value, "at the next tick"
+        assert onboard.core.setup is before, "nothing is designed in the loop"
+        assert onboard.work is not None
+        asked.append(onboard.work)
+    onboard.finish(asked[0], None)
+    assert onboard.work is asked[1], "the first is of no use any more"
+    onboard.finish(asked[1], asked[1].done())
+    assert onboard.core.setup.law != before.law
+    assert onboard.work is None
+
+
+def test_a_design_that_failed_leaves_the_gains_and_is_told() -> None:
+    craft = Craft(clock_waits=False, CTL_LAW=PLUMBLINE)
+    craft.wait(1.0)
+    before = craft.onboard.core.setup
+    kind = mavlink.MAV_PARAM_TYPE_REAL32
+    craft.send(mavlink.MAVLink_param_set_message(1, 1, b"PLB_DELAY_TOL", 14.0, kind))
+    craft.tick()
+    work = craft.onboard.work
+    assert work is not None
+    craft.onboard.finish(work, work.failed("the process has died"))
+    craft.tick()
+    assert craft.onboard.core.setup is before
+    assert craft.texts[-1] == "Gains not designed: the old ones are in force"

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Iterator
+from itertools import count
 from typing import Any
 
 import pytest
 
 from autopilot.services.records import Event, TimesyncAnswered
 from autopilot.shell.options import Stop
-from autopilot.shell.program import GroundInStep
+from autopilot.shell.program import AutopilotError, GroundInStep
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -170,3 +172,11 @@ def test_it_can_be_stopped_while_it_waits(rig: Rig) -> None:
 
     with pytest.raises(Stop):
         rig.step.exchange(rig.vehicle, lambda events: None, Asked())  # type: ignore[arg-type]
+
+
+def test_one_that_is_silent_for_long_ends_the_program(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where it was stopped (SIGSTOP), or is gone without a word: the clock has waited for it meanwhile."""
+    ticking = count(0.0, 2.0)  # s of the monotonic clock, which each look takes
+    monkeypatch.setattr(time, "monotonic", lambda: next(ticking))
+    with pytest.raises(AutopilotError, match="the ground station was silent for 30 s; stopping"):
+        rig.tick(looks=40)

@@ -30,7 +30,7 @@ class Waiting:
 
     def ask(self, east_m: float) -> Work:
         steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(east_m, 0.0, 2.0, 1.0))
-        self.work = Work(steps, (0, 1), self.rehearsal.limits)
+        self.work = Work(steps, (0, 1), self.rehearsal.paths.limits)
         return self.work
 
     def finish(self, work: Work, prepared: Prepared) -> None:
@@ -94,7 +94,7 @@ def test_on_the_ground_no_process_is_started_where_there_was_none(aside: Aside) 
 def test_what_takes_long_and_is_of_no_use_any_more_is_given_up(aside: Aside) -> None:
     onboard = Waiting()
     places = tuple(Waypoint(float(i % 7), float(i % 5), 2.0) for i in range(400))
-    onboard.work = Work(places, tuple(range(400)), onboard.rehearsal.limits)
+    onboard.work = Work(places, tuple(range(400)), onboard.rehearsal.paths.limits)
     aside.attend(onboard)  # type: ignore[arg-type]
     later = onboard.ask(2.0)
     attend(aside, onboard, lambda: onboard.work is None)

@@ -341,10 +341,16 @@ def test_a_reboot_begins_anew_with_the_parameters_in_force(answerer, messages) -
     simulator.advance()
     assert simulator.now_us == 0
 
-    def without_sequence(datagrams: list[bytes]) -> list[str]:
-        return [str(message) for datagram in datagrams for message in messages(datagram)]
+    def told(datagrams: list[bytes]) -> tuple[list[str], set[int]]:
+        """All without sequence numbers but the number of the run, and that."""
+        found = [message for datagram in datagrams for message in messages(datagram)]
+        rest = [str(message) for message in found if message.get_type() != "SIM_BOOT"]
+        return rest, {message.boot_id for message in found if message.get_type() == "SIM_BOOT"}
 
-    assert without_sequence(answerer().fly(simulator, 100)) == without_sequence(plain)
+    again = told(answerer().fly(simulator, 100))
+    assert again[0] == told(plain)[0]
+    assert told(plain)[1] == {0}
+    assert again[1] == {1}, "it is another run of the world, and says so"
 
 
 def test_status_carries_what_the_shell_measured(answerer, messages) -> None:
@@ -376,3 +382,46 @@ def test_bad_options_are_told_in_one_line(kwargs, complaint: str) -> None:
         HilSimulator.build(**kwargs)
     assert complaint in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def boots(simulator: HilSimulator, messages) -> list:
+    return [m for m in messages(simulator.sensor_datagram()) if m.get_type() == "SIM_BOOT"]
+
+
+def test_which_run_it_is_is_told_at_first_each_second_and_to_who_comes(answerer, messages) -> None:
+    simulator, pilot = HilSimulator.build(boot_id=2**63 - 1), answerer()
+    told = []
+    for tick in range(501):
+        if boots(simulator, messages):
+            told.append(tick)
+        pilot.fly(simulator, 1)
+    assert told == [0, 250, 500]
+    plain = simulator.sensor_datagram()
+    simulator.introduce()
+    (boot,) = boots(simulator, messages)
+    assert (boot.time_usec, boot.boot_id) == (simulator.now_us, 2**63 - 1)
+    assert simulator.sensor_datagram().endswith(plain), "with the sensors of this tick"
+    pilot.fly(simulator, 1)
+    assert len(boots(simulator, messages)) == 1, "and of the next, which may be the first that is heard"
+    pilot.fly(simulator, 1)
+    assert not boots(simulator, messages)
+
+
+def test_who_comes_is_told_what_the_rotors_do(answerer, messages) -> None:
+    simulator, pilot = HilSimulator.build(lockstep=False), answerer((1.0, 1.5, 1.0, 1.5))
+
+    def rotors() -> tuple[int, list[float]]:
+        for _ in range(2):
+            simulator.advance()
+        simulator.introduce()
+        boot = boots(simulator, messages)[0]
+        return boot.rotors, list(boot.force)
+
+    assert rotors()[0] == mavlink.PLUMBLINE_ROTORS_DISARMED
+    pilot.fly(simulator, 3)
+    assert rotors() == (mavlink.PLUMBLINE_ROTORS_OBEYING, pytest.approx([1.0, 1.5, 1.0, 1.5]))
+    while simulator.now_us < 2 * COMMAND_TIMEOUT_US:
+        simulator.advance()
+    assert rotors() == (mavlink.PLUMBLINE_ROTORS_UNHEARD, [0.0] * 4)
+    simulator.receive(pilot.answer(simulator.now_us, armed=False))
+    assert rotors()[0] == mavlink.PLUMBLINE_ROTORS_DISARMED

@@ -270,3 +270,13 @@ def test_the_winch_reaches_the_rate_it_is_told_by_the_next_tick(core) -> None:
     assert flown.cable_length == standing
     flown.tick((0.0,) * 4, gripper_open=True, reel_rate=0.3)
     assert flown.cable_length == standing  # nothing hangs on it
+
+
+@pytest.mark.parametrize("failed", range(7))
+@pytest.mark.parametrize("profile", ["lab", "rtk"])
+def test_a_failed_sensor_is_silent_and_the_others_say_what_they_did(core, profile: str, failed: int) -> None:
+    whole, less = collected(core(profile), 200), collected(core(profile, SIM_SENS_FAIL=1 << failed), 200)
+    names = ("imu", "mocap", "load_tracker", "cable_sensor", "gnss", "barometer", "magnetometer")
+    assert not less.get(names[failed])
+    for name in set(whole) - {names[failed]}:
+        assert str(less[name]) == str(whole[name]), name  # what was not measured is NaN

@@ -18,7 +18,9 @@ from autopilot.supervisor.advance import advance
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.state import (
     CARRYING,
+    CRITICAL,
     IN_AIR,
+    LANDING,
     ON_GROUND,
     Flight,
     MissionPlan,
@@ -325,7 +327,7 @@ NAN3 = (math.nan, 0.0, 0.0)
 TROUBLES: dict[str, tuple[dict[str, Any], str]] = {
     "tilt": ({"tilt_rad": math.radians(121.0)}, "tilt 121 deg exceeds FS_TILT_DEG 120"),
     "tilt is no number": ({"tilt_rad": math.nan}, "the estimate is no number"),
-    "sensors": ({"complaints": ("no load position from a tracker",)}, "no load position from a tracker"),
+    "nothing to land by": ({"lost": "no reading of the inertial unit"}, "no reading of the inertial unit"),
     "x_quad is no number": ({"x_quad": NAN3}, "the estimate is no number"),
     "v_quad is no number": ({"v_quad": NAN3}, "the estimate is no number"),
     "x_load is no number": ({"x_load": NAN3}, "the estimate is no number"),
@@ -356,6 +358,26 @@ def test_trouble_in_the_air_ends_in_failsafe_and_says_why(phase: Phase, trouble:
     assert report.texts[0][1] == f"Flight given up: {why}"
     later, _ = advance(after, hanging(4_000_000, HERE), SETTINGS)
     assert later.phase == Phase.DISARMED
+
+
+@pytest.mark.parametrize("phase", sorted(IN_AIR - LANDING))
+def test_readings_that_are_missing_in_the_air_lead_to_a_landing(phase: Phase) -> None:
+    flight = under_way(phase)
+    blind = hanging(STEP_US, HERE)._replace(complaints=("no load position from a tracker",))
+    after, report = advance(flight, blind, SETTINGS)
+    assert after.phase == (Phase.SET_DOWN if phase == Phase.TAUTEN else Phase.LOWER)
+    assert not after.mission.active
+    assert report.texts == ((CRITICAL, "Failsafe: no load position from a tracker, landing"),)
+    held = entered(after, Phase.HOLD, hanging(2 * STEP_US, HERE), SETTINGS)
+    again = advance(held, blind._replace(now_us=3 * STEP_US), SETTINGS)[0]
+    assert again.phase == Phase.LOWER, "nothing else is flown while they are missing"
+
+
+@pytest.mark.parametrize("phase", sorted(LANDING))
+def test_a_landing_goes_on_while_readings_are_missing(phase: Phase) -> None:
+    blind = hanging(STEP_US, HERE)._replace(complaints=("no load position from a tracker",))
+    after, report = advance(under_way(phase), blind, SETTINGS)
+    assert (after.phase, report.texts) == (phase, ())
 
 
 @pytest.mark.parametrize("phase", sorted(CARRYING))

@@ -189,7 +189,7 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
 
 
 def test_what_the_storage_lost_keeps_the_vehicle_from_being_armed() -> None:
-    flight = Flight(hindrances=("the stored fence is damaged",))
+    flight = Flight(hindrances={"storage": ("the stored fence is damaged",)})
     after, verdict = decide(flight, R.Arm(True, False), view(), SETTINGS)
     assert (after.phase, verdict.text) == (Phase.DISARMED, "Arming denied: the stored fence is damaged")
 

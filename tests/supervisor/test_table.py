@@ -18,6 +18,7 @@ from autopilot.services import requests as R
 from autopilot.supervisor import machine
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.machine import happen
+from autopilot.supervisor.recovery import Found, take_up
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.state import (
     CARRYING,
@@ -240,6 +241,7 @@ CAUSES: dict[Event, Callable[[Phase], Flight]] = {
     Event.RELEASED: lambda phase: asked(under_way(phase), R.Release()),
     Event.LOAD_DOWN: load_down,
     Event.VEHICLE_DOWN: vehicle_down,
+    Event.FOUND: lambda phase: take_up(under_way(phase), Found(5.0, 0.0, False), hanging(SECOND), SETTINGS),
     Event.FAIL: lambda phase: asked(under_way(phase), R.Terminate()),
 }
 

@@ -33,4 +33,5 @@ CONTENTS = {
     "SIM_STATUS": (60105, 30, 34),
     "WIND_STATE": (60106, 38, 32),
     "CABLE_SNAP": (60107, 208, 16),
+    "SIM_BOOT": (60108, 252, 38),
 }

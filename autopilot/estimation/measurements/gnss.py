@@ -1,7 +1,8 @@
 """Correction by a satellite navigation receiver: position, with an error that is partly slow, and velocity.
 
-The first fix starts the vehicle, which must then stand on the ground: levelled by the accelerometer, headed
-by the magnetometer, at the height of its gear, with the load where the crew laid it.
+The first fix starts the vehicle, levelled by the accelerometer and headed by the magnetometer. It stands on
+the ground then, at the height of its gear, with the load where the crew laid it; or, if its rotors carry it,
+it is somewhere in the air with the load below it, and the fixes that follow tell more.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ from autopilot.estimation.records import (
     LoadEstimate,
     VehicleEstimate,
 )
+from autopilot.estimation.tautness import tauten
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, cross, from_columns, norm, sub
 from autopilot.geometry.s2 import normalise, tangent
@@ -55,6 +57,10 @@ FIXES_BEFORE_RESET = 8.0
 CLIMB_WORSE = 1.7  # deviation of the climb over that of the level speed
 STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
+# of a vehicle that is found in the air
+CARRIED_SHARE = 0.5  # of its weight, from which the rotors carry it
+FLYING_SPEED_STD, FLYING_TILT_STD = 1.0, 0.15  # m/s; rad, by which its acceleration tilts the vertical
+HANGING_STD, SWINGING_STD = 0.3, 1.0  # of the cable's length, level; m/s
 ANYWHERE_STD = 100.0  # m: the first fix says where
 MAGNETIC_FRESH_S = 0.2
 LEAST_SLANT = 0.01  # sine of the angle between specific force and magnetic field
@@ -135,20 +141,48 @@ def laid(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
 
 
 @kernel
+def hanging(state: EstimatorState, history: History, tuning: EstimatorTuning) -> LoadEstimate:
+    """The load on a taut cable below the vehicle, moving with it."""
+    load, x = state.load, state.vehicle.x_quad
+    std = HANGING_STD * tuning.cable_length
+    below = LoadEstimate(
+        (x[0], x[1], x[2] - tuning.cable_length),
+        state.vehicle.v_quad,
+        (0.0, 0.0, -1.0),
+        ZERO,
+        load.across,
+        tuning.cable_length,
+        (std * std, 0.0, SWINGING_STD * SWINGING_STD),
+        0.0,
+        0.0,
+        tuning.load_mass * tuning.gravity,
+        0.0,
+        0.0,
+        load.age_s,
+        0.0,
+        CAMERA,
+    )
+    return tauten(below, history, tuning, tuning.cable_length)
+
+
+@kernel
 def start_by_fix(
-    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
+    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
-    """The standing vehicle, all but placed by the fix: that the ordinary correction does."""
+    """The vehicle, all but placed by the fix: that the ordinary correction does. `thrust` in N."""
     old, accel, g = state.vehicle, state.last_imu.accel, tuning.gravity
+    flies = thrust > CARRIED_SHARE * tuning.quad_mass * g
+    speed_var = FLYING_SPEED_STD * FLYING_SPEED_STD if flies else STARTING_SPEED_STD * STARTING_SPEED_STD
     R = level_heading(accel, state.aids.field, magnetic_north(tuning.declination))
     quat = quat_from_rotation(R)
     bias_var = tuning.accel_bias_std * tuning.accel_bias_std
     tilt_var = (bias_var + tuning.accel_std * tuning.accel_std) / (g * g)
-    spread_out(
-        history, ANYWHERE_STD * ANYWHERE_STD, STARTING_SPEED_STD * STARTING_SPEED_STD, tilt_var, tuning
-    )
+    if flies:
+        tilt_var += FLYING_TILT_STD * FLYING_TILT_STD
+    spread_out(history, ANYWHERE_STD * ANYWHERE_STD, speed_var, tilt_var, tuning)
     P = history.covariance
-    P[POSITION + 2, POSITION + 2] = STANDING_STD * STANDING_STD
+    if not flies:
+        P[POSITION + 2, POSITION + 2] = STANDING_STD * STANDING_STD
     P[ATTITUDE + 2, ATTITUDE + 2] = 1.0
     # a bias of the accelerometer tilts what it levels
     for j in range(3):
@@ -158,10 +192,12 @@ def start_by_fix(
     for i in range(3):
         slow = state.aids.horizontal_slow if i < 2 else state.aids.vertical_slow
         P[GNSS + i, GNSS + i] = slow * slow
-    x_quad = (fix.position[0], fix.position[1], tuning.gear_height)
+    x_quad, v_quad = fix.position, fix.velocity
+    if not flies:
+        x_quad, v_quad = (x_quad[0], x_quad[1], tuning.gear_height), ZERO
     vehicle = VehicleEstimate(
         x_quad,
-        ZERO,
+        v_quad,
         quat,
         old.omega_body,
         old.gyro_bias,
@@ -172,12 +208,13 @@ def start_by_fix(
         RECEIVER,
     )
     renew(history, X_QUAD, 3, (x_quad[0], x_quad[1], x_quad[2], 0.0))
-    renew(history, V_QUAD, 3, (0.0, 0.0, 0.0, 0.0))
+    renew(history, V_QUAD, 3, (v_quad[0], v_quad[1], v_quad[2], 0.0))
     renew(history, QUAT, 4, quat)
     state = with_vehicle(state, vehicle, state.resets + 1.0)
     state = correct_magnetic(state, history, state.aids.field, 0.0, tuning)
     if state.load.source != TRACKER:
-        state = with_load(state, laid(state, tuning), state.resets)
+        load = hanging(state, history, tuning) if flies else laid(state, tuning)
+        state = with_load(state, load, state.resets)
     return state
 
 
@@ -196,9 +233,9 @@ def restart_by_fix(
 
 @kernel
 def correct_gnss(
-    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning
+    state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
-    """The state after the fix; `history` is corrected along with it.
+    """The state after the fix; `history` is corrected along with it. `thrust` (N): believed of the rotors.
 
     Ignored where a tracker places the vehicle.
     """
@@ -219,7 +256,7 @@ def correct_gnss(
     if starting:
         if not (aids.magnetic_age <= MAGNETIC_FRESH_S and tells_attitude(state.last_imu.accel, aids.field)):
             return state
-        state = start_by_fix(state, history, fix, tuning)
+        state = start_by_fix(state, history, fix, tuning, thrust)
     past = look_back(state, history, tuning, fix.age_s)
     innovation = sub(fix.position, add(past.x_quad, state.aids.gnss))
     difference = sub(fix.velocity, past.v_quad)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import chain
 
 from autopilot.geometry.linear import norm
 from autopilot.services.records import Verdict
@@ -34,7 +35,7 @@ TILT_TO_ARM_RAD = math.radians(20.0)
 def arming_complaints(flight: Flight, view: View, settings: Settings) -> tuple[str, ...]:
     """What keeps the vehicle from being armed, in words."""
     # `view.complaints` are the estimator's: `autopilot.estimation.filter.complaints`
-    found = [*flight.hindrances, *view.complaints]
+    found = [*chain.from_iterable(flight.hindrances.values()), *view.complaints]
     if not view.tilt_rad <= TILT_TO_ARM_RAD:
         found.append(f"tilted by {math.degrees(view.tilt_rad):.0f} deg")
     if not norm(view.v_quad) <= GROUND_SPEED_M_S:

@@ -1,15 +1,19 @@
-"""Failsafe: what makes it impossible to fly on. The rotors stop."""
+"""Failsafe: what makes it impossible to fly on. By what is left of the estimate the vehicle lands, as long as
+that tells up from down and roughly where it is; else the rotors stop."""
 
 from __future__ import annotations
 
 from math import degrees, isfinite
 
 from autopilot.geometry.linear import norm, sub
+from autopilot.guidance.legs import Steady
 from autopilot.supervisor.motion import position_mode
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
     CARRYING,
+    CRITICAL,
     IN_AIR,
+    LANDING,
     Event,
     Flight,
     View,
@@ -26,6 +30,15 @@ def watch_failsafe(flight: Flight, view: View, settings: Settings) -> Watched:
     return given_up(flight, why) if why else Watched(flight)
 
 
+def watch_blind(flight: Flight, view: View, settings: Settings) -> Watched:
+    """Land while readings to fly by are missing; whatever else is flown ends."""
+    aloft = flight.phase in IN_AIR and flight.phase not in LANDING
+    if not view.complaints or not aloft or isinstance(flight.legs[0], Steady):
+        return Watched(flight)
+    text = f"Failsafe: {view.complaints[0]}, landing"
+    return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
+
+
 def given_up(flight: Flight, why: str) -> Watched:
     """The end of a flight, with its reason."""
     return Watched(off_mission(flight), Event.FAIL, ((MAV_SEVERITY_EMERGENCY, f"Flight given up: {why}"),))
@@ -34,8 +47,8 @@ def given_up(flight: Flight, why: str) -> Watched:
 def trouble(flight: Flight, view: View, settings: Settings) -> str:
     """Why the flight cannot go on, or an empty string."""
     limits = settings.failsafe
-    if view.complaints:
-        return view.complaints[0]
+    if view.lost and not (flight.legs and isinstance(flight.legs[0], Steady)):
+        return view.lost
     if not all(map(isfinite, (view.tilt_rad, *view.x_quad, *view.v_quad, *view.x_load, *view.v_load))):
         return "the estimate is no number"
     if view.tilt_rad > limits.tilt_limit_rad:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import axpy, sub
-from autopilot.guidance.legs import Catch
+from autopilot.guidance.legs import Catch, Steady
 from autopilot.supervisor.motion import asked_motion, stop, swings
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -39,7 +39,7 @@ def watch_fence(flight: Flight, view: View, settings: Settings) -> Watched:
     limits, area = settings.fence, flight.area
     if flight.phase not in CARRYING or not fenced(flight, settings) or not limited(flight, settings):
         return Watched(flight)
-    if isinstance(flight.legs[0], Catch):
+    if isinstance(flight.legs[0], Catch | Steady):
         return Watched(flight)
     why = _breach(flight, view, settings)
     if bool(why) == bool(area.breach):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from autopilot.geometry.linear import norm, sub
-from autopilot.guidance.legs import Catch, Creep
+from autopilot.guidance.legs import Catch, Creep, Steady
 from autopilot.supervisor.phase_legs import TOUCH_HEIGHT
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
@@ -30,7 +30,7 @@ SLACK_US = 20_000  # for which it must be so
 
 def watch_slack(flight: Flight, view: View, settings: Settings) -> Watched:
     """Catch a load that falls freely; begin the phase again when it hangs on the cable."""
-    if flight.phase not in CARRYING or flight.cable.released:
+    if flight.phase not in CARRYING or flight.cable.released or isinstance(flight.legs[0], Steady):
         return Watched(flight)
     flight = _note_slack(flight, view, settings)
     fallen = view.x_load[2] < TOUCH_HEIGHT and norm(view.v_load) < LYING_SPEED

@@ -8,6 +8,7 @@ from autopilot.guidance.legs import LOAD_POSITION, Creep
 from autopilot.supervisor.phase_legs import TOUCH_SPEED
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import INFO, Event, Flight, Phase, View, leg_time_s
+from autopilot.supervisor.watches.cable_pull import SLACK, share_pulled
 from autopilot.supervisor.watches.watched import Watched
 
 LOAD_SUNK, VEHICLE_SUNK = 0.05, 0.15  # m by which the setpoint must be below what stopped
@@ -51,6 +52,8 @@ def _note_stop(flight: Flight, view: View, settings: Settings) -> Flight:
         target = leg.jet(leg_time_s(flight, view.now_us))[0][2]
         if leg.control_mode == LOAD_POSITION:
             down = view.x_load[2] - target > LOAD_SUNK + settings.ramp_lag_s * TOUCH_SPEED
+            # of a load that is not seen the pull tells
+            down = down or (bool(view.complaints) and share_pulled(view, settings) < SLACK)
         else:
             sunk = view.x_quad[2] - target
             down = sunk > VEHICLE_SUNK and (sunk > STANDS or abs(view.v_quad[2]) < STILL_SPEED)

@@ -359,6 +359,18 @@ class Enum(Dict[int, EnumEntry]):
 
 enums: Dict[str, Enum] = {}
 
+# PLUMBLINE_ROTORS
+enums["PLUMBLINE_ROTORS"] = Enum()
+enums["PLUMBLINE_ROTORS"].bitmask = False
+PLUMBLINE_ROTORS_DISARMED = 0
+enums["PLUMBLINE_ROTORS"][0] = EnumEntry("PLUMBLINE_ROTORS_DISARMED", """The last command was to stand still.""")
+PLUMBLINE_ROTORS_OBEYING = 1
+enums["PLUMBLINE_ROTORS"][1] = EnumEntry("PLUMBLINE_ROTORS_OBEYING", """They obey the last command of an armed autopilot.""")
+PLUMBLINE_ROTORS_UNHEARD = 2
+enums["PLUMBLINE_ROTORS"][2] = EnumEntry("PLUMBLINE_ROTORS_UNHEARD", """The last command was that of an armed autopilot, but so long ago that they have stopped.""")
+PLUMBLINE_ROTORS_ENUM_END = 3
+enums["PLUMBLINE_ROTORS"][3] = EnumEntry("PLUMBLINE_ROTORS_ENUM_END", """""")
+
 # PLUMBLINE_SOURCE
 enums["PLUMBLINE_SOURCE"] = Enum()
 enums["PLUMBLINE_SOURCE"].bitmask = False
@@ -6450,6 +6462,7 @@ MAVLINK_MSG_ID_ROTOR_STATE = 60104
 MAVLINK_MSG_ID_SIM_STATUS = 60105
 MAVLINK_MSG_ID_WIND_STATE = 60106
 MAVLINK_MSG_ID_CABLE_SNAP = 60107
+MAVLINK_MSG_ID_SIM_BOOT = 60108
 MAVLINK_MSG_ID_SYS_STATUS = 1
 MAVLINK_MSG_ID_SYSTEM_TIME = 2
 MAVLINK_MSG_ID_PING = 4
@@ -7058,6 +7071,52 @@ class MAVLink_cable_snap_message(MAVLink_message):
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
 setattr(MAVLink_cable_snap_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_sim_boot_message(MAVLink_message):
+    """
+    Which run of the simulated world this is, and how rotors, winch
+    and gripper are, for an autopilot that has just started. On the
+    simulator link only: at the first tick, each second, and when an
+    autopilot announces itself.
+    """
+
+    id = MAVLINK_MSG_ID_SIM_BOOT
+    msgname = "SIM_BOOT"
+    fieldnames = ["time_usec", "boot_id", "force", "reeled", "rotors", "released"]
+    ordered_fieldnames = ["time_usec", "boot_id", "force", "reeled", "rotors", "released"]
+    fieldtypes = ["uint64_t", "uint64_t", "float", "float", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {"rotors": "PLUMBLINE_ROTORS"}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "force": "N", "reeled": "m"}
+    native_format = bytearray(b"<QQffBB")
+    orders = [0, 1, 2, 3, 4, 5]
+    lengths = [1, 1, 4, 1, 1, 1]
+    array_lengths = [0, 0, 4, 0, 0, 0]
+    crc_extra = 252
+    unpacker = struct.Struct("<QQ4ffBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int):
+        MAVLink_message.__init__(self, MAVLink_sim_boot_message.id, MAVLink_sim_boot_message.msgname)
+        self._fieldnames = MAVLink_sim_boot_message.fieldnames
+        self._instance_field = MAVLink_sim_boot_message.instance_field
+        self._instance_offset = MAVLink_sim_boot_message.instance_offset
+        self.time_usec = time_usec
+        self.boot_id = boot_id
+        self.force = force
+        self.reeled = reeled
+        self.rotors = rotors
+        self.released = released
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.boot_id, self.force[0], self.force[1], self.force[2], self.force[3], self.reeled, self.rotors, self.released), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_sim_boot_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_sys_status_message(MAVLink_message):
@@ -17483,6 +17542,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_SIM_STATUS: MAVLink_sim_status_message,
     MAVLINK_MSG_ID_WIND_STATE: MAVLink_wind_state_message,
     MAVLINK_MSG_ID_CABLE_SNAP: MAVLink_cable_snap_message,
+    MAVLINK_MSG_ID_SIM_BOOT: MAVLink_sim_boot_message,
     MAVLINK_MSG_ID_SYS_STATUS: MAVLink_sys_status_message,
     MAVLINK_MSG_ID_SYSTEM_TIME: MAVLink_system_time_message,
     MAVLINK_MSG_ID_PING: MAVLink_ping_message,
@@ -18410,6 +18470,40 @@ class MAVLink(object):
 
         """
         self.send(self.cable_snap_encode(time_usec, speed, impulse), force_mavlink1=force_mavlink1)
+
+    def sim_boot_encode(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int) -> MAVLink_sim_boot_message:
+        """
+        Which run of the simulated world this is, and how rotors, winch and
+        gripper are, for an autopilot that has just started. On the
+        simulator link only: at the first tick, each second, and when
+        an autopilot announces itself.
+
+        time_usec                 : The tick, clock of the vehicle. [us] (type:uint64_t)
+        boot_id                   : Number of this run of the world; another one after every start. (type:uint64_t)
+        force                     : Rotor forces that an autopilot asked for last. [N] (type:float)
+        reeled                    : By how much the winch has lengthened the cable. [m] (type:float)
+        rotors                    : Whether the rotors obey that command. (type:uint8_t, values:PLUMBLINE_ROTORS)
+        released                  : 1 while the gripper holds nothing. (type:uint8_t)
+
+        """
+        return MAVLink_sim_boot_message(time_usec, boot_id, force, reeled, rotors, released)
+
+    def sim_boot_send(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int, force_mavlink1: bool = False) -> None:
+        """
+        Which run of the simulated world this is, and how rotors, winch and
+        gripper are, for an autopilot that has just started. On the
+        simulator link only: at the first tick, each second, and when
+        an autopilot announces itself.
+
+        time_usec                 : The tick, clock of the vehicle. [us] (type:uint64_t)
+        boot_id                   : Number of this run of the world; another one after every start. (type:uint64_t)
+        force                     : Rotor forces that an autopilot asked for last. [N] (type:float)
+        reeled                    : By how much the winch has lengthened the cable. [m] (type:float)
+        rotors                    : Whether the rotors obey that command. (type:uint8_t, values:PLUMBLINE_ROTORS)
+        released                  : 1 while the gripper holds nothing. (type:uint8_t)
+
+        """
+        self.send(self.sim_boot_encode(time_usec, boot_id, force, reeled, rotors, released), force_mavlink1=force_mavlink1)
 
     def sys_status_encode(self, onboard_control_sensors_present: int, onboard_control_sensors_enabled: int, onboard_control_sensors_health: int, load: int, voltage_battery: int, current_battery: int, battery_remaining: int, drop_rate_comm: int, errors_comm: int, errors_count1: int, errors_count2: int, errors_count3: int, errors_count4: int, onboard_control_sensors_present_extended: int = 0, onboard_control_sensors_enabled_extended: int = 0, onboard_control_sensors_health_extended: int = 0) -> MAVLink_sys_status_message:
         """

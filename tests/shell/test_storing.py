@@ -1,0 +1,103 @@
+"""Storing aside: in order, told when it is done, and what is said to the ground waits for it."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from autopilot.shell.program import GroundStations
+from autopilot.shell.storing import Storing
+from autopilot.shell.whole_file import write_whole
+
+
+@pytest.fixture
+def aside() -> Iterator[Storing]:
+    storing = Storing(aside=True)
+    yield storing
+    storing.close()
+
+
+LISTENER = ("127.0.0.1", 0)
+
+
+def nothing(error: OSError) -> None:
+    raise AssertionError(error)
+
+
+def test_what_is_asked_for_is_done_in_order_and_told_by_who_asked(aside: Storing) -> None:
+    done: list[int] = []
+    told: list[int] = []
+    for number in range(20):
+        aside.ask(lambda n=number: done.append(n), nothing, lambda n=number: told.append(n))
+    assert not told, "not by the thread"
+    aside.close()
+    assert done == told == list(range(20))
+    assert aside.asked == aside.done == 20
+
+
+@pytest.mark.parametrize("by_thread", [True, False])
+def test_what_cannot_be_stored_is_told_and_what_follows_is_stored(by_thread: bool) -> None:
+    storing = Storing(by_thread)
+    told: list[str] = []
+
+    def full() -> None:
+        raise OSError(28, "No space left on device")
+
+    storing.ask(full, lambda error: told.append(str(error.strerror)), lambda: told.append("stored"))
+    storing.ask(lambda: None, nothing, lambda: told.append("stored"))
+    storing.close()
+    assert told == ["No space left on device", "stored"]
+
+
+def test_where_the_clock_waits_it_is_done_at_once() -> None:
+    done: list[str] = []
+    Storing(aside=False).ask(lambda: done.append("stored"), nothing, lambda: done.append("told"))
+    assert done == ["stored", "told"]
+
+
+def test_the_loop_does_not_wait_for_a_disk_and_the_ground_does(aside: Storing) -> None:
+    """A disk that takes its time: ticks go on, and no answer leaves before what it tells of is stored."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(LISTENER)
+        listener.setblocking(False)
+        stations = GroundStations((listener.getsockname(),), (), None, aside)
+        link = (0, listener.getsockname())
+        onboard: Any = SimpleNamespace(said=[b"before"])
+        onboard.ground_datagrams = lambda: [(link, datagram) for datagram in onboard.said]
+        disk = Event()
+
+        def wait_for_disk() -> None:
+            disk.wait()
+
+        stations.send(onboard)
+        aside.ask(wait_for_disk, nothing, lambda: None)
+        for said in (b"the answer", b"telemetry"):
+            onboard.said = [said]
+            stations.send(onboard)
+        assert listener.recv(100) == b"before"
+        with pytest.raises(BlockingIOError):
+            listener.recv(100)
+        disk.set()
+        aside.close()
+        onboard.said = []
+        stations.send(onboard)
+        assert [listener.recv(100), listener.recv(100)] == [b"the answer", b"telemetry"]
+        stations.close()
+
+
+def test_what_is_told_as_stored_lies_on_the_disk(tmp_path: Path, aside: Storing, monkeypatch: Any) -> None:
+    synced: list[bool] = []
+    monkeypatch.setattr(os, "fsync", lambda handle: synced.append(True))
+    before: list[int] = []
+    aside.ask(
+        lambda: write_whole(tmp_path / "mission.bin", b"m"), nothing, lambda: before.append(len(synced))
+    )
+    aside.close()
+    assert before == [2], "the file and its directory"
