@@ -21,6 +21,7 @@ COMMANDS = {
     "missions": ("missions", "List the shipped missions."),
     "check": ("missions", "Check whether a vehicle can fly a mission."),
     "report": ("report", "Make the report of a captured flight again."),
+    "compare": ("compare", "Compare flights: figures, settings, tracks and errors."),
     "experiments": (
         "experiments",
         "Repeat published experiments beside their printed results.",

@@ -83,7 +83,7 @@ def tracking_numbers(samples: Samples) -> Numbers:
         numbers[f"load_error_max_{axis}_m"] = _over(np.abs(error[:, i]), np.max)
     for i, axis in enumerate(_AXES):
         numbers[f"load_error_rms_{axis}_m"] = _over(error[:, i], _rms)
-    speed = np.linalg.norm(samples.actual_m_s[samples.in_mission], axis=1)
+    speed = np.linalg.norm(samples.actual_m_s[samples.carried], axis=1)
     numbers["load_speed_max_m_s"] = _over(speed, np.max)
     return numbers
 
@@ -145,11 +145,11 @@ def rotor_numbers(telemetry: Telemetry) -> Numbers:
 def cable_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
     """True attitude, swing and tension over the mission window; slack while the load is carried."""
     truth = telemetry.load_truth
-    window = samples.in_mission
-    tilt_max = _over(tilt(samples.quat_wxyz[window]), np.max)
+    window = samples.carried
+    tilt_max = _over(tilt(samples.quat_wxyz[samples.in_mission]), np.max)
     swing_max = _over(swing(truth.q_cable[window]), np.max)
     went_slack = np.diff(truth.slack_events, prepend=truth.slack_events[:1]) % _WRAP
-    carried = np.isin(samples.phase, CARRIED)
+    carried = np.isin(samples.phase, CARRIED) & samples.attached
     return {
         "tilt_max_deg": None if tilt_max is None else float(np.degrees(tilt_max)),
         "swing_max_deg": None if swing_max is None else float(np.degrees(swing_max)),
@@ -174,6 +174,7 @@ def gust_numbers(telemetry: Telemetry, samples: Samples) -> Numbers:
     its begin until the load is no longer carried or the next gust begins.
     """
     carried = np.isin(samples.phase, CARRIED) & ~np.isin(samples.control_mode, ATTITUDE_MODES)
+    carried &= samples.attached
     error = np.linalg.norm(samples.error_m, axis=1)
     whole, worst_m, recovery_s = 0, 0.0, 0.0
     gusts = gust_intervals(telemetry.wind)
@@ -216,7 +217,7 @@ def snap_numbers(telemetry: Telemetry) -> Numbers:
 
 def estimator_numbers(samples: Samples) -> Numbers:
     """Estimated minus true load position over the mission window."""
-    norm = np.linalg.norm((samples.estimated_m - samples.actual_m)[samples.in_mission], axis=1)
+    norm = np.linalg.norm((samples.estimated_m - samples.actual_m)[samples.carried], axis=1)
     return {"estimator_error_max_m": _over(norm, np.max), "estimator_error_rms_m": _over(norm, _rms)}
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.align import as_of, hermite, linear
 from gcs.analysis.axes import Floats
+from gcs.analysis.release import attached
 from gcs.analysis.tracks import Ints, Telemetry
 
 UNKNOWN = -1
@@ -47,6 +48,7 @@ class Samples:
     item: Ints  # (n,)
     control_mode: Ints  # (n,)
     in_mission: NDArray[np.bool_]  # (n,) the mission window, see `in_window`
+    attached: NDArray[np.bool_]  # (n,) the load is on the cable, see `gcs.analysis.release`
     actual_m: Floats  # (n, 3) true load position
     actual_m_s: Floats  # (n, 3) true load velocity
     desired_m: Floats  # (n, 3)
@@ -69,8 +71,13 @@ class Samples:
 
     @property
     def position_tracked(self) -> NDArray[np.bool_]:
-        """(n,) in the mission window, and the cascade tracks a position rather than an attitude."""
-        return self.in_mission & ~np.isin(self.control_mode, ATTITUDE_MODES)
+        """(n,) `carried`, and the cascade tracks a position rather than an attitude."""
+        return self.carried & ~np.isin(self.control_mode, ATTITUDE_MODES)
+
+    @property
+    def carried(self) -> NDArray[np.bool_]:
+        """(n,) in the mission window, the load on the cable: what figures of the load count over."""
+        return self.in_mission & self.attached
 
 
 def phase_at(telemetry: Telemetry, at_s: Floats) -> Ints:
@@ -105,6 +112,7 @@ def samples_of(telemetry: Telemetry) -> Samples:
         item=_whole_as_of(telemetry, setpoint.item, time_s),
         control_mode=_whole_as_of(telemetry, setpoint.control_mode, time_s),
         in_mission=in_window(telemetry, time_s),
+        attached=attached(truth),
         actual_m=truth.position_m,
         actual_m_s=truth.velocity_m_s,
         desired_m=np.where(

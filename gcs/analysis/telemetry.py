@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from autopilot.wire.codec import Received
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.asked import ASKED, VEHICLE_SYSTEM, Asked
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
 from gcs.analysis.columns import Columns
 from gcs.analysis.tracks import (
@@ -31,7 +32,6 @@ from gcs.analysis.tracks import (
 
 Record = tuple[int, Received]  # microseconds since 1970 and the message, as in a .tlog
 
-VEHICLE_SYSTEM = 1
 AUTOPILOT_COMPONENT = 1
 _MICRO = 1e-6
 
@@ -67,7 +67,10 @@ def telemetry_of(records: Iterable[Record]) -> Telemetry:
     frames: dict[int, list[bytes]] = {message_id: [] for message_id in (*_READ, *_HEARD)}
     stamps: dict[int, list[int]] = {message_id: [] for message_id in frames}
     texts: list[tuple[int, Any]] = []
+    asked = Asked()
     for unix_us, received in records:
+        if received.id in ASKED:
+            asked.take(received)
         if received.system != VEHICLE_SYSTEM:
             continue
         if received.id not in frames:
@@ -84,7 +87,11 @@ def telemetry_of(records: Iterable[Record]) -> Telemetry:
         boot_us = min(heard - sent for heard, sent in zip(waited_us, sent_us, strict=True))
     else:
         boot_us = min((stamps[message_id][0] for message_id in _HEARD if stamps[message_id]), default=0)
-    return _assemble(columns, {message_id: stamps[message_id] for message_id in _HEARD}, texts, boot_us)
+    heard = {
+        message_id: (np.array(stamps[message_id], dtype=np.float64) - boot_us) * _MICRO
+        for message_id in _HEARD
+    }
+    return _assemble(columns, heard, _texts(texts, boot_us), asked)
 
 
 TrackT = TypeVar("TrackT")
@@ -213,17 +220,13 @@ def _texts(texts: list[tuple[int, Any]], boot_us: int) -> tuple[StatusText, ...]
 
 
 def _assemble(
-    columns: dict[int, Columns], heard: dict[int, list[int]], texts: list[tuple[int, Any]], boot_us: int
+    columns: dict[int, Columns], times: dict[int, Floats], texts: tuple[StatusText, ...], asked: Asked
 ) -> Telemetry:
     load = columns[mavlink.MAVLINK_MSG_ID_LOAD_STATE]
     rotors = columns[mavlink.MAVLINK_MSG_ID_ROTOR_STATE]
     hil = columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION]
     attitude = columns[mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION]
     beat = columns[mavlink.MAVLINK_MSG_ID_HEARTBEAT]
-    times = {
-        message_id: (np.array(stamps, dtype=np.float64) - boot_us) * _MICRO
-        for message_id, stamps in heard.items()
-    }
     current = mavlink.MAVLINK_MSG_ID_MISSION_CURRENT
     reached = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED
     return Telemetry(
@@ -252,5 +255,8 @@ def _assemble(
         simulation=_simulation(columns[mavlink.MAVLINK_MSG_ID_SIM_STATUS]),
         wind=_wind(columns[mavlink.MAVLINK_MSG_ID_WIND_STATE]),
         snaps=_snaps(columns[mavlink.MAVLINK_MSG_ID_CABLE_SNAP]),
-        texts=_texts(texts, boot_us),
+        texts=texts,
+        mission=asked.mission,
+        parameters=asked.parameters,
+        home=asked.home,
     )

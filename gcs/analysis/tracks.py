@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.wire.convert import Home
+from autopilot.wire.items.records import WireItem
 from gcs.analysis.axes import Floats
 
 Ints = NDArray[np.int64]
@@ -167,6 +169,9 @@ class Telemetry:
     wind: WindTrack
     snaps: SnapTrack
     texts: tuple[StatusText, ...]
+    mission: tuple[WireItem, ...]  # what was uploaded last, if all of it is in the log
+    parameters: dict[str, float]  # what the vehicle said of its parameters last
+    home: Home  # the origin of the world
 
     @property
     def span_s(self) -> tuple[float, float] | None:

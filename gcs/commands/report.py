@@ -17,15 +17,24 @@ from gcs.errors import GcsError
     type=click.Path(file_okay=False, path_type=Path),
     help="Where the report goes.  [default: beside the log]",
 )
+@click.option("--mcap", is_flag=True, help="Also flight.mcap, for Foxglove, PlotJuggler and Rerun.")
+@click.option(
+    "--common-tlog",
+    "common",
+    is_flag=True,
+    help="Also flight.common.tlog, without the private dialect, for tools that end at unknown messages.",
+)
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress and no table.")
-def report_command(source: Path, out: Path | None, as_json: bool, quiet: bool) -> None:
+def report_command(
+    source: Path, out: Path | None, mcap: bool, common: bool, as_json: bool, quiet: bool
+) -> None:
     """Make the report of a captured flight again.
 
     DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. Made are
     summary.json, flight.parquet, pictures and report.html, from the telemetry alone.
     """
-    from gcs.workflows.report import print_record, report_again
+    from gcs.workflows.report import make_common, make_mcap, print_record, report_again
 
     record, folder = report_again(source, out, quiet or as_json)
     if as_json:
@@ -34,5 +43,9 @@ def report_command(source: Path, out: Path | None, as_json: bool, quiet: bool) -
         print_record(record)
     if record["outcome"] == "no telemetry":
         raise GcsError(f"{source}: holds no telemetry of a Plumbline vehicle")
+    beside = [make_common(source, folder)] if common else []
+    beside += [make_mcap(source, folder)] if mcap else []
     if not as_json:
+        for path in beside:
+            click.echo(f"{path.name}: {path}")
         click.echo(f"report: {folder / 'report.html'}")

@@ -68,6 +68,12 @@ from gcs.shell.display import say
     type=click.Path(file_okay=False, path_type=Path),
     help="Where table and report go.  [default: sweeps/MISSION]",
 )
+@click.option(
+    "--reports",
+    is_flag=True,
+    help="Fly the flights that stand out again, each with a report: of each law the worst, the median and "
+    "the first that was lost.",
+)
 @click.option("--fresh", is_flag=True, help="Fly everything anew, also what has been flown already.")
 @require_options
 @json_option
@@ -86,6 +92,7 @@ def sweep_command(
     jobs: int | None,
     scheduler: str | None,
     out: Path | None,
+    reports: bool,
     fresh: bool,
     required: tuple[str, ...],
     junit: Path | None,
@@ -124,6 +131,7 @@ def sweep_command(
         jobs=jobs,
         scheduler=scheduler,
         out=out,
+        reports=reports,
         fresh=fresh,
         quiet=quiet or as_json,
         command=shlex.join(sys.argv),
@@ -136,6 +144,11 @@ def sweep_command(
         done = sweep.done
         pace = f", {done.flights_per_s:.1f} flights/s" if done.flown else ""
         say(f"{mission}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{pace}")
+        if not quiet:
+            for one in sweep.flights:
+                click.echo(
+                    f"{one['law']}, {one['kind']} (flight {one['index']}, {one['told']}): {one['command']}"
+                )
         click.echo(f"report: {sweep.page}")
     outcome = COMPLETED if sweep.done.whole else "interrupted"
     met = conclude(run, junit, outcome, sweep.done.wall_s, judge(requirements, sweep.record))

@@ -14,6 +14,7 @@ META_FILE = "meta.json"
 SUMMARY_FILE = "summary.json"
 PARQUET_FILE = "flight.parquet"
 PAGE_FILE = "report.html"
+MCAP_FILE = "flight.mcap"
 
 # steps done, steps in all, what is done next
 Progress = Callable[[int, int, str], None]
@@ -81,16 +82,33 @@ def build_report(
 
         from gcs.analysis.parquet import write_flight
         from gcs.report.html import render_page
+        from gcs.report.replay import replay_of
+        from gcs.report.settings import changed_settings
 
         # where the directory lies is no property of the flight
         about = {**meta.to_json(), "record": {k: v for k, v in record.items() if k != "report_dir"}}
         write_flight(out_dir / PARQUET_FILE, telemetry, samples, about)
         done(PARQUET_FILE)
+        replay = replay_of(telemetry, samples, meta)
         drawing.finish(lambda picture: done(picture.file))
-    page = render_page(record, meta, telemetry.texts, out_dir)
+    page = render_page(record, meta, replay, changed_settings(telemetry, meta), out_dir)
     (out_dir / PAGE_FILE).write_text(page, encoding="utf-8")
     done(PAGE_FILE)
     return record
+
+
+def build_mcap(tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None) -> Path:
+    """Writes flight.mcap from a log; returns its path."""
+    from gcs.analysis.mcap import Layout, write_mcap
+    from gcs.report.replay import layout_of
+
+    meta = load_meta(tlog_path.parent / META_FILE) if meta is None else meta
+    telemetry = load_telemetry(tlog_path)
+    layout = layout_of(meta.vehicle)
+    out_dir.mkdir(parents=True, exist_ok=True)
+    path = out_dir / MCAP_FILE
+    write_mcap(path, telemetry, samples_of(telemetry), Layout(layout["arm"], layout["load_radius"]))
+    return path
 
 
 def _write_json(path: Path, values: Record) -> None:

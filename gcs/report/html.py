@@ -1,45 +1,64 @@
-"""report.html: one page with everything in it, pictures included, that asks for nothing from elsewhere."""
+"""report.html: a flight as replay, plots, figures and texts; one file that asks for nothing elsewhere."""
 
 from __future__ import annotations
 
 import base64
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.definitions import GROUPS, HEADLINE, METRICS, Metric
 from gcs.analysis.record import FlightMeta, Record
-from gcs.analysis.tracks import StatusText
 from gcs.report.plots import PICTURES, headline
+from gcs.report.replay import Json
+from gcs.report.settings import Setting
+from gcs.web import PLOT_SCRIPTS, PLOT_STYLES, SCENE_SCRIPTS
+from gcs.web.page import render
 
-_TEMPLATE = "report.html"
 _MOODS = {"completed": "good", "diverged": "bad", "lost": "bad"}
-_LEVELS = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
+SCRIPTS = (
+    *PLOT_SCRIPTS,
+    *SCENE_SCRIPTS,
+    "charts.js",
+    "flight_data.js",
+    "transport.js",
+    "stage.js",
+    "plots.js",
+    "replay.js",
+)
+STYLES = (*PLOT_STYLES, "page.css", "charts.css", "transport.css", "stage.css")
 
 
-def render_page(record: Record, meta: FlightMeta, texts: tuple[StatusText, ...], directory: Path) -> str:
-    """The page, from the pictures that lie in `directory`."""
-    from jinja2 import Environment
-
-    # the template is ours, every value is not: escape them all
-    environment = Environment(autoescape=True, trim_blocks=False)
-    source = files("gcs.report").joinpath(_TEMPLATE).read_text(encoding="utf-8")
+def render_page(
+    record: Record, meta: FlightMeta, replay: Json, settings: list[Setting], directory: Path
+) -> str:
+    """The page of a flight; its still picture, for print, lies in `directory`."""
     outcome = str(record["outcome"])
-    return environment.from_string(source).render(
+    return render(
+        "gcs.report",
+        "report.html",
+        SCRIPTS,
+        STYLES,
+        replay,
         headline=headline(meta),
         outcome=outcome,
-        mood=_MOODS.get(outcome, "wait"),
+        mood=mood(outcome),
         reason=meta.reason,
         subtitle=_subtitle(record),
-        figures=_figures(record),
-        groups=[{"title": group.title, "rows": _rows(metrics, record)} for group, metrics in GROUPS],
-        settings=sorted(meta.settings.items()),
-        pictures=[_picture(directory, picture.file, picture.caption) for picture in PICTURES],
-        texts=[_text(text) for text in texts],
+        figures=_figures(record, replay),
+        groups=_groups(record),
+        settings=settings,
+        still=_picture(directory, PICTURES[0].file, PICTURES[0].caption),
+        said=bool(replay["texts"]),
+        steps=bool(replay["steps"]),
+        believed=replay["source"] == "estimate",
         command=meta.command,
         version=meta.version,
     )
+
+
+def mood(outcome: str) -> str:
+    """The style of an outcome: good, bad or wait."""
+    return _MOODS.get(outcome, "wait")
 
 
 def _subtitle(record: Record) -> str:
@@ -47,30 +66,37 @@ def _subtitle(record: Record) -> str:
     return " · ".join(f"{name} {record[name]}" for name in names if record[name] is not None)
 
 
-def _figures(record: Record) -> list[dict[str, str]]:
+def _figures(record: Record, replay: Json) -> list[Json]:
+    """The main figures; `time` is when the one that has a moment was measured."""
+    worst = replay["worst"]
     return [
-        {"label": label, "value": METRICS[name].read(record)}
+        {
+            "label": label,
+            "value": METRICS[name].read(record),
+            "time": worst["time"] if worst and name == "load_error_max_m" else None,
+        }
         for name, label in HEADLINE.items()
         if record[name] is not None
     ]
 
 
-def _rows(metrics: tuple[Metric, ...], record: Record) -> list[dict[str, str]]:
+def _groups(record: Record) -> list[dict[str, Any]]:
+    """The groups of figures, each with what is known; a group in which nothing happened is left out."""
     return [
-        {"label": metric.label, "value": metric.read(record), "definition": f"{metric.name}: {metric.text}"}
-        for metric in metrics
+        {"title": group.title, "rows": [_row(metric, record) for metric in metrics if _known(metric, record)]}
+        for group, metrics in GROUPS
+        if any(record[metric.name] for metric in metrics)
     ]
+
+
+def _known(metric: Metric, record: Record) -> bool:
+    return record[metric.name] is not None
+
+
+def _row(metric: Metric, record: Record) -> dict[str, str]:
+    definition = f"{metric.name}: {metric.text}"
+    return {"label": metric.label, "value": metric.read(record), "definition": definition}
 
 
 def _picture(directory: Path, file: str, caption: str) -> dict[str, str]:
     return {"caption": caption, "data": base64.b64encode((directory / file).read_bytes()).decode("ascii")}
-
-
-def _text(text: StatusText) -> dict[str, Any]:
-    known = 0 <= text.severity < len(_LEVELS)
-    return {
-        "time": f"{text.time_s:.2f} s",
-        "level": _LEVELS[text.severity] if known else str(text.severity),
-        "text": text.text,
-        "loud": text.severity <= mavlink.MAV_SEVERITY_WARNING,
-    }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import math
 from collections import Counter
-from importlib.resources import files
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -13,24 +12,27 @@ from typing import Any
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.parameter_table import Parameter, ParameterTable
+from gcs.analysis.axes import Floats
 from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
 from gcs.sweep.plots import draw_curve, draw_map
-from gcs.sweep.results import Flights, flights_of, reach
+from gcs.sweep.results import Flights, cells, flights_of, reach
+from gcs.sweep.standouts import FOLDER, Standout, base_command, command_of, stored_standouts
 from gcs.sweep.store import Store
+from gcs.web.page import render
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
 PAGE_FILE = "report.html"
 _TEMPLATE = "sweep.html"
 _MOST_PAIRS = 10
+_SCRIPTS = ("sweep.js",)
+_STYLES = ("page.css", "sweep.css")
 
 
 def write_report(directory: Path, plan: SweepPlan) -> Path:
     """Pictures and page from the flights that are stored; the page's path."""
-    from jinja2 import Environment
-
     laws = [flights for flights in flights_of(Store(directory, plan).read(), plan) if flights.outcome]
     tables = _tables(plan)
     units = {v.name: _parameter(tables, v.name).unit for v in plan.varied}
@@ -40,31 +42,75 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
         picture = directory / f"curve-{name.lower()}.png"
         draw_curve(picture, laws, plan, name, units)
         curves.append(_picture(picture, f"{name}: everything else thrown together"))
-    for first, second in list(combinations(names, 2))[:_MOST_PAIRS]:
+    for pair in list(combinations(names, 2))[:_MOST_PAIRS]:
         for flights in laws:
-            picture = directory / f"map-{flights.law}-{first.lower()}-{second.lower()}.png"
-            draw_map(picture, flights, plan, (first, second), units)
-            maps.append(_picture(picture, f"law {flights.law}, {first} and {second}"))
+            picture = directory / f"map-{flights.law}-{pair[0].lower()}-{pair[1].lower()}.png"
+            draw_map(picture, flights, plan, pair, units)
+            maps.append(_map(flights, plan, pair, units))
+    if len(names) == 1:
+        maps = [_map(flights, plan, (names[0],), units) for flights in laws]
     command, version = load_command(directory)
-    source = files("gcs.sweep").joinpath(_TEMPLATE).read_text(encoding="utf-8")
     page = directory / PAGE_FILE
-    text = (
-        Environment(autoescape=True)
-        .from_string(source)
-        .render(
-            title=plan.mission,
-            plan=plan,
-            command=command,
-            version=version,
-            flown=sum(len(flights.outcome) for flights in laws),
-            laws=[_law(flights) for flights in laws],
-            reaches=margins(plan, laws, tables),
-            curves=curves,
-            maps=maps,
-        )
+    text = render(
+        "gcs.sweep",
+        _TEMPLATE,
+        _SCRIPTS,
+        _STYLES,
+        {"base": base_command(plan), "maps": maps},
+        title=plan.mission,
+        plan=plan,
+        command=command,
+        version=version,
+        flown=sum(len(flights.outcome) for flights in laws),
+        laws=[_law(flights) for flights in laws],
+        standouts=[_shown(plan, one, directory) for one in stored_standouts(directory, plan)],
+        reaches=margins(plan, laws, tables),
+        curves=curves,
+        maps=maps,
     )
     page.write_text(text, encoding="utf-8")
     return page
+
+
+def _shown(plan: SweepPlan, flight: Standout, directory: Path) -> dict[str, Any]:
+    """A row of the page; `page` leads to the report, where it was flown again."""
+    page = f"{FOLDER}/{flight.name}/report.html"
+    return {
+        "flight": flight,
+        "command": command_of(plan, flight, directory),
+        "page": page if (directory / page).is_file() else None,
+    }
+
+
+def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[str, str]) -> dict[str, Any]:
+    """A map for `sweep.js`: cells in the order of the first parameter, then the second."""
+    found = cells(flights, plan, names)
+    rows = found.shown.ravel().tolist()
+    return {
+        "law": flights.law,
+        "names": names,
+        "units": [units[name] for name in names],
+        "axes": [axis.tolist() for axis in found.axes],
+        "flown": found.flown.ravel().tolist(),
+        "completed": _plain(100.0 * found.success.ravel()),
+        "median": _plain(1e3 * found.error_median_m.ravel()),
+        "worst": _plain(1e3 * found.error_worst_m.ravel()),
+        "varied": list(flights.values),
+        "shown": [_one(flights, row) if row >= 0 else None for row in rows],
+    }
+
+
+def _one(flights: Flights, row: int) -> dict[str, Any]:
+    return {
+        "index": int(flights.index[row]),
+        "seed": int(flights.seed[row]),
+        "outcome": flights.outcome[row],
+        "values": [repr(float(values[row])) for values in flights.values.values()],
+    }
+
+
+def _plain(values: Floats) -> list[float | None]:
+    return [float(f"{value:.5g}") if math.isfinite(value) else None for value in values]
 
 
 def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, ...]) -> list[dict[str, str]]:

@@ -30,6 +30,8 @@ class Flights:
     error_m: Floats  # (n,) greatest load error of the mission
     outcome: tuple[str, ...]
     lost_phase: tuple[str, ...]
+    index: NDArray[np.int64]  # (n,) of the sweep
+    seed: NDArray[np.int64]  # (n,)
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Cells:
     success: Floats  # share
     error_median_m: Floats  # of the flights that completed
     error_worst_m: Floats
+    shown: NDArray[np.intp]  # row of the flight that shows most: a lost one, else the worst; -1: none
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     outcome = np.array(table.column("outcome").to_pylist(), dtype=object)
     phase = np.array(table.column("lost_phase").to_pylist(), dtype=object)
     error = table.column("load_error_max_m").to_numpy()
+    index, seed = (table.column(column).to_numpy() for column in ("index", "seed"))
     found = []
     for name in plan.laws:
         rows = law == name
@@ -76,6 +80,8 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
                 error[rows],
                 tuple(outcome[rows].tolist()),
                 tuple(phase[rows].tolist()),
+                index[rows],
+                seed[rows],
             )
         )
     return found
@@ -105,15 +111,24 @@ def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
     flown = np.bincount(at, minlength=count).astype(float)
     done = np.bincount(at, weights=flights.completed.astype(float), minlength=count)
     median, worst = np.full(count, np.nan), np.full(count, np.nan)
-    for cell in np.unique(at[flights.completed]):
-        errors = flights.error_m[(at == cell) & flights.completed]
-        errors = errors[np.isfinite(errors)]
-        if len(errors):
+    shown = np.full(count, -1, dtype=np.intp)
+    for cell in np.unique(at):
+        rows = np.flatnonzero(at == cell)
+        rated = rows[flights.completed[rows] & np.isfinite(flights.error_m[rows])]
+        errors = flights.error_m[rated]
+        lost = rows[~flights.completed[rows]]
+        if len(rated):
             median[cell], worst[cell] = np.median(errors), errors.max()
+        shown[cell] = lost[0] if len(lost) else rated[np.argmax(errors)] if len(rated) else rows[0]
     with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
         success = np.where(flown > 0.0, done / flown, np.nan)
     return Cells(
-        axes, flown.reshape(shape), success.reshape(shape), median.reshape(shape), worst.reshape(shape)
+        axes,
+        flown.reshape(shape),
+        success.reshape(shape),
+        median.reshape(shape),
+        worst.reshape(shape),
+        shown.reshape(shape),
     )
 
 

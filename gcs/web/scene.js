@@ -106,12 +106,13 @@
     }
 
     /**
-     * Puts whole paths in place: arrays N, E, D, N, ...; `error` has one number (m) a point of `flown`.
+     * Puts whole paths in place: arrays N, E, D, N, ...; `error` has one number (m) a point of `flown`,
+     * which colours it; with `colour` (of CSS) all of it has that one.
      * @param id of the vehicle, where there are several
      */
     setTrack(track, id = 1) {
       const { flown, asked } = this.trackOf(id);
-      flown.set(track.flown || [], track.error || null);
+      flown.set(track.flown || [], track.error || null, track.colour || null);
       asked.set(track.asked || []);
       this.levelScale();
     }
@@ -252,8 +253,8 @@
       this.lastFollowed = now;
     }
 
-    /** Brings all paths and vehicles into the picture. */
-    fit() {
+    /** Brings all paths and vehicles into the picture, and `also`: places that nothing is drawn at yet. */
+    fit(also = []) {
       const box = { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] };
       const take = (place) => place.forEach((value, axis) => {
         box.low[axis] = Math.min(box.low[axis], value);
@@ -268,6 +269,7 @@
         take(vehicle.position);
         if (vehicle.load && vehicle.load.position) take(vehicle.load.position);
       }
+      also.forEach(take);
       if (!Number.isFinite(box.low[0])) return;
       const centre = box.low.map((low, axis) => 0.5 * (low + box.high[axis]));
       const radius = 0.5 * Math.hypot(...box.low.map((low, axis) => box.high[axis] - low)) + this.layout.armLength;

@@ -114,7 +114,7 @@
       this.shadows[1].visible = this.plumb.visible = this.load.visible;
       if (this.load.visible) {
         this.load.position.set(...load.position);
-        this.load.material.color.set(load.attached === false ? this.theme.loadFree : this.theme.load);
+        this.load.material.color.set(vehicle.colour || (load.attached === false ? this.theme.loadFree : this.theme.load));
         this.placeShadow(this.shadows[1], ...load.position, ground);
         const line = this.plumb.geometry.attributes.position;
         line.setXYZ(0, ...load.position);

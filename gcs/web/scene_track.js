@@ -86,6 +86,7 @@
       this.points = [];
       this.errors = [];
       this.full = LEAST_FULL; // m, the error at the upper end of the scale
+      this.only = null; // one colour for the whole path
       this.colour = new Float32Array(3);
     }
 
@@ -109,7 +110,10 @@
 
     append(index) {
       const error = this.errors[index];
-      if (Number.isFinite(error)) {
+      if (this.only !== null) {
+        const chosen = new THREE.Color(this.only).convertLinearToSRGB();
+        this.colour.set([chosen.r, chosen.g, chosen.b]);
+      } else if (Number.isFinite(error)) {
         Plumbline.sceneTheme.scaleColour(this.theme, error / this.full, this.colour, 0);
       } else {
         const grey = this.theme.asked;
@@ -125,8 +129,9 @@
       for (let index = 0; index < this.errors.length; index += 1) this.append(index);
     }
 
-    /** Puts a whole path in place; `points` is N, E, D, N, ... */
-    set(points, errors) {
+    /** Puts a whole path in place; `points` is N, E, D, N, ... With a colour, it is that of all points. */
+    set(points, errors, only = null) {
+      this.only = only;
       this.points = Array.from(points);
       this.errors = Array.from({ length: points.length / 3 }, (_, i) => (errors ? errors[i] : NaN));
       const most = this.errors.reduce((a, b) => (b > a ? b : a), 0);

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.wire.tlog import read_tlog
+from autopilot.wire.tlog import read_tlog, write_common
 from gcs.errors import GcsError
 from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
 
+COMMON_FILE = "flight.common.tlog"
 TLOG_FILE = "flight.tlog"  # in a directory of gcs fly or gcs capture
 
 
@@ -36,15 +37,43 @@ def make_report(
             raise GcsError(f"{error.filename or out}: {error.strerror}") from None
 
 
-def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, Path]:
-    """The report of a log, or of the directory that holds it, made again; the record and its directory."""
+def find_log(source: Path) -> Path:
+    """The log that is named, or that lies in the directory that is named."""
     tlog = source / TLOG_FILE if source.is_dir() else source
     if not tlog.is_file():
         raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
     if next(read_tlog(tlog), None) is None:
         raise GcsError(f"{tlog}: holds no telemetry; must be a .tlog, or a directory that holds {TLOG_FILE}")
+    return tlog
+
+
+def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, Path]:
+    """The report of a log, or of the directory that holds it, made again; the record and its directory."""
+    tlog = find_log(source)
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else tlog.with_suffix(""))
     return make_report(tlog, folder, None, quiet), folder
+
+
+def make_mcap(source: Path, folder: Path) -> Path:
+    """flight.mcap of a log, in the directory of its report."""
+    from gcs.report.build import ReportError, build_mcap
+
+    try:
+        return build_mcap(find_log(source), folder)
+    except ReportError as error:
+        raise GcsError(str(error)) from None
+    except OSError as error:
+        raise GcsError(f"{error.filename or folder}: {error.strerror}") from None
+
+
+def make_common(source: Path, folder: Path) -> Path:
+    """flight.common.tlog of a log: without the private dialect."""
+    path = folder / COMMON_FILE
+    try:
+        write_common(find_log(source), path)
+    except OSError as error:
+        raise GcsError(f"{error.filename or path}: {error.strerror}") from None
+    return path
 
 
 def print_record(record: Record) -> None:

@@ -10,11 +10,13 @@ from pathlib import Path
 from gcs.batch.pool import dask_cluster, own_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
+from gcs.shell.display import say
 from gcs.shell.stopping import StopRequest
-from gcs.sweep.plan import make_plan, read_varied
-from gcs.sweep.report import write_report
+from gcs.sweep.plan import SweepPlan, make_plan, read_varied
+from gcs.sweep.report import PAGE_FILE, write_report
 from gcs.sweep.run import Swept, sweep
-from gcs.workflows.flight_options import setting_of
+from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
+from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.warmup import warm_up
 
 STOPPING = "stopping; completed flights are stored, run the same command again to continue"
@@ -50,6 +52,7 @@ class SweepOptions:
     fresh: bool
     quiet: bool
     command: str  # as it was typed
+    reports: bool = False  # of the flights that stand out
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,7 @@ class Sweep:
     planned: int
     directory: Path
     page: Path
+    flights: tuple[dict[str, object], ...]  # those that stand out
 
     @property
     def exit_code(self) -> int:
@@ -79,6 +83,7 @@ class Sweep:
             "wall_s": round(self.done.wall_s, 3),
             "flights_per_s": round(self.done.flights_per_s, 2),
             "out": str(self.directory),
+            "standouts": list(self.flights),
         }
 
 
@@ -108,5 +113,51 @@ def run_sweep(options: SweepOptions) -> Sweep:
             options.fresh,
             partial(warm_up, quiet=options.quiet),
         )
+        found = stored_standouts(directory, plan)
+        if options.reports and not stop:
+            _fly_again(plan, found, directory, options.quiet)
         page = write_report(directory, plan)
-    return Sweep(done, plan.flights, directory, page)
+    flights = tuple(_told(plan, one, directory) for one in found)
+    return Sweep(done, plan.flights, directory, page, flights)
+
+
+def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quiet: bool) -> None:
+    """Each of the flights over the wire, with its report."""
+    from gcs.workflows.fly import fly
+
+    for one in found:
+        if not quiet:
+            say(f"{one.law}, {one.kind}: flying flight {one.index} again")
+        fly(
+            FlightOptions(
+                mission=plan.mission,
+                law=one.law,
+                sensors=plan.sensors,
+                vehicle=plan.vehicle,
+                seed=one.seed,
+                speed=None,
+                real_time=False,
+                out=directory / FOLDER / one.name,
+                settings=flight_settings(plan, one.varied),
+                connect=None,
+                quiet=True,
+                force=True,
+                overwrite=True,
+                limit_s=None,
+            ),
+            lambda record, outcome: None,
+        )
+
+
+def _told(plan: SweepPlan, one: Standout, directory: Path) -> dict[str, object]:
+    """As `gcs sweep --json` prints it."""
+    page = directory / FOLDER / one.name / PAGE_FILE
+    return {
+        "law": one.law,
+        "kind": one.kind,
+        "index": one.index,
+        "seed": one.seed,
+        "told": one.told,
+        "command": command_of(plan, one, directory),
+        "report": str(page) if page.is_file() else None,
+    }

@@ -91,6 +91,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "sitl.sensors.files",
         "sitl.vehicles",
     ),
+    "gcs.report.settings": (*GCS, "gcs", "sitl.vehicles"),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
     "plumbline": ("autopilot.vehicle.parameters", "autopilot.wire", "missions", "gcs"),

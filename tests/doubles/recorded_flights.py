@@ -77,6 +77,7 @@ class Flight:
     actual_v: np.ndarray
     estimated: np.ndarray
     q_cable: np.ndarray
+    distance: np.ndarray
     tension: np.ndarray
     slack_events: np.ndarray
     taut: np.ndarray
@@ -128,7 +129,7 @@ class Flight:
                     0.0,
                     0.0,
                     0.0,
-                    CABLE_M,
+                    self.distance[i],
                     self.tension[i],
                     int(self.slack_events[i]),
                     int(self.taut[i]),
@@ -258,6 +259,7 @@ def flight(duration_s: float, path: Path3, error: Path3 | None = None, altitude_
         actual_v=av,
         estimated=a.copy(),
         q_cable=np.tile((0.0, 0.0, -1.0), (n, 1)),
+        distance=np.full(n, CABLE_M),
         tension=np.where(held, LOAD_KG * GRAVITY, 0.0),
         slack_events=np.zeros(n, dtype=int),
         taut=held.astype(int),
@@ -316,6 +318,24 @@ def case_b(seed: int = 1, duration_s: float = 50.0) -> Flight:
         (BEFORE_S + duration_s, 6, "Mission complete"),
         (BEFORE_S + duration_s + 4.0, 6, "Disarmed"),
     ]
+    return made
+
+
+def delivery() -> Flight:
+    """A load that is let go in the middle of the mission; it lies there while the vehicle flies on."""
+    made = flight(10.0, still)
+    alone = np.flatnonzero(made.mission & (made.time_s > made.time_s[made.mission][0] + 4.0))[0]
+    vehicle = made.actual - made.distance[:, None] * made.q_cable
+    made.actual[alone:] = made.actual[alone] * (1.0, 1.0, 0.0)
+    made.actual_v[alone:] = 0.0
+    vehicle[alone:, 0] += np.linspace(0.0, 4.0, len(vehicle) - alone)
+    between = made.actual - vehicle
+    made.distance = np.linalg.norm(between, axis=1)
+    made.q_cable = between / made.distance[:, None]
+    made.tension[alone:] = 0.0
+    made.taut[alone:] = 0
+    made.control_mode[alone:] = mavlink.PLUMBLINE_CONTROL_QUAD_POSITION
+    made.texts.append((float(made.time_s[alone]), 6, "Load released"))
     return made
 
 

@@ -1,5 +1,7 @@
 """The files of a report."""
 
+import base64
+import hashlib
 import io
 import json
 import math
@@ -15,7 +17,7 @@ from PIL import Image
 from pyarrow import parquet
 from rich.console import Console
 
-from gcs.analysis.definitions import METRICS
+from gcs.analysis.definitions import GROUPS, METRICS
 from gcs.analysis.record import FlightMeta, jsonable
 from gcs.analysis.telemetry import load_telemetry
 from gcs.report import style
@@ -112,17 +114,20 @@ def test_pictures_show_something(built, file):
 
 
 class Page(HTMLParser):
-    """References, texts and unclosed elements of a page."""
+    """References, policies, texts and unclosed elements of a page; scripts apart."""
 
     VOID = frozenset(("meta", "img", "br", "link", "input", "hr"))
 
     def __init__(self):
         super().__init__()
-        self.references, self.open, self.text = [], [], []
+        self.references, self.policies, self.open, self.text, self.scripts = [], [], [], [], []
 
     def handle_starttag(self, tag, attributes):
         self.references += [v for k, v in attributes if k in ("src", "href", "srcset", "data", "action")]
-        assert tag not in ("script", "link", "iframe", "object")
+        assert not any(name.startswith("on") for name, _ in attributes)
+        assert tag not in ("link", "iframe", "object")
+        if ("http-equiv", "Content-Security-Policy") in attributes:
+            self.policies.append(dict(attributes)["content"])
         if tag not in self.VOID:
             self.open.append(tag)
 
@@ -130,7 +135,7 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        self.text.append(data)
+        (self.scripts if self.open and self.open[-1] == "script" else self.text).append(data)
 
 
 @pytest.fixture(scope="module")
@@ -140,23 +145,41 @@ def page(built):
     return parser
 
 
-def test_the_page_asks_for_nothing_from_elsewhere(built, page):
-    source = (built[0] / "report.html").read_text()
+def test_the_page_asks_for_nothing_from_elsewhere(page):
     assert page.open == []
-    assert len(page.references) == len(PICTURES)
-    assert all(reference.startswith("data:image/png;base64,") for reference in page.references)
-    without_data = re.sub(r"data:image/png;base64,[A-Za-z0-9+/=]+", "", source)
-    assert "url(" not in without_data
-    assert "@import" not in without_data
-    assert "://" not in without_data
+    assert len(page.references) == 1  # the still picture
+    assert page.references[0].startswith("data:image/png;base64,")
+    assert "url(" not in "".join(page.text)
+    assert "@import" not in "".join(page.text)
+    (policy,) = page.policies
+    assert "default-src 'none'" in policy
+
+
+def test_no_script_runs_but_those_that_the_policy_names(page):
+    (policy,) = page.policies
+    allowed = set(re.findall(r"'sha256-([^']+)'", policy))
+    ours = {base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in page.scripts[1:]}
+    assert ours == allowed  # the first one is data
+    assert "unsafe-inline" not in policy.split("script-src")[1]
+    assert "unsafe-eval" not in policy
 
 
 def test_the_page_says_what_matters_and_escapes_what_it_was_given(page):
     text = " ".join(page.text)
-    for part in (META.title, META.command, "completed", "SIM_WIND_E", "Rotor 2 at its limit <b>&amp;"):
+    for part in (META.title, META.command, "completed", "SIM_WIND_E"):
         assert part in text
-    for metric in METRICS.values():
-        assert metric.label in text
+    assert "<" not in page.scripts[0]
+    said = [one["text"] for one in json.loads(page.scripts[0])["texts"]]
+    assert "Rotor 2 at its limit <b>&amp;" in said
+
+
+def test_groups_in_which_nothing_happened_are_left_out(page, built):
+    text = " ".join(page.text)
+    for group, metrics in GROUPS:
+        known = [metric for metric in metrics if built[1][metric.name] is not None]
+        happened = any(built[1][metric.name] for metric in known)
+        assert (f"{group.title}" in text) == happened, group.title
+        assert all(metric.label in text for metric in known if happened)
 
 
 def test_parquet_has_units_phases_and_the_record(built):

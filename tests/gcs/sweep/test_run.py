@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -19,7 +20,9 @@ from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, flights_of, reach
+from gcs.sweep.standouts import command_of, stored_standouts
 from gcs.sweep.store import Store, columns
+from tests.doubles.browser import Browser
 from tests.gcs.sweep.conftest import AtOnce
 
 
@@ -135,6 +138,39 @@ def test_no_range_is_claimed_of_what_was_not_flown(
     assert "<td>0 … 4</td><td>0</td><td>0</td>" in page, "flown, all complete, all seeds complete"
 
 
+def test_flights_that_stand_out_are_those_of_the_table(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
+    plan, directory, _ = whole
+    rows = pq.read_table(directory / "flights.parquet").to_pylist()
+    completed = sorted((row["load_error_max_m"], row["index"]) for row in rows[:4])
+    found = {one.kind: one for one in stored_standouts(directory, plan)}
+    assert {kind: one.index for kind, one in found.items()} == {
+        "worst": completed[-1][1],
+        "median": completed[1][1],
+        "lost": 4,
+    }
+    words = shlex.split(command_of(plan, found["lost"], directory))
+    assert words[:3] == ["gcs", "fly", plan.mission]
+    assert words[words.index("--seed") + 1] == "1"
+    assert "SIM_ACT_DELAY_MS=60.0" in words
+
+
+def test_a_click_on_a_cell_gives_the_command_of_its_flight(
+    browser: Browser, whole: tuple[SweepPlan, Path, run.Swept]
+) -> None:
+    plan, directory, _ = whole
+    browser.open(write_report(directory, plan).as_uri(), 1280, 900)
+    browser.wait("document.documentElement.dataset.ready === '1'")
+    assert browser.run("return document.querySelectorAll('rect.cell').length") == 3
+    browser.find("rect.cell[data-cell='2']").click()
+    assert "SIM_ACT_DELAY_MS 60 ms: 2 flights, 0 % completed" in browser.find(".said").text
+    lost = next(one for one in stored_standouts(directory, plan) if one.kind == "lost")
+    whole_command = shlex.split(command_of(plan, lost, directory))
+    assert shlex.split(browser.find("#chosen code").text) == whole_command[: whole_command.index("--out")]
+    browser.listen()
+    assert browser.errors == []
+    assert [url for url in browser.requests if not url.startswith(("file:", "data:"))] == []
+
+
 def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
     arguments = [
         "sweep",
@@ -192,3 +228,31 @@ def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept],
     done = run.sweep(plan, tmp_path, "gcs sweep", cluster(), lambda: False, quiet=True, fresh=False)
     assert done.whole and done.flown == 6
     assert without_clock(tmp_path) == without_clock(complete)
+
+
+@pytest.mark.processes
+def test_flights_that_stand_out_are_the_same_when_they_are_flown_again(short: str, tmp_path: Path) -> None:
+    arguments = [
+        "sweep",
+        short,
+        "--vary",
+        "SIM_NOISE_SCALE=0.5,3.1415",
+        "--seeds",
+        "2",
+        "--set",
+        "SIM_WIND_E=0.7",
+    ]
+    result = CliRunner().invoke(
+        gcs, [*arguments, "--reports", "--out", str(tmp_path), "--json"], prog_name="gcs"
+    )
+    assert result.exit_code == 0, result.output
+    rows = {row["index"]: row for row in pq.read_table(tmp_path / "flights.parquet").to_pylist()}
+    found = json.loads(result.stdout)["standouts"]
+    assert [one["kind"] for one in found] == ["worst", "median"]
+    for one in found:
+        record = json.loads((Path(one["report"]).parent / "summary.json").read_text())
+        assert record["seed"] == one["seed"]
+        # the sweep looks at every tick, the report at 125 samples a second
+        assert record["load_error_max_m"] == pytest.approx(rows[one["index"]]["load_error_max_m"], rel=2e-3)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert 'href="flights/plumbline-worst/report.html"' in page

@@ -1,0 +1,56 @@
+"""What a log says of what was asked of the vehicle: the mission that was uploaded, and parameters."""
+
+from __future__ import annotations
+
+import math
+
+from autopilot.wire.codec import Received
+from autopilot.wire.convert import Home
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items.records import WireItem
+from autopilot.wire.parameter_encoding import from_the_wire
+
+VEHICLE_SYSTEM = 1
+ASKED = (
+    mavlink.MAVLINK_MSG_ID_MISSION_COUNT,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+    mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+)
+
+
+class Asked:
+    """Collects messages of the kinds `ASKED` from all who speak, in their order."""
+
+    def __init__(self) -> None:
+        self.parameters: dict[str, float] = {}
+        self.home = Home()  # which the items' places are relative to
+        self._items: dict[int, WireItem] = {}
+        self._count = 0
+
+    def take(self, received: Received) -> None:
+        """Take one message in; what is not of our vehicle, or no number, is passed over."""
+        message = received.message
+        if received.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
+            value = from_the_wire(message.param_value, message.param_type)
+            if received.system == VEHICLE_SYSTEM and math.isfinite(value):
+                self.parameters[message.param_id] = value
+        elif received.id == mavlink.MAVLINK_MSG_ID_HOME_POSITION:
+            if received.system == VEHICLE_SYSTEM:
+                self.home = Home(1e-7 * message.latitude, 1e-7 * message.longitude, 1e-3 * message.altitude)
+        elif message.mission_type == mavlink.MAV_MISSION_TYPE_MISSION:
+            self._take_mission(received)
+
+    def _take_mission(self, received: Received) -> None:
+        message = received.message
+        if received.id == mavlink.MAVLINK_MSG_ID_MISSION_COUNT:
+            self._items, self._count = {}, message.count
+        elif message.seq < self._count:
+            self._items[message.seq] = WireItem(*(getattr(message, name) for name in WireItem._fields))
+
+    @property
+    def mission(self) -> tuple[WireItem, ...]:
+        """The items of the last transfer, upload or download; none unless all are there."""
+        if len(self._items) != self._count:
+            return ()
+        return tuple(self._items[seq] for seq in range(self._count))

@@ -1,0 +1,245 @@
+"""flight.mcap: the flight for Foxglove, PlotJuggler and Rerun, as protobuf in Foxglove's schemas and ours.
+
+| topic | schema | what |
+|---|---|---|
+| /flight | plumbline.Flight | the columns of flight.parquet as fields, at each sample |
+| /tf | foxglove.FrameTransforms | vehicle and load in world |
+| /scene | foxglove.SceneUpdate | vehicle, load and paths at the begin; the cable until the load is let go |
+| /load/flown, /load/asked | foxglove.PosesInFrame | the paths, at the begin |
+| /texts | foxglove.Log | what the vehicle said |
+
+World ENU, body FLU, SI. Times count from boot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gcs.analysis.axes import Floats
+from gcs.analysis.parquet import flight_columns
+from gcs.analysis.samples import PHASE_NAMES, Samples
+from gcs.analysis.tracks import Telemetry
+from gcs.errors import GcsError
+
+_WORLD, _VEHICLE, _LOAD = "world", "vehicle", "load"
+_EVERY_S = 0.04  # of the cable
+_MOST_POINTS = 4000  # of a path
+_NANO = 1e9
+# colours as red, green, blue, alpha
+_DARK, _AMBER, _BLUE, _GREY = (
+    (0.2, 0.25, 0.3, 1.0),
+    (0.85, 0.6, 0.0, 1.0),
+    (0.0, 0.45, 0.7, 1.0),
+    (0.6, 0.6, 0.6, 1.0),
+)
+_LEVELS = (5, 5, 5, 4, 3, 2, 2, 1)  # of foxglove.Log by MAV_SEVERITY: fatal, error, warning, info, debug
+
+
+class Layout(NamedTuple):
+    """Sizes of what is drawn, m."""
+
+    arm_m: float
+    load_radius_m: float
+
+
+def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layout) -> None:
+    """Write the file; GcsError where the libraries are not installed."""
+    try:
+        from mcap_protobuf.writer import Writer
+    except ImportError:
+        raise GcsError("flight.mcap needs more libraries: pip install 'plumbline[mcap]'") from None
+    with path.open("wb") as file, Writer(file) as log:
+        messages = sorted(_messages(telemetry, samples, layout), key=lambda one: one[0])
+        for time_s, topic, message in messages:
+            ns = round(time_s * _NANO)
+            log.write_message(topic, message, ns, ns)
+
+
+def _messages(telemetry: Telemetry, samples: Samples, layout: Layout) -> Iterator[tuple[float, str, Any]]:
+    """(time, topic, message) of all, in no order."""
+    known = np.isfinite(samples.actual_m).all(axis=1) & np.isfinite(samples.vehicle_m).all(axis=1)
+    if known.any():
+        begin_s = float(samples.time_s[known][0])
+        yield begin_s, "/scene", _bodies(layout, begin_s, samples, known)
+        yield from _paths(samples, begin_s, known)
+        yield from _transforms(samples, known)
+        yield from _cable(samples, known)
+    yield from _columns(telemetry, samples)
+    yield from _texts(telemetry)
+
+
+def _columns(telemetry: Telemetry, samples: Samples) -> Iterator[tuple[float, str, Any]]:
+    """One message a sample; NaN where something is not known."""
+    columns = flight_columns(telemetry, samples)
+    flight = _flight_class(columns)
+    times = columns["time_s"]
+    values = {name: array.tolist() for name, array in columns.items() if name != "time_s"}
+    for i, time_s in enumerate(times.tolist()):
+        message = flight(phase=PHASE_NAMES.get(int(samples.phase[i]), ""))
+        _stamp(message.timestamp, time_s)
+        for name, column in values.items():
+            setattr(message, name, float(column[i]))
+        yield time_s, "/flight", message
+
+
+def _flight_class(columns: dict[str, Any]) -> Any:
+    """The class of a message with a double for each column."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+
+    file = descriptor_pb2.FileDescriptorProto(
+        name="plumbline/Flight.proto",
+        package="plumbline",
+        syntax="proto3",
+        dependency=[timestamp_pb2.DESCRIPTOR.name],
+    )
+    message = file.message_type.add(name="Flight")
+    kinds = descriptor_pb2.FieldDescriptorProto
+    optional = kinds.LABEL_OPTIONAL
+    stamp = ".google.protobuf.Timestamp"
+    message.field.add(name="timestamp", number=1, type=kinds.TYPE_MESSAGE, type_name=stamp, label=optional)
+    message.field.add(name="phase", number=2, type=kinds.TYPE_STRING, label=optional)
+    for number, name in enumerate((name for name in columns if name != "time_s"), start=3):
+        message.field.add(name=name, number=number, type=kinds.TYPE_DOUBLE, label=optional)
+    pool = descriptor_pool.DescriptorPool()
+    pool.AddSerializedFile(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName("plumbline.Flight"))
+
+
+def _transforms(samples: Samples, known: Any) -> Iterator[tuple[float, str, Any]]:
+    from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+
+    for i in np.flatnonzero(known).tolist():
+        time_s = float(samples.time_s[i])
+        found = FrameTransforms()
+        for frame, place, turn in (
+            (_VEHICLE, samples.vehicle_m[i], samples.quat_wxyz[i]),
+            (_LOAD, samples.actual_m[i], (1.0, 0.0, 0.0, 0.0)),
+        ):
+            one = found.transforms.add(parent_frame_id=_WORLD, child_frame_id=frame)
+            _stamp(one.timestamp, time_s)
+            _put(one.translation, place)
+            _turn(one.rotation, turn)
+        yield time_s, "/tf", found
+
+
+def _paths(samples: Samples, begin_s: float, known: Any) -> Iterator[tuple[float, str, Any]]:
+    from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
+
+    for topic, places in (
+        ("/load/flown", samples.actual_m[known & samples.attached]),
+        ("/load/asked", samples.asked_m[np.isfinite(samples.asked_m).all(axis=1)]),
+    ):
+        poses = PosesInFrame(frame_id=_WORLD)
+        _stamp(poses.timestamp, begin_s)
+        for place in _thinned(places):
+            pose = poses.poses.add()
+            _put(pose.position, place)
+            pose.orientation.w = 1.0
+        yield begin_s, topic, poses
+
+
+def _bodies(layout: Layout, begin_s: float, samples: Samples, known: Any) -> Any:
+    """What stays in its frame: vehicle, load and the paths."""
+    from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+    from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+
+    update = SceneUpdate()
+    vehicle = _entity(update, begin_s, _VEHICLE, _VEHICLE)
+    for size in ((2.0 * layout.arm_m, 0.02, 0.02), (0.02, 2.0 * layout.arm_m, 0.02)):
+        cube = vehicle.cubes.add()
+        cube.pose.orientation.w = 1.0
+        _put(cube.size, size)
+        _paint(cube.color, _DARK)
+    for x, y in ((-1.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0)):  # rotors 1 ... 4
+        disc = vehicle.cylinders.add(bottom_scale=1.0, top_scale=1.0)
+        _put(disc.pose.position, (x * layout.arm_m, y * layout.arm_m, 0.03))
+        disc.pose.orientation.w = 1.0
+        _put(disc.size, (1.2 * layout.arm_m, 1.2 * layout.arm_m, 0.005))
+        _paint(disc.color, (*_BLUE[:3], 0.4))
+    ball = _entity(update, begin_s, _LOAD, _LOAD).spheres.add()
+    ball.pose.orientation.w = 1.0
+    _put(ball.size, (2.0 * layout.load_radius_m,) * 3)
+    _paint(ball.color, _AMBER)
+    for name, places, colour in (
+        ("flown", samples.actual_m[known & samples.attached], _BLUE),
+        ("asked", samples.asked_m[np.isfinite(samples.asked_m).all(axis=1)], _GREY),
+    ):
+        line = _entity(update, begin_s, name, _WORLD).lines.add(type=LinePrimitive.LINE_STRIP, thickness=0.01)
+        line.pose.orientation.w = 1.0
+        _paint(line.color, colour)
+        for place in _thinned(places):
+            _put(line.points.add(), place)
+    return update
+
+
+def _cable(samples: Samples, known: Any) -> Iterator[tuple[float, str, Any]]:
+    """Where it hangs, some times a second; taken away where the load is let go."""
+    from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+    from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+
+    last_s, drawn = -math.inf, False
+    for i in np.flatnonzero(known).tolist():
+        time_s = float(samples.time_s[i])
+        update = SceneUpdate()
+        if not samples.attached[i]:
+            if drawn:
+                _stamp(update.deletions.add(id="cable").timestamp, time_s)
+                drawn = False
+                yield time_s, "/scene", update
+            continue
+        if time_s - last_s < _EVERY_S:
+            continue
+        line = _entity(update, time_s, "cable", _WORLD).lines.add(
+            type=LinePrimitive.LINE_STRIP, thickness=0.005
+        )
+        line.pose.orientation.w = 1.0
+        _paint(line.color, _DARK)
+        for place in (samples.vehicle_m[i], samples.actual_m[i]):
+            _put(line.points.add(), place)
+        last_s, drawn = time_s, True
+        yield time_s, "/scene", update
+
+
+def _texts(telemetry: Telemetry) -> Iterator[tuple[float, str, Any]]:
+    from foxglove_schemas_protobuf.Log_pb2 import Log
+
+    for text in telemetry.texts:
+        time_s = max(text.time_s, 0.0)
+        level: Any = _LEVELS[text.severity] if 0 <= text.severity < len(_LEVELS) else 0
+        message = Log(level=level, message=text.text, name="vehicle")
+        _stamp(message.timestamp, time_s)
+        yield time_s, "/texts", message
+
+
+def _entity(update: Any, time_s: float, name: str, frame: str) -> Any:
+    entity = update.entities.add(id=name, frame_id=frame, frame_locked=True)
+    _stamp(entity.timestamp, time_s)
+    return entity
+
+
+def _stamp(timestamp: Any, time_s: float) -> None:
+    timestamp.FromNanoseconds(round(time_s * _NANO))
+
+
+def _put(vector: Any, place: Any) -> None:
+    vector.x, vector.y, vector.z = map(float, place)
+
+
+def _turn(quaternion: Any, wxyz: Any) -> None:
+    finite = bool(np.isfinite(wxyz).all())
+    values = map(float, wxyz) if finite else (1.0, 0.0, 0.0, 0.0)
+    quaternion.w, quaternion.x, quaternion.y, quaternion.z = values
+
+
+def _paint(colour: Any, rgba: tuple[float, float, float, float]) -> None:
+    colour.r, colour.g, colour.b, colour.a = rgba
+
+
+def _thinned(places: Floats) -> Floats:
+    return places[:: max(1, -(-len(places) // _MOST_POINTS))]

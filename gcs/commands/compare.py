@@ -1,0 +1,45 @@
+"""gcs compare"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from gcs.commands.options import json_option, print_json
+
+
+@click.command("compare")
+@click.argument("runs", metavar="RUN RUN ...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The page.  [default: comparisons/RUN-RUN.html]",
+)
+@json_option
+@click.option("--quiet", is_flag=True, help="No table.")
+def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, quiet: bool) -> None:
+    """Compare flights: figures, settings, tracks and errors.
+
+    RUN is the output of gcs fly or gcs capture, or any telemetry log of a Plumbline vehicle. The figures
+    stand beside each other, the best of each marked, with what differed in mission, law, sensors, seed and
+    parameters; the page lays tracks and errors over each other.
+
+    \b
+    gcs compare flights/plumbline flights/thesis
+    gcs compare flights/* --json
+    """
+    from gcs.workflows.compare import compare
+
+    found, page = compare(runs, out)
+
+    from gcs.report.compare import comparison, comparison_table
+
+    if as_json:
+        print_json(comparison(found))
+        return
+    if not quiet:
+        from rich.console import Console
+
+        Console().print(comparison_table(found))
+    click.echo(f"comparison: {page}")

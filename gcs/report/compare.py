@@ -1,0 +1,205 @@
+"""Several flights beside each other: what differed, figures with the best marked, tracks over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gcs.analysis.definitions import GROUPS, UNKNOWN, Group, Metric
+from gcs.analysis.record import FlightMeta, Record, flight_record
+from gcs.analysis.samples import AIRBORNE, MISSION, Samples, samples_of
+from gcs.analysis.telemetry import load_telemetry
+from gcs.analysis.tracks import Telemetry
+from gcs.report.html import mood
+from gcs.report.replay import Json, replay_of
+from gcs.report.settings import changed_settings
+from gcs.report.steps import step_texts
+from gcs.web import PLOT_SCRIPTS, PLOT_STYLES, SCENE_SCRIPTS
+from gcs.web.page import render
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_WAYS = ("mission", "law", "sensors", "vehicle", "seed")  # keys of the record that say how it was flown
+_CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
+_DRAWN = {"load", "vehicle", "asked", "quat", "cable", "tension", "rotor", "taut", "attached", "scored"}
+SCRIPTS = (
+    *PLOT_SCRIPTS,
+    *SCENE_SCRIPTS,
+    "charts.js",
+    "flight_data.js",
+    "transport.js",
+    "stage.js",
+    "compare.js",
+)
+STYLES = (*PLOT_STYLES, "page.css", "charts.css", "transport.css", "stage.css")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One of the flights."""
+
+    name: str
+    meta: FlightMeta
+    telemetry: Telemetry
+    samples: Samples
+    record: Record
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Something that was not the same: a value for each run."""
+
+    name: str
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of each run as people read it, and which runs have the best; none if all are equal."""
+
+    metric: Metric
+    values: tuple[str, ...]
+    best: tuple[int, ...]
+
+
+def load_run(name: str, tlog: Path, meta: FlightMeta) -> Run:
+    """A flight from its log."""
+    telemetry = load_telemetry(tlog)
+    samples = samples_of(telemetry)
+    return Run(name, meta, telemetry, samples, flight_record(telemetry, meta, samples))
+
+
+def differences(runs: Sequence[Run]) -> list[Difference]:
+    """What is known of how they were flown and is not the same in all."""
+    rows: dict[str, list[str]] = {name: [_shown(run.record[name]) for run in runs] for name in _WAYS}
+    settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
+    unnamed = ["default" if run.meta.command or run.telemetry.parameters else UNKNOWN for run in runs]
+    for name in sorted(set().union(*settings)):
+        rows[name] = [found.get(name, other) for found, other in zip(settings, unnamed, strict=True)]
+    rows["mission items"] = [_steps(run) for run in runs]
+    rows["version"] = [_shown(run.meta.version) for run in runs]
+    return [Difference(name, tuple(values)) for name, values in rows.items() if len(set(values)) > 1]
+
+
+def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
+    """The figures group by group; those of which nothing is known, or that say how it was flown, left out."""
+    found = []
+    for group, metrics in GROUPS:
+        rows = [
+            Figure(metric, tuple(metric.read(run.record) for run in runs), _best(metric, runs))
+            for metric in metrics
+            if metric.name not in _WAYS and any(run.record[metric.name] for run in runs)
+        ]
+        if rows:
+            found.append((group, rows))
+    return found
+
+
+def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
+    """Which runs have the best value as it is read; of flights that were completed, if there are any."""
+    completed = [i for i, run in enumerate(runs) if run.record["outcome"] == "completed"]
+    rated = [i for i in completed or range(len(runs)) if runs[i].record[metric.name] is not None]
+    read = {i: metric.read(runs[i].record) for i in rated}
+    if metric.better is None or metric.name in _CLOCK or len(set(read.values())) < 2:
+        return ()
+    choose = min if metric.better == "less" else max
+    best = read[choose(rated, key=lambda i: runs[i].record[metric.name])]
+    return tuple(i for i in rated if read[i] == best)
+
+
+def comparison(runs: Sequence[Run]) -> Json:
+    """As `gcs compare --json` prints it; `best` has the places of the best runs, from 0."""
+    return {
+        "runs": [
+            {"name": run.name, **{k: v for k, v in run.record.items() if k != "report_dir"}} for run in runs
+        ],
+        "differences": {one.name: list(one.values) for one in differences(runs)},
+        "best": {row.metric.name: list(row.best) for _, rows in figures(runs) for row in rows if row.best},
+    }
+
+
+def comparison_table(runs: Sequence[Run]) -> Table:
+    """For the terminal: differences first, then the figures, a star at the best."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("")
+    for run in runs:
+        table.add_column(Text(run.name), justify="right", overflow="fold")
+    different = differences(runs)
+    for one in different:
+        cells = [Text(_brief(value)) for value in one.values]
+        table.add_row(Text(one.name), *cells, end_section=one is different[-1])
+    for group, rows in figures(runs):
+        table.add_row(Text(group.title, style="bold"))
+        for row in rows:
+            cells = [_cell(value, i in row.best) for i, value in enumerate(row.values)]
+            table.add_row(f"  {row.metric.label}", *cells, end_section=row is rows[-1])
+    return table
+
+
+def _cell(value: str, best: bool) -> Any:
+    from rich.text import Text
+
+    return Text(f"* {value}", style="bold green") if best else Text(value)
+
+
+def comparison_page(runs: Sequence[Run]) -> str:
+    """The page: tables, tracks over each other, errors over each other."""
+    what, times = begins(runs)
+    return render(
+        "gcs.report",
+        "compare.html",
+        SCRIPTS,
+        STYLES,
+        [_embedded(run, time) for run, time in zip(runs, times, strict=True)],
+        begun=what,
+        runs=[{"name": run.name, **_told(run)} for run in runs],
+        differences=differences(runs),
+        groups=[(group.title, rows) for group, rows in figures(runs)],
+    )
+
+
+def _told(run: Run) -> dict[str, str]:
+    outcome = str(run.record["outcome"])
+    return {"outcome": outcome, "mood": mood(outcome), "reason": run.meta.reason or ""}
+
+
+def _embedded(run: Run, begin_s: float) -> Json:
+    """The flight, and its time at which the flights are laid over each other."""
+    replay = replay_of(run.telemetry, run.samples, run.meta, _DRAWN)
+    return {**replay, "name": run.name, "begin": begin_s}
+
+
+def begins(runs: Sequence[Run]) -> tuple[str, list[float]]:
+    """Of what all have begun last (the mission, the flight, the log) its name, and when each began it."""
+    for name, phases in (("mission", (MISSION,)), ("flight", AIRBORNE)):
+        found = [_first(run, phases) for run in runs]
+        if all(time is not None for time in found):
+            return name, [time for time in found if time is not None]
+    return "log", [(run.telemetry.span_s or (0.0, 0.0))[0] for run in runs]
+
+
+def _first(run: Run, phases: tuple[int, ...]) -> float | None:
+    setpoint = run.telemetry.setpoint
+    times = setpoint.time_s[np.isin(setpoint.phase, phases)]
+    return float(times[0]) if len(times) else None
+
+
+def _steps(run: Run) -> str:
+    return "; ".join(step.text for step in step_texts(run.telemetry.mission, run.telemetry.home)) or UNKNOWN
+
+
+def _brief(text: str, most: int = 60) -> str:
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def _shown(value: Any) -> str:
+    return UNKNOWN if value is None else str(value)

@@ -1,0 +1,69 @@
+"""Columns of numbers as short text for a page: whole steps, differences of differences, deflate, base64.
+
+`gcs/web/flight_data.js` is the other end. A flight at 125 Hz takes about a byte a number.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+import zlib
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcs.analysis.axes import Floats
+
+_MOST = float(2**30)  # steps from zero: whole numbers of 32 bits
+_BEYOND = 1e6  # such numbers are of a flight that is lost: none
+_LEVEL = 6
+
+
+class Column(NamedTuple):
+    """n numbers, NaN where there is none, and the step to whose multiples they are rounded."""
+
+    name: str
+    values: Floats
+    step: float
+
+
+def pack(columns: list[Column], count: int) -> dict[str, Any]:
+    """JSON values: `count`, of each column its `name`, `step` and `gaps` ([first, last + 1] of each stretch
+    of NaN), and `data`. Columns of NaN alone are left out."""
+    meant = [column._replace(values=_meant(column.values)) for column in columns]
+    known = [column for column in meant if np.isfinite(column.values).any()]
+    described, planes = [], []
+    for name, values, least in known:
+        finite = np.isfinite(values)
+        step = _step(values[finite], least)
+        described.append({"name": name, "step": step, "gaps": _gaps(finite)})
+        whole = np.rint(_filled(values, finite) / step).astype(np.int32)
+        twice = np.diff(np.diff(whole, prepend=np.int32(0)), prepend=np.int32(0))
+        # bytes of one weight lie together: most of the upper ones are equal
+        planes.append(twice.astype("<i4").view(np.uint8).reshape(-1, 4).T.tobytes())
+    squeezed = zlib.compress(b"".join(planes), _LEVEL, wbits=-zlib.MAX_WBITS)
+    return {"count": count, "columns": described, "data": base64.b64encode(squeezed).decode("ascii")}
+
+
+def _meant(values: Floats) -> Floats:
+    return np.where(np.abs(values) < _BEYOND, values, np.nan)
+
+
+def _step(finite: Floats, least: float) -> float:
+    """`least`, or so much more that the greatest number fits."""
+    greatest = float(np.abs(finite).max())
+    if greatest <= least * _MOST:
+        return least
+    return float(10.0 ** math.ceil(math.log10(greatest / _MOST)))
+
+
+def _filled(values: Floats, finite: NDArray[np.bool_]) -> Floats:
+    """The last number that is known in place of each that is not: no jumps to be stored."""
+    index = np.maximum.accumulate(np.where(finite, np.arange(len(values)), int(np.argmax(finite))))
+    return values[index]
+
+
+def _gaps(finite: NDArray[np.bool_]) -> list[list[int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], finite, [True])).astype(np.int8)))
+    return [[int(a), int(b)] for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,54 @@
+"""Parameters of a flight that differ from what the vehicle is delivered with."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.vehicle.file import VehicleFileError
+from autopilot.wire.parameter_table import ParameterTable
+from gcs.analysis.record import FlightMeta
+from gcs.analysis.tracks import Telemetry
+
+_USUAL = "bebop"
+
+
+class Setting(NamedTuple):
+    """A parameter as people read it; `default` is None where it is not known."""
+
+    name: str
+    value: str
+    default: str | None
+
+
+def changed_settings(telemetry: Telemetry, meta: FlightMeta) -> list[Setting]:
+    """What was set on the command line, and what the vehicle said that is not the default."""
+    told = {**telemetry.parameters, **meta.settings}
+    tables = _tables(meta.vehicle or _USUAL) if told else ()
+    found = []
+    for name, value in sorted(told.items()):
+        default = next((table.describe(name).default for table in tables if name in table), None)
+        if name not in meta.settings and (default is None or _same(value, default)):
+            continue
+        found.append(Setting(name, _number(value), None if default is None else _number(default)))
+    return found
+
+
+def _tables(vehicle: str) -> tuple[ParameterTable, ...]:
+    from autopilot.vehicle.file import load_vehicle
+    from autopilot.vehicle.parameters import autopilot_parameters
+    from sitl.vehicles.sim_parameters import sim_parameters
+    from sitl.vehicles.truth import load_truth
+
+    try:
+        return sim_parameters(load_truth(vehicle)), autopilot_parameters(load_vehicle(vehicle))
+    except (VehicleFileError, OSError):
+        return ()
+
+
+def _same(value: float | str, default: float) -> bool:
+    """Equal but for the rounding of a single-precision number on the wire."""
+    return isinstance(value, str) or abs(value - default) <= 1e-6 * max(abs(default), 1e-6)
+
+
+def _number(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"

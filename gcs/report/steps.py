@@ -1,0 +1,101 @@
+"""What a mission asks, in words: a line for each step, from the items that were uploaded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from autopilot.wire.convert import Home
+from autopilot.wire.items import MissionItemError, WireItem, located_steps
+from gcs.formats.items import command_name
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    Release,
+    ReturnHome,
+    Signals,
+    Speed,
+    Step,
+    Takeoff,
+    Term,
+    Waypoint,
+    Winch,
+)
+
+_MOST_TERMS = 3  # of a signal that are written out
+
+
+class StepText(NamedTuple):
+    """A step in words, and the items that it was made of, both included."""
+
+    first: int
+    last: int
+    text: str
+
+
+def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
+    """The steps in the order in which they are flown; items that cannot be flown by their command's name."""
+    try:
+        found = located_steps(items, home)
+    except MissionItemError:
+        return [StepText(seq, seq, command_name(item.command)) for seq, item in enumerate(items)]
+    texts, alone = [], False
+    for first, last, step in found:
+        texts.append(StepText(first, last, describe(step, alone)))
+        alone = alone or isinstance(step, Release)
+    return texts
+
+
+def describe(step: Step, alone: bool) -> str:
+    """One step as a sentence without a full stop; `alone`: the vehicle has let the load go."""
+    match step:
+        case Takeoff():
+            return f"Take off{'' if alone else ', lift the load'} to {_m(step.altitude_m)}"
+        case Waypoint():
+            place = f"{_m(step.east_m)} east, {_m(step.north_m)} north, {_m(step.altitude_m)} up"
+            held = f", hold for {step.hold_s:g} s" if step.hold_s > 0.0 else ""
+            return f"{'Fly' if alone else 'Carry the load'} to {place}{held}"
+        case Speed():
+            return f"From here on at most {step.speed_m_s:g} m/s"
+        case Delay():
+            return f"Hold for {step.duration_s:g} s"
+        case ReturnHome():
+            return "Return to home"
+        case Land():
+            return "Land" if alone else "Set the load down and land"
+        case Release():
+            return "Release the load"
+        case Winch():
+            pace = "" if step.speed_m_s is None else f" at {step.speed_m_s:g} m/s"
+            return f"Make the cable {_m(abs(step.length_m))} {_longer(step.length_m)}{pace}"
+        case Signals():
+            return f"Fly signals for {step.duration_s:g} s: {_terms(step.terms)}"
+        case AttitudeRun():
+            return _swing(step)
+
+
+def _terms(terms: Sequence[Term]) -> str:
+    named = [_term(term) for term in terms[:_MOST_TERMS]]
+    more = len(terms) - len(named)
+    return "; ".join([*named, *([f"and {more} more"] if more else [])])
+
+
+def _term(term: Term) -> str:
+    sines = "".join(f" × sine of {factor.period_s:g} s" for factor in term.factors)
+    return f"{_m(term.amplitude_m)} along {term.axis}{sines}"
+
+
+def _swing(step: AttitudeRun) -> str:
+    what = "cable" if step.controlled == "load" else "vehicle"
+    tilt = math.degrees(math.hypot(step.tilt_north_rad, step.tilt_east_rad))
+    return f"Lean the {what} by {tilt:.3g}° and back within {step.duration_s:g} s"
+
+
+def _longer(length_m: float) -> str:
+    return "longer" if length_m > 0.0 else "shorter"
+
+
+def _m(value: float) -> str:
+    return f"{round(value, 2) + 0.0:g} m"

@@ -1,0 +1,88 @@
+/* Which plots a flight has: Plumbline.plotsOf(flight) gives options of Plumbline.Chart, those without data left out. */
+(function () {
+  "use strict";
+  const Plumbline = (window.Plumbline = window.Plumbline || {});
+  const AXES = ["x", "y", "z"];
+  const METRE = 1; // errors from here on are shown in metres
+
+  const greatest = (vector) => {
+    let most = 0;
+    for (const values of vector) for (const value of values) if (Math.abs(value) > most) most = Math.abs(value);
+    return most;
+  };
+  const scaled = (vector, factor) => vector && vector.map((values) => values.map((value) => factor * value));
+  const columns = (flight, name, parts) => {
+    const found = parts.map((part) => flight.column(`${name}_${part}`));
+    return found.some((values) => values === null) ? null : found;
+  };
+  const lines = (names, vector, more) => (vector || []).map((values, i) => Object.assign({ name: names[i], values, color: i }, more));
+
+  /** Options of a plot of lengths that are small in a good flight: millimetres, or metres. */
+  function lengths(title, vector, names, digits, norm) {
+    if (!vector) return null;
+    const large = greatest(vector) >= METRE, factor = large ? 1 : 1000;
+    const series = lines(names, scaled(vector, factor));
+    if (norm) series.unshift({ name: "distance", values: norm.map((value) => factor * value), color: "ink", width: 2 });
+    return { title, unit: large ? "m" : "mm", series, digits: large ? 3 : digits, least: large ? 0.1 : 1, zero: true };
+  }
+
+  function position(flight) {
+    const load = flight.vector("load"), asked = flight.vector("asked");
+    if (!load) return null;
+    return { title: "Load position", unit: "m, dashed: asked", digits: 3, least: 0.1,
+      series: [...lines(AXES, load), ...lines(AXES, asked, { dash: true, color: "faint", quiet: true })] };
+  }
+
+  function velocity(flight) {
+    const speed = flight.vector("velocity"), asked = flight.vector("asked_velocity");
+    if (!speed) return null;
+    return { title: "Load velocity", unit: "m/s, dashed: asked", digits: 2, least: 0.1,
+      series: [...lines(AXES, speed), ...lines(AXES, asked, { dash: true, color: "faint", quiet: true })] };
+  }
+
+  function tension(flight) {
+    const values = flight.column("tension");
+    return values && { title: "Cable tension", unit: "N", digits: 2, least: 0.1, zero: true,
+      series: [{ name: "tension", values, color: 3 }] };
+  }
+
+  function rotors(flight, name, title) {
+    const forces = columns(flight, name, ["1", "2", "3", "4"]);
+    if (!forces) return null;
+    const series = lines(["1", "2", "3", "4"], forces, { width: 1.1 });
+    [1, 2, 0].forEach((colour, i) => { series[i].color = colour; });
+    series[3].color = 3;
+    const limits = flight.limits_n || [];
+    limits.forEach((limit, i) => series.push({ name: i ? "greatest" : "least", dash: true, color: "faint", quiet: true,
+      values: flight.time.map((_, k) => (Number.isFinite(forces[0][k]) ? limit : NaN)) }));
+    return { title, unit: limits.length ? "N, dashed: limits" : "N", digits: 2, least: 0.1, series };
+  }
+
+  function angles(title, vector, names) {
+    return vector && { title, unit: "°", digits: 1, least: 1, series: lines(names, vector) };
+  }
+
+  function wind(flight) {
+    if (!flight.wind.length) return null;
+    const rows = Array.from(flight.time, (t) => flight.windAt(t));
+    return { title: "Wind", unit: "m/s", digits: 1, least: 1,
+      series: lines(["east", "north", "up"], [0, 1, 2].map((axis) => rows.map((row) => (row ? row[axis] : NaN)))) };
+  }
+
+  Plumbline.plotsOf = function (flight) {
+    const psi = ["psi_R", "psi_q"].map((name) => flight.column(name)).filter(Boolean);
+    return [
+      lengths("Load error", flight.error, AXES, 2, flight.distance),
+      position(flight),
+      tension(flight),
+      rotors(flight, "rotor", "Rotor forces"),
+      velocity(flight),
+      lengths("Error of the estimate (load)", flight.difference("believed", "load"), AXES, 2),
+      angles("Cable from vertical", flight.cableAngles(), ["φ towards y", "θ towards −x"]),
+      angles("Vehicle attitude", flight.angles(), ["roll", "pitch", "yaw"]),
+      rotors(flight, "command", "Rotor commands"),
+      psi.length === 2 ? { title: "Error functions of the cascade", digits: null, series: lines(["Ψ_R", "Ψ_q"], psi), zero: true } : null,
+      wind(flight),
+    ].filter(Boolean);
+  };
+})();

@@ -1,0 +1,111 @@
+/* The scene of a replay with its cameras and what is known at the time shown.
+
+   stage = new Plumbline.Stage(element, layout)    throws where the browser offers no WebGL
+   stage.show(state)          as Scene.show
+   stage.readings([[name, text], ...], phase)
+   stage.camera(mode), stage.fit(places)
+   stage.note(text)           a word over the scene; empty: none
+   stage.scene                the Scene; drawn when something has changed */
+(function () {
+  "use strict";
+  const Plumbline = (window.Plumbline = window.Plumbline || {});
+  const CAMERAS = [["orbit", "Orbit"], ["follow", "Follow"], ["top", "From above"]];
+
+  class Stage {
+    constructor(element, layout) {
+      const canvas = document.createElement("canvas");
+      canvas.id = "scene";
+      canvas.tabIndex = -1;
+      element.prepend(canvas);
+      try {
+        this.scene = new Plumbline.Scene(canvas, {
+          rotors: layout.rotors, armLength: layout.arm, cableLength: layout.cable, theme: "auto" });
+      } catch (error) {
+        canvas.remove();
+        throw error;
+      }
+      this._readings = element.appendChild(document.createElement("dl"));
+      this._readings.className = "over readings";
+      this._note = element.appendChild(document.createElement("div"));
+      this._note.className = "over note";
+      this._note.hidden = true;
+      this._cameras(element);
+      this._values = new Map();
+      this._places = [];
+      this._dirty = true;
+      const changed = () => { this._dirty = true; };
+      this.scene.controls.addEventListener("change", changed);
+      new ResizeObserver(changed).observe(canvas);
+      Plumbline.Theme.onChange(changed);
+      const frame = () => {
+        if (this._dirty) { this._dirty = false; this.scene.render(); }
+        requestAnimationFrame(frame);
+      };
+      requestAnimationFrame(frame);
+    }
+
+    _cameras(element) {
+      const box = element.appendChild(document.createElement("div"));
+      box.className = "over cameras";
+      this._modes = new Map(CAMERAS.map(([mode, name]) => {
+        const button = box.appendChild(document.createElement("button"));
+        button.type = "button";
+        button.textContent = name;
+        button.setAttribute("aria-pressed", String(mode === "orbit"));
+        button.addEventListener("click", () => this.camera(mode));
+        return [mode, button];
+      }));
+      const fit = box.appendChild(document.createElement("button"));
+      fit.type = "button";
+      fit.textContent = "Whole flight";
+      fit.addEventListener("click", () => {
+        if (this.scene.mode === "follow") this.camera("orbit"); // which would go along at once
+        this.fit();
+      });
+    }
+
+    /** "orbit", "follow" or "top". */
+    camera(mode) {
+      this.scene.camera(mode);
+      for (const [other, button] of this._modes) button.setAttribute("aria-pressed", String(other === mode));
+      this._dirty = true;
+    }
+
+    /** Brings the whole flight into the picture: paths, and `places` [N, E, D] where vehicles will be. */
+    fit(places = this._places) {
+      this._places = places;
+      this.scene.fit(places);
+      this._dirty = true;
+    }
+
+    show(state) {
+      this.scene.show(state);
+      this._dirty = true;
+    }
+
+    readings(rows, phase) {
+      if (!this._phase) {
+        this._phase = this._readings.appendChild(document.createElement("dt"));
+        this._phase.className = "phase";
+      }
+      if (this._phase.textContent !== phase) this._phase.textContent = phase;
+      for (const [name, text] of rows) {
+        let value = this._values.get(name);
+        if (!value) {
+          const term = this._readings.appendChild(document.createElement("dt"));
+          term.textContent = name;
+          value = this._readings.appendChild(document.createElement("dd"));
+          this._values.set(name, value);
+        }
+        if (value.textContent !== text) value.textContent = text;
+      }
+    }
+
+    note(text) {
+      this._note.hidden = !text;
+      this._note.textContent = text;
+    }
+  }
+
+  Plumbline.Stage = Stage;
+})();

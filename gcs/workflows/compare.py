@@ -1,0 +1,67 @@
+"""`gcs compare` from its arguments to table and page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gcs.errors import EXIT_USAGE, GcsError
+from gcs.workflows.report import TLOG_FILE, find_log
+
+if TYPE_CHECKING:
+    from gcs.analysis.record import FlightMeta
+    from gcs.report.compare import Run
+
+MOST_RUNS = 12  # whose lines can be told apart, on a page of some megabytes
+FOLDER = Path("comparisons")
+
+
+class CompareError(GcsError):
+    """What was named cannot be compared."""
+
+    exit_code = EXIT_USAGE
+
+
+def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]:
+    """The flights that were named, and the page that was made of them."""
+    if not 2 <= len(sources) <= MOST_RUNS:
+        raise CompareError(f"{len(sources)} flights; name 2 to {MOST_RUNS} to be compared")
+    logs = [find_log(source) for source in sources]
+    for i, log in enumerate(logs):
+        if log.resolve() in [other.resolve() for other in logs[:i]]:
+            raise CompareError(f"{sources[i]} is named twice")
+
+    from gcs.report.compare import comparison_page, load_run
+
+    names = _names(sources)
+    runs = [load_run(name, log, _meta(log)) for name, log in zip(names, logs, strict=True)]
+    for source, run in zip(sources, runs, strict=True):
+        if run.record["outcome"] == "no telemetry":
+            raise GcsError(f"{source}: holds no telemetry of a Plumbline vehicle")
+    page = out or FOLDER / f"{'-'.join(names)[:100].replace('/', '_')}.html"
+    try:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(comparison_page(runs), encoding="utf-8")
+    except OSError as error:
+        raise GcsError(f"{page}: {error.strerror}") from None
+    return runs, page
+
+
+def _meta(log: Path) -> FlightMeta:
+    """What lies beside a log that was made by gcs fly; any other log is on its own."""
+    from gcs.analysis.record import FlightMeta
+    from gcs.report.build import META_FILE, ReportError, load_meta
+
+    if log.name != TLOG_FILE:
+        return FlightMeta()
+    try:
+        return load_meta(log.parent / META_FILE)
+    except ReportError as error:
+        raise GcsError(str(error)) from None
+
+
+def _names(sources: Sequence[Path]) -> list[str]:
+    """The last part of each path, or all of it where two are the same."""
+    short = [source.resolve().name.removesuffix(".tlog") for source in sources]
+    return short if len(set(short)) == len(short) else [str(source) for source in sources]

@@ -1,0 +1,137 @@
+"""Flights beside each other: what differed, which is best, and the page."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from rich.console import Console
+
+from gcs.analysis.record import FlightMeta
+from gcs.cli import gcs
+from gcs.report.compare import Run, begins, comparison, comparison_table, differences, load_run
+from tests.doubles import recorded_flights as flights
+from tests.doubles.browser import Browser
+
+HOSTILE = "<img src=x onerror=window.hostile=1>"
+
+
+def flown(folder: Path, name: str, seed: int = 1, **meta: object) -> Path:
+    """The directory of a short Case B."""
+    directory = folder / name
+    directory.mkdir()
+    flights.case_b(seed, duration_s=6.0).write(directory / "flight.tlog")
+    told = {"mission": "case-b", "law": "plumbline", "outcome": "completed", "command": "gcs fly case-b"}
+    about = FlightMeta(**{**told, "seed": seed, **meta})
+    (directory / "meta.json").write_text(json.dumps(about.to_json()))
+    return directory
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("runs")
+    return [
+        flown(folder, "one"),
+        flown(folder, "two", seed=2, law="thesis", settings={"SIM_WIND_E": 2.0}),
+        flown(folder, HOSTILE.replace("/", ""), seed=3),
+    ]
+
+
+def loaded(directory: Path) -> Run:
+    meta = FlightMeta.from_json(json.loads((directory / "meta.json").read_text()))
+    return load_run(directory.name, directory / "flight.tlog", meta)
+
+
+def called(*arguments: object) -> tuple[int, str, str]:
+    result = CliRunner().invoke(gcs, ["compare", *map(str, arguments)])
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_what_differed_is_told_and_nothing_else(runs: list[Path]) -> None:
+    found = {one.name: one.values for one in differences([loaded(run) for run in runs[:2]])}
+    assert found == {"law": ("plumbline", "thesis"), "seed": ("1", "2"), "SIM_WIND_E": ("default", "2")}
+
+
+def test_the_best_is_the_best(runs: list[Path]) -> None:
+    found = [loaded(run) for run in runs]
+    values = [run.record["load_error_rms_m"] for run in found]
+    best = comparison(found)["best"]["load_error_rms_m"]
+    assert values.index(min(values)) in best
+    assert len(best) < len(runs)
+    assert "samples" not in comparison(found)["best"]  # neither less nor more is better
+
+
+def test_a_flight_that_was_lost_is_no_better_than_one_that_was_completed(runs: list[Path]) -> None:
+    found = [loaded(run) for run in runs[:2]]
+    values = [run.record["load_error_rms_m"] for run in found]
+    found[values.index(min(values))].record["outcome"] = "diverged"
+    assert "load_error_rms_m" not in comparison(found)["best"]
+
+
+def test_flights_meet_where_all_have_begun(runs: list[Path], tmp_path: Path) -> None:
+    grounded = flights.case_b(duration_s=2.0)
+    grounded.phase[grounded.mission] = 2  # never beyond TAUTEN
+    path = grounded.write(tmp_path / "grounded.tlog")
+    one, other = loaded(runs[0]), load_run("grounded", path, FlightMeta())
+    assert begins([one, one]) == ("mission", pytest.approx([flights.BEFORE_S] * 2))
+    assert begins([one, other]) == ("flight", pytest.approx([0.504] * 2))
+
+
+def test_the_table_has_a_star_at_the_best(runs: list[Path]) -> None:
+    found = [loaded(run) for run in runs[:2]]
+    console = Console(width=120, record=True, file=io.StringIO())
+    console.print(comparison_table(found))
+    line = next(line for line in console.export_text().splitlines() if line.split()[:1] == ["RMS"])
+    cells = line.split("mm")
+    best = comparison(found)["best"]["load_error_rms_m"]
+    assert [i for i in (0, 1) if "*" in cells[i]] == best
+
+
+def test_the_command_prints_json_and_makes_the_page(runs: list[Path], tmp_path: Path) -> None:
+    code, out, _ = called(*runs[:2], "--json", "--out", tmp_path / "page.html")
+    assert code == 0
+    found = json.loads(out)
+    assert [run["name"] for run in found["runs"]] == ["one", "two"]
+    assert found["differences"]["law"] == ["plumbline", "thesis"]
+    assert (tmp_path / "page.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("names", "said", "code"),
+    [
+        (["one"], "1 flights; name 2 to 12", 2),
+        (["one", "one"], "is named twice", 2),
+        (["one", "nowhere"], "nowhere: no such file", 1),
+        (["one", "empty.tlog"], "empty.tlog: holds no telemetry", 1),
+    ],
+)
+def test_what_cannot_be_compared_is_one_clear_line(
+    runs: list[Path], names: list[str], said: str, code: int
+) -> None:
+    folder = runs[0].parent
+    (folder / "empty.tlog").write_bytes(b"")
+    found, _, err = called(*(folder / name for name in names))
+    assert found == code
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_the_page_shows_all_and_runs_nothing_it_was_given(
+    browser: Browser, runs: list[Path], tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    assert called(*runs, "--quiet", "--out", page)[0] == 0
+    browser.open(page.as_uri())
+    browser.wait("document.documentElement.dataset.ready === '1'")
+    assert browser.run("return replay.stage.scene.crafts.size") == 3
+    assert browser.run("return replay.stage.scene.tracks.size") == 3
+    names = browser.run("return document.querySelector('.chart-head').textContent")
+    assert all(run.name in names for run in runs)
+    assert browser.run("return typeof window.hostile") == "undefined"
+    assert browser.run("return document.querySelectorAll('td.best').length") > 3
+    browser.listen()
+    assert browser.errors == []
+    assert [url for url in browser.requests if not url.startswith(("file:", "data:"))] == []
