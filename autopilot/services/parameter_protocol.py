@@ -128,7 +128,7 @@ class ParameterService:
         return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
 
     def fail_parts(self, name: str, bits: int, fail: bool) -> list[Output] | None:
-        """Let fail or work what these bits of a parameter of the simulator stand for; None: it has no such."""
+        """Let fail or work what these bits of a simulator's parameter stand for; None: it has none such."""
         if name not in self.table.learned:
             return None
         before = int(self.table[name])
