@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError
-from gcs.workflows.flight_options import FlightOptions, meta_of
+from gcs.workflows.flight_meta import meta_of
+from gcs.workflows.flight_options import FlightOptions
 from gcs.workflows.mission_file import load
 from missions.model import Mission
 from plumbline.frames import as_frame

@@ -22,7 +22,7 @@ from autopilot.services.requests import (
     ChangeSpeed,
     Continue,
     EnableFence,
-    FailRotors,
+    FailParts,
     GetMessageInterval,
     Grab,
     Land,
@@ -390,15 +390,32 @@ def _enable_fence(call: Call, context: Context) -> Request | Verdict:
     return EnableFence(call.p[0] == 1.0)
 
 
+# bits of SIM_SENS_FAIL; gyroscope and accelerometer are one unit, motion capture comes as visual odometry
+_SENSORS: dict[int | None, int] = {
+    mavlink.FAILURE_UNIT_SENSOR_GYRO: 1,
+    mavlink.FAILURE_UNIT_SENSOR_ACCEL: 1,
+    mavlink.FAILURE_UNIT_SENSOR_MAG: 64,
+    mavlink.FAILURE_UNIT_SENSOR_BARO: 32,
+    mavlink.FAILURE_UNIT_SENSOR_GPS: 16,
+    mavlink.FAILURE_UNIT_SENSOR_VIO: 2,
+}
+
+
 def _inject_failure(call: Call, context: Context) -> Request | Verdict:
-    unit, kind, rotor = _whole(call.p[0]), _whole(call.p[1]), _whole(call.p[2])
-    if unit != mavlink.FAILURE_UNIT_SYSTEM_MOTOR:
-        return Verdict(UNSUPPORTED, "Failure: rotors can fail (unit 101); for the rest see SIM_ parameters")
+    unit, kind, instance = _whole(call.p[0]), _whole(call.p[1]), _whole(call.p[2])
+    motor = unit == mavlink.FAILURE_UNIT_SYSTEM_MOTOR
+    if not motor and unit not in _SENSORS:
+        return Verdict(UNSUPPORTED, "Failure: rotors (unit 101) and sensors (0, 1, 2, 3, 4, 6) can fail")
     if kind not in (mavlink.FAILURE_TYPE_OK, mavlink.FAILURE_TYPE_OFF):
-        return Verdict(UNSUPPORTED, "Failure: a rotor can be ok (0) or off (1)")
-    if rotor is None or rotor not in range(5):
-        return _refused(f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... 4, or 0 for all")
-    return FailRotors(rotor, kind == mavlink.FAILURE_TYPE_OFF)
+        return Verdict(UNSUPPORTED, "Failure: it can be ok (0) or off (1)")
+    fail = kind == mavlink.FAILURE_TYPE_OFF
+    if motor:
+        if instance is None or instance not in range(5):
+            return _refused(f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... 4, or 0 for all")
+        return FailParts("SIM_ENGINE_FAIL", 0b1111 if instance == 0 else 1 << (instance - 1), fail)
+    if instance not in (0, 1):
+        return _refused(f"Failure: param3 = {call.p[2]:g}; there is one of it, 1, or 0 for all")
+    return FailParts("SIM_SENS_FAIL", _SENSORS[unit], fail)
 
 
 def _plain(request: Request) -> Parser:

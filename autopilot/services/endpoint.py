@@ -50,7 +50,7 @@ from autopilot.services.records import (
     WorldSaved,
 )
 from autopilot.services.requests import (
-    FailRotors,
+    FailParts,
     FollowAttitude,
     FollowRates,
     FollowSetpoint,
@@ -507,11 +507,11 @@ class VehicleEndpoint:
                     if save and self._parameters.table.learned:
                         self._consequences.append(self._parameters.world())
                     return _ACCEPTED
-                case FailRotors(rotor, fail):
-                    outputs = self._parameters.fail_rotors(rotor, fail)
+                case FailParts(parameter, bits, fail):
+                    outputs = self._parameters.fail_parts(parameter, bits, fail)
                     if outputs is None:
                         return Verdict(
-                            mavlink.MAV_RESULT_DENIED, "Failure: the simulator has told of no rotors"
+                            mavlink.MAV_RESULT_DENIED, f"Failure: the simulator has told of no {parameter}"
                         )
                     self._consequences += outputs
                     return _ACCEPTED

@@ -31,7 +31,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_encoding import from_the_wire, on_the_wire
 from autopilot.wire.parameter_table import ParameterError, ParameterTable, float32
 
-_FAILED, _ALL_ROTORS = "SIM_ENGINE_FAIL", 0b1111
 _BY_NAME = -1  # PARAM_REQUEST_READ.param_index: the name counts
 LIST_PACE_US = 2000  # between two values of a list: 500 a second
 LIST_BURST = 8  # of them at once, where ticks are longer than that
@@ -128,14 +127,13 @@ class ParameterService:
             text += f"; {kept} are fixed while running"
         return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
 
-    def fail_rotors(self, rotor: int, fail: bool) -> list[Output] | None:
-        """Let a rotor of the simulator fail or work (0: all of them); None where it has no rotors to fail."""
-        if _FAILED not in self.table.learned:
+    def fail_parts(self, name: str, bits: int, fail: bool) -> list[Output] | None:
+        """Let fail or work what these bits of a simulator's parameter stand for; None: it has none such."""
+        if name not in self.table.learned:
             return None
-        before = int(self.table[_FAILED])
-        bits = _ALL_ROTORS if rotor == 0 else 1 << (rotor - 1)
-        after = self.table.set(_FAILED, before | bits if fail else before & ~bits)
-        return [Send(None, self.value_message(_FAILED)), ParameterChanged(_FAILED, after)]
+        before = int(self.table[name])
+        after = self.table.set(name, before | bits if fail else before & ~bits)
+        return [Send(None, self.value_message(name)), ParameterChanged(name, after)]
 
     def world(self) -> WorldSaved:
         """What the simulator's parameters are now."""

@@ -40,10 +40,11 @@ class EnableFence:
 
 
 @dataclass(frozen=True, slots=True)
-class FailRotors:
-    """Let rotors of the simulated vehicle fail, or work again: `rotor` 1 ... 4, 0: all."""
+class FailParts:
+    """Let parts of the simulated vehicle fail, or work again: `bits` of the simulator's parameter."""
 
-    rotor: int
+    parameter: str
+    bits: int
     fail: bool
 
 
@@ -316,7 +317,7 @@ Decided = (
     | ChangeSigningKey
 )
 Answered = (
-    FailRotors
+    FailParts
     | StoreParameters
     | RequestMessage
     | SetMessageInterval

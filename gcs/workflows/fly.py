@@ -24,7 +24,8 @@ from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.before_flight import check_mission, check_options
-from gcs.workflows.flight_options import FlightOptions, meta_of
+from gcs.workflows.flight_meta import meta_of
+from gcs.workflows.flight_options import FlightOptions
 from gcs.workflows.mission_file import load
 from gcs.workflows.own_vehicle import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
 from gcs.workflows.report import TLOG_FILE, make_report

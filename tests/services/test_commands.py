@@ -115,7 +115,10 @@ LONG = [
     (420, (101, 1, 5), None, DENIED),
     (420, (101, 1, 1), None, DENIED),  # of a simulator that has told of no parameters
     (420, (101, 5, 1), None, UNSUPPORTED),
-    (420, (0, 1, 0), None, UNSUPPORTED),
+    (420, (0, 1, 0), None, DENIED),  # the same
+    (420, (0, 2, 0), None, UNSUPPORTED),
+    (420, (4, 1, 2), None, DENIED),
+    (420, (5, 1, 0), None, UNSUPPORTED),
     (115, (90,), TurnNose(0.0), OK),  # east
     (115, (90, NAN), TurnNose(0.0), OK),
     (115, (90, 180, -1), TurnNose(0.0, sense=1, rate_rad_s=math.pi), OK),
@@ -476,6 +479,21 @@ def test_rotors_fail_and_work_again_by_the_simulators_parameter(rig):
         assert rig.events[-1] == ParameterChanged("SIM_ENGINE_FAIL", failed)
     rig.send(long(420, (101, 0, 0)))
     assert rig.table["SIM_ENGINE_FAIL"] == 0
+
+
+def test_sensors_fail_and_work_again_by_the_simulators_parameter(rig):
+    rig.table.learn(Parameter("SIM_SENS_FAIL", 0.0, 0.0, 127.0, "", ""))
+    for p, failed in (
+        ((0, 1, 0), 1),
+        ((4, 1, 1), 17),
+        ((1, 0, 0), 16),
+        ((2, 1), 80),
+        ((3, 1), 112),
+        ((6, 1), 114),
+    ):
+        rig.send(long(420, p))
+        assert rig.table["SIM_SENS_FAIL"] == failed
+        assert rig.events[-1] == ParameterChanged("SIM_SENS_FAIL", failed)
 
 
 def test_the_simulators_parameters_are_saved_on_request_alone(rig):

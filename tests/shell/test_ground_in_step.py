@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from autopilot.services.records import Event, TimesyncAnswered
+from autopilot.shell.ground import AutopilotError, GroundInStep
 from autopilot.shell.options import Stop
-from autopilot.shell.program import AutopilotError, GroundInStep
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 

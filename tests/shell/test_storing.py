@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.shell.program import GroundStations
+from autopilot.shell.ground import GroundStations
 from autopilot.shell.storing import Storing
 from autopilot.shell.whole_file import write_whole
 

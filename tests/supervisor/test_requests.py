@@ -49,7 +49,7 @@ REQUESTS: list[Any] = [
     R.Arm(False, False),
     R.Arm(False, True),
     R.EnableFence(False),
-    R.FailRotors(1, True),
+    R.FailParts("SIM_ENGINE_FAIL", 1, True),
     R.Takeoff(None),
     R.Takeoff(3.0),
     R.Takeoff(0.1),
