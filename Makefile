@@ -8,7 +8,7 @@ DEV_STAMP := $(VENV)/.installed-dev
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help install fly test lint types thesis figures robustness bench clean
+.PHONY: help install fly test lint types thesis figures pictures robustness bench clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -46,6 +46,9 @@ thesis: $(STAMP) ## repeat the thesis's experiments and renew docs/thesis.md
 figures: $(DEV_STAMP) ## fly the figures of README and docs/control.md anew, and put them there
 	$(BIN)/python benchmarks/figures.py
 	$(BIN)/python tests/documentation/test_figures.py
+
+pictures: $(DEV_STAMP) ## make the pictures of README and docs anew (needs chromium and its driver)
+	$(BIN)/python benchmarks/pictures.py
 
 robustness: $(STAMP) ## fly the sweeps of docs/robustness.md and renew its maps
 	$(BIN)/python benchmarks/robustness.py

@@ -1,4 +1,4 @@
-"""The figures that README and docs/control.md state, flown anew: docs/figures.json, and Case B's picture.
+"""The figures that README and docs/control.md state, flown anew: docs/figures.json.
 
     python benchmarks/figures.py [--seeds 20] [--flights 10000] [--jobs 2]
 
@@ -13,7 +13,6 @@ import argparse
 import json
 import multiprocessing
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -24,7 +23,7 @@ import pyarrow.parquet as pq
 from fit_to_fly import ROWS, Row, flown
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-RECORD, PICTURE = DOCS / "figures.json", DOCS / "images" / "case-b.png"
+RECORD = DOCS / "figures.json"
 PLAIN = (
     Row("B lab", "case-b", {}),
     Row("B lab, wind 4", "case-b", {}, settings={"SIM_WIND_E": 4.0}),
@@ -56,7 +55,7 @@ def many(flights: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Fly, and write the record and the picture."""
+    """Fly, and write the record."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--flights", type=int, default=10_000)
@@ -68,22 +67,6 @@ def main() -> None:
             found = worst(row, options.seeds, pool)
             record[row.name] = {name: float(f"{value:.4g}") for name, value in found.items()}
             print(row.name, record[row.name], flush=True)
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "case-b"
-        command = [
-            sys.executable,
-            "-m",
-            "gcs",
-            "fly",
-            "case-b",
-            "--sensors",
-            "lab",
-            "--quiet",
-            "--out",
-            str(out),
-        ]
-        subprocess.run(command, check=True)
-        shutil.copyfile(out / "overview.png", PICTURE)
     made = {"seeds": options.seeds, "rows": record, "sweep": many(options.flights)}
     RECORD.write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
 

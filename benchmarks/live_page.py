@@ -1,10 +1,9 @@
 """What the live page costs: script time a frame in the browser, and processor time of `gcs fly` and its page.
 
-    python benchmarks/live_page.py [--seconds 15] [--screenshot docs/images/live.png] [--theme dark]
+    python benchmarks/live_page.py [--seconds 15]
 
 A flight in real time is watched by headless Chromium, which draws without a graphics card. Times are those
-that the threads and processes had the processor, so that a busy machine does not count. With --screenshot
-only the picture is made, of a flight in the wind that is pushed by a gust.
+that the threads and processes had the processor, so that a busy machine does not count.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -99,37 +97,19 @@ def measure(browser: Browser, folder: Path, seconds: float) -> list[tuple[str, s
     return rows
 
 
-def picture(browser: Browser, folder: Path, path: Path, theme: str) -> None:
-    """A screenshot in the middle of a mission."""
-    with flight(folder, "--set", "SIM_WIND_E=3", "--set", "SIM_GUST_STD=0.5") as (_, address):
-        browser.open(address, 1440, 860, theme)
-        browser.wait(IN_MISSION, WAIT_S)
-        browser.wait("Plumbline.live.plots.samples.at(-1)[0] > 37", WAIT_S)
-        browser.run("Plumbline.live.ask('push', {north: 2, east: 7, seconds: 0.6})")
-        browser.run("Plumbline.live.scene.look(Plumbline.live.scene.vehicles.get(1).position, 3.8)")
-        browser.wait("Plumbline.live.plots.samples.at(-1)[0] > 39.3", WAIT_S)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        browser.screenshot(path)
-
-
 def main() -> None:
-    """Measure, or take the picture."""
+    """Measure, and print the figures."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seconds", type=float, default=15.0)
-    parser.add_argument("--screenshot", type=Path)
-    parser.add_argument("--theme", choices=("dark", "light"), default="dark")
     options = parser.parse_args()
     if missing():
         sys.exit(missing())
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         with chromium(folder / "profile") as browser:
-            if options.screenshot:
-                picture(browser, folder, options.screenshot, options.theme)
-                return
-            rows: list[tuple[str, Any]] = list(measure(browser, folder, options.seconds))
+            rows = measure(browser, folder, options.seconds)
     for name, figure in rows:
         print(f"{name:<50} {figure}")
 
