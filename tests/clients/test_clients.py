@@ -328,12 +328,17 @@ def _ask_for_home_and_the_fence(program: Mavproxy) -> None:
 
 
 def _push_forward(stage: Stage, program: Mavproxy) -> None:
-    """`velocity`, as often as setpoints must come, until the load has followed: ahead is east."""
-    begin = stage.witness.load[-1][1][0]
+    """`velocity`, as often as setpoints must come, until the load has followed along the nose."""
+
+    def ahead_m() -> float:
+        east, north, _ = stage.witness.load[-1][1]
+        return east * math.sin(stage.witness.yaw) + north * math.cos(stage.witness.yaw)
+
+    begin_m = ahead_m()
 
     def moved() -> bool:
         program.type("velocity 0.4 0 0")
-        return stage.witness.load[-1][1][0] > begin + 0.4
+        return ahead_m() > begin_m + 0.4
 
     stage.wait_until(moved)
 
