@@ -126,5 +126,6 @@ def gcs(signing_key: bytes | None) -> None:
     autopilot, or gcs fly --speed 1).
 
     Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong usage,
-    3 flown, but the mission was not completed, 130 stopped by Ctrl-C.
+    3 flown, but the mission was not completed, 4 flown, but not as --require asks, 130 stopped by
+    Ctrl-C.
     """

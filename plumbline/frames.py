@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Any
 
 from gcs.errors import GcsError
 
 
+def check_kind(kind: str) -> None:
+    """`Error` unless there is such a kind of table, and the library for it: told before anything is flown."""
+    if kind not in ("pandas", "polars", "arrow"):
+        raise GcsError(f"kind={kind!r}: there is none; must be pandas, polars or arrow")
+    if kind != "arrow" and find_spec(kind) is None:
+        raise GcsError(f"{kind} is not installed; pip install {kind}, or ask for kind='arrow'")
+
+
 def as_frame(table: Any, kind: str) -> Any:
     """An Arrow table as a DataFrame of pandas or polars, or as it is; `Error` where that is not installed."""
     check_kind(kind)
-    try:
-        if kind == "pandas":
-            return table.to_pandas()
-        if kind == "polars":
-            import polars
+    if kind == "pandas":
+        return table.to_pandas()
+    if kind == "polars":
+        import polars
 
-            return polars.from_arrow(table)
-    except ImportError:
-        raise GcsError(f"{kind} is not installed; pip install {kind}, or ask for kind='arrow'") from None
+        return polars.from_arrow(table)
     return table
-
-
-def check_kind(kind: str) -> None:
-    """`Error` unless there is such a kind of table."""
-    if kind not in ("pandas", "polars", "arrow"):
-        raise GcsError(f"kind={kind!r}: there is none; must be pandas, polars or arrow")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 from pathlib import Path
 from typing import Any
 
@@ -66,24 +65,14 @@ def test_a_sweep_is_a_table() -> None:
     assert found["outcome"].tolist()[:2] == ["completed"] * 2
 
 
-class NotInstalled:
-    """An import of this library fails."""
-
-    def __init__(self, name: str) -> None:
-        self._name, self._import = name, builtins.__import__
-
-    def __call__(self, name: str, *others: Any) -> Any:
-        if name == self._name:
-            raise ImportError(name)
-        return self._import(name, *others)
-
-
-def test_a_library_that_is_missing_is_named(
-    flight: plumbline.Flight, monkeypatch: pytest.MonkeyPatch
+def test_a_library_that_is_missing_is_named_before_anything_is_flown(
+    flight: plumbline.Flight, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(builtins, "__import__", NotInstalled("polars"))
-    with pytest.raises(plumbline.Error, match="polars is not installed; pip install polars"):
-        flight.telemetry("polars")
+    monkeypatch.setattr("plumbline.frames.find_spec", lambda name: None)
+    for call in (lambda: flight.telemetry("polars"), lambda: plumbline.sweep("hover", kind="polars")):
+        with pytest.raises(plumbline.Error, match="polars is not installed; pip install polars"):
+            call()
+    assert capsys.readouterr().err == ""
 
 
 WRONG: dict[str, tuple[Any, str]] = {
