@@ -41,13 +41,16 @@ _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
 SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 10.0)
 
 
-def autopilot_parts(law: str) -> tuple[Part, ...]:
-    """What the autopilot needs to fly with this law, the longest first."""
-    module = "autopilot.shell.warmup"
+def autopilot_parts(*laws: str) -> tuple[Part, ...]:
+    """What the autopilot needs to fly with these laws, the longest first; what they share is there once."""
+    module, any_law = "autopilot.shell.warmup", laws[0]
     return (
-        Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 26.0),
-        Part("the messages", module, ("messages", law), _ONBOARD, "messages", 8.0),
-        Part("the paths", module, ("paths", law), _AUTOPILOT, "paths", 3.0),
+        *(
+            Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 26.0)
+            for law in laws
+        ),
+        Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 8.0),
+        Part("the paths", module, ("paths", any_law), _AUTOPILOT, "paths", 3.0),
     )
 
 

@@ -14,12 +14,11 @@ _MODULE = "gcs.sweep.warmup"
 def sweep_parts(laws: Sequence[str]) -> list[Part]:
     """What a sweep with these laws needs to fly one flight after another."""
     source = ROOT / "gcs" / "sweep" / "flight.py"
-    parts = {part.mark: part for law in laws for part in autopilot_parts(law)}
     alone = [
         Part(f"the sweep's {law} flight", _MODULE, ("alone", law), source, f"alone-{law}", 25.0)
         for law in laws
     ]
-    return [*parts.values(), SIMULATOR, *alone]
+    return [*autopilot_parts(*laws), SIMULATOR, *alone]
 
 
 def lanes_part(law: str) -> Part:

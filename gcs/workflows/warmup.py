@@ -28,8 +28,7 @@ _REPORT = Part("the report", "gcs.report.warm", (), ROOT / "gcs" / "report" / "s
 
 def flight_parts(laws: Sequence[str]) -> list[Part]:
     """What `gcs fly` needs for flights with these laws."""
-    parts = {part.mark: part for law in laws for part in autopilot_parts(law)}
-    return [*parts.values(), SIMULATOR, _CHECK, _REPORT]
+    return [*autopilot_parts(*laws), SIMULATOR, _CHECK, _REPORT]
 
 
 def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
