@@ -47,7 +47,7 @@ def autopilot_parts(*laws: str) -> tuple[Part, ...]:
     return (
         *(
             Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 26.0)
-            for law in laws
+            for law in dict.fromkeys(laws)
         ),
         Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 8.0),
         Part("the paths", module, ("paths", any_law), _AUTOPILOT, "paths", 3.0),
