@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
-import os
 import random
 import re
 import socket
@@ -31,6 +30,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
@@ -47,6 +48,7 @@ from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import encode_mission
 from autopilot.wire.signing import Signing, timestamp_of
+from benchmarks.processor_time import processor_s
 from gcs.closed_loop import Conditions, build_simulator
 from missions.fileformat import load_mission
 
@@ -283,12 +285,6 @@ def ports_of(pid: int) -> list[int]:
             inodes.update(re.findall(r"socket:\[(\d+)\]", str(link.readlink())))
     rows = [line.split() for line in Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]]
     return [int(row[1].split(":")[1], 16) for row in rows if row[9] in inodes]
-
-
-def processor_s(pid: int) -> float:
-    """Processor time that a process has used, its own threads included."""
-    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def fire_at(ports: list[int], tcp: int, count: int, seed: int, done: Any) -> None:

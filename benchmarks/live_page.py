@@ -22,16 +22,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.processor_time import processor_s
 from tests.doubles.browser import Browser, chromium, missing
 
 IN_MISSION = "document.getElementById('phase').textContent.startsWith('mission')"
 WAIT_S = 60.0
-
-
-def cpu_s(pid: int) -> float:
-    """Seconds that a process has had the processor."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def children(pid: int) -> dict[str, int]:
@@ -82,7 +77,11 @@ def measure(browser: Browser, folder: Path, seconds: float) -> list[tuple[str, s
         browser.wait(IN_MISSION, WAIT_S)
         pids = {"gcs fly": process.pid, **children(process.pid)}
         frames = "return Plumbline.live.page.frames"
-        before = script_s(browser), browser.run(frames), {name: cpu_s(pid) for name, pid in pids.items()}
+        before = (
+            script_s(browser),
+            browser.run(frames),
+            {name: processor_s(pid) for name, pid in pids.items()},
+        )
         began = time.monotonic()
         time.sleep(seconds)
         taken = time.monotonic() - began
@@ -91,7 +90,7 @@ def measure(browser: Browser, folder: Path, seconds: float) -> list[tuple[str, s
         rows.append(("frames a second, drawn without a graphics card", f"{drawn / taken:.0f}"))
         rows.append(("script time a frame", f"{1000 * script / max(drawn, 1):.2f} ms"))
         rows += [
-            (f"share of a core: {name}", f"{100 * (cpu_s(pid) - before[2][name]) / taken:.1f} %")
+            (f"share of a core: {name}", f"{100 * (processor_s(pid) - before[2][name]) / taken:.1f} %")
             for name, pid in pids.items()
         ]
     return rows
