@@ -4,11 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
+DOCS_STAMP := $(VENV)/.installed-docs
 # pip would compile the bytecode of whole packages; Python does it for what is imported, and keeps it
 PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help install fly test lint types thesis figures pictures robustness bench clean
+.PHONY: help install fly test lint types docs thesis figures pictures robustness bench clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -26,12 +27,17 @@ $(DEV_STAMP): $(STAMP)
 	$(PIP) --editable '.[dev,clients]'
 	@touch $@
 
+$(DOCS_STAMP): $(STAMP)
+	$(PIP) --editable '.[docs]'
+	@touch $@
+
 fly: $(STAMP) ## fly Case B through three real processes and show the report
 	$(BIN)/gcs fly case-b --sensors lab
 
 test: $(DEV_STAMP) ## run the tests
-	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist worksteal -m 'not processes'
-	$(BIN)/pytest --numprocesses 2 --dist loadfile -m processes # these keep to the wall clock
+	@$(BIN)/pytest --numprocesses 2 --dist loadfile -m processes & clocked=$$!; \
+	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist worksteal -m 'not processes'; others=$$?; \
+	wait $$clocked && exit $$others # those of processes keep to the wall clock and mostly wait
 
 lint: $(DEV_STAMP) ## ruff: lint and format
 	$(BIN)/ruff check .
@@ -39,6 +45,10 @@ lint: $(DEV_STAMP) ## ruff: lint and format
 
 types: $(DEV_STAMP) ## mypy, strict
 	$(BIN)/mypy
+
+docs: $(DOCS_STAMP) ## build the documentation as a site: site/index.html
+	NO_MKDOCS_2_WARNING=1 RUN_NOTEBOOKS=true $(BIN)/mkdocs build --strict --quiet
+	@echo "site/index.html"
 
 thesis: $(STAMP) ## repeat the thesis's experiments and renew docs/thesis.md
 	$(BIN)/gcs experiments thesis --docs docs/thesis.md
@@ -58,6 +68,8 @@ bench: $(STAMP) ## measure this machine
 	$(BIN)/python benchmarks/cascade_margin.py
 	$(BIN)/python benchmarks/thesis_assumptions.py
 	$(BIN)/python benchmarks/performance.py --flights 1000 --real-time 60 --linear --docs docs/performance.md
+	$(PIP) --editable '.[peers]'
+	$(BIN)/python benchmarks/peers.py --docs docs/performance.md
 
 clean: ## remove what was made here
-	rm -rf $(VENV) *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) site build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -39,10 +39,10 @@ from autopilot.control.actuators.lag_compensation import lag_gain
 from autopilot.control.actuators.rotor_model import Actuation, actuation_constants, advance
 from autopilot.control.command_filter import FilterState
 from autopilot.control.design import Timing, Wanted, design
+from autopilot.control.drag import Drag
 from autopilot.control.laws.plumbline import PlumblineConstants, PlumblineLaw, PlumblineMemory, load_position
 from autopilot.control.laws.thesis import ThesisLaw
 from autopilot.control.linear_model import LOAD_STATES, hover_thrust, load_state_space
-from autopilot.control.load_motion import Drag
 from autopilot.control.quad_position import QUAD_POSITION_GAINS, quad_position
 from autopilot.control.records import Cable, Reference, Vehicle
 from gcs.sweep.margin import sampled_plant, state_at

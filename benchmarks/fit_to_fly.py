@@ -44,6 +44,7 @@ class Row:
     limits: dict[str, float]
     sensors: str = "lab"
     settings: dict[str, float] = field(default_factory=dict)
+    vehicle: str = "bebop"
 
 
 SLOW = {"SIM_ACT_DELAY_MS": 12.0, "SIM_ROTOR_TAU_MS": 30.0}
@@ -101,7 +102,7 @@ def flown(row: Row, law: str, seed: int) -> Flown:
     settings = {"CTL_LAW": float(LAWS.index(law)), **row.settings}
     file = io.BytesIO()
     outcome = fly(
-        load_mission(row.mission), Conditions("bebop", row.sensors, seed, settings), TlogWriter(file)
+        load_mission(row.mission), Conditions(row.vehicle, row.sensors, seed, settings), TlogWriter(file)
     )
     file.seek(0)
     telemetry = telemetry_of(read_tlog(file))

@@ -54,14 +54,27 @@ from missions.fileformat import load_mission
 
 HOME = Home()
 KEY, OTHER_KEY = bytes(range(1, 33)), bytes(range(2, 34))
-LINKS = ("gcs", "api", "stranger", "noise")
+SENSORS, ANSWERS = "sensors", "answers"  # the two ends of the simulator link
+LINKS = ("gcs", "api", "stranger", "noise", "gcs", "api", "stranger", "noise", SENSORS, ANSWERS)
 MISSION = "delivery"  # waypoints, a release, and a flight home
-TICKS = 50_000  # over which the datagrams are spread
+TICKS = 80_000  # over which the datagrams are spread
 RATE = 20_000  # of datagrams over sockets, a second
-ORDERS = {  # of the true ground station, by tick
-    250: m.MAVLink_command_long_message(1, 1, m.MAV_CMD_MISSION_START, 0, *((0.0,) * 7)),
-    260: m.MAVLink_command_long_message(1, 1, m.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *((0.0,) * 6)),
-}
+
+
+def order(command: int, *params: float) -> Any:
+    """A command of the true ground station."""
+    return m.MAVLink_command_long_message(1, 1, command, 0, *params, *((0.0,) * (7 - len(params))))
+
+
+ARM = order(m.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+ORDERS = (  # by tick: the mission; and a flight by hand with the load on the cable to its end
+    {250: order(m.MAV_CMD_MISSION_START), 260: ARM},
+    {
+        250: order(m.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 2.0),
+        260: ARM,
+        6000: order(m.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    },
+)
 Make = Callable[[random.Random], bytes]
 
 
@@ -229,6 +242,15 @@ class Twin:
         self.simulator.receive(answer)
         self.simulator.advance()
 
+    def hear_stranger(self, datagram: bytes, link: str) -> Any:
+        """Hand it a datagram; what it heeds of it, which is to be nothing."""
+        if link == SENSORS:
+            return self.onboard.receive_sensors(datagram)
+        if link == ANSWERS:
+            return self.simulator.receive(datagram) or self.simulator.greets(datagram)
+        events = self.onboard.receive_ground(datagram, link)
+        return [event for event in events if not isinstance(event, TimesyncAnswered)]
+
     @property
     def kept(self) -> Any:
         """What outlives the flight."""
@@ -240,25 +262,26 @@ def fly_under_fire(name: str, key: bytes | None, hostile: dict[str, Make], count
     """Missions in peace and under fire, tick by tick, `each` datagrams a tick, until so many have come."""
     rng = random.Random(count)
     kinds, phases = Counter[str](), Counter[str]()
-    spent_s = 0.0
+    spent_s, flights = 0.0, 0
     while kinds.total() < count:
         peace, fire = Twin(key), Twin(key)
         makers = list(hostile.items())
         if key is not None:
             makers.append(("replayed", lambda rng, said=fire.said: rng.choice(said) if said else b""))
         flown = False
+        orders = ORDERS[flights % len(ORDERS)]
+        flights += 1
         while kinds.total() < count and not (flown and peace.onboard.phase == Phase.DISARMED):
             for twin in (peace, fire):
-                if twin.onboard.tick in ORDERS:
-                    twin.say(ORDERS[twin.onboard.tick])
+                if twin.onboard.tick in orders:
+                    twin.say(orders[twin.onboard.tick])
             for _ in range(each):
                 kind, make = rng.choice(makers)
                 datagram, link = make(rng), rng.choice(LINKS)
                 began = time.perf_counter()
-                events = fire.onboard.receive_ground(datagram, link)
+                heeded = fire.hear_stranger(datagram, link)
                 spent_s += time.perf_counter() - began
-                events = [event for event in events if not isinstance(event, TimesyncAnswered)]
-                assert not events, (kind, datagram.hex(), events)
+                assert not heeded, (kind, link, datagram.hex(), heeded)
                 kinds[kind] += 1
             phases[fire.onboard.phase.name.lower()] += each
             peace.tick()
@@ -267,7 +290,7 @@ def fly_under_fire(name: str, key: bytes | None, hostile: dict[str, Make], count
             assert np.array_equal(*worlds, equal_nan=True), (
                 f"the flights part at tick {fire.onboard.tick}: {peace.onboard.phase}, {fire.onboard.phase}"
             )
-            flown = flown or peace.onboard.phase == Phase.MISSION
+            flown = flown or peace.onboard.phase in (Phase.HOLD, Phase.MISSION)
         assert fire.kept == peace.kept
     print(f"{name}: {kinds.total()} datagrams, {1e6 * spent_s / kinds.total():.1f} us each; nothing changed")
     for counts in (kinds, phases):
@@ -365,8 +388,8 @@ class Watched:
                 self.flights += 1
             if not flying and not until() and self.boot_ms - asked_ms > 3000:
                 asked_ms = self.boot_ms
-                for order in ORDERS.values():
-                    self.say(order)
+                for message in ORDERS[0].values():
+                    self.say(message)
 
 
 def state_of(gcs: Callable[..., str], folder: Path) -> tuple[str, str]:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from autopilot.geometry.linear import axpy
 from autopilot.geometry.so3 import quat_exp
-from sitl.plant.records import PlantState, Rotors, Truth
-from sitl.plant.step import advance_many, initial_state
+from sitl.plant.by_value import Flown, Forces, advance_many, initial_state
+from sitl.plant.records import Truth
 from sitl.vehicles.truth import load_truth
 
 TICK = 4e-3
@@ -31,10 +31,10 @@ STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
 STEPS_CONTACT = (5e-4, 2.5e-4, 1.25e-4, 6.25e-5, 3.125e-5)
 WIND = (2.0, -1.0, 0.5)
 
-Case = tuple[Truth, PlantState, Callable[[int], Rotors], float]
+Case = tuple[Truth, Flown, Callable[[int], Forces], float]
 
 
-def _aloft(truth: Truth) -> PlantState:
+def _aloft(truth: Truth) -> Flown:
     """Hanging at rest, 5 m up, rotors at hover."""
     hover = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
     return initial_state(truth)._replace(
@@ -61,7 +61,7 @@ def _taut() -> Case:
     rng = np.random.default_rng(1)
     trims = 1.35 + 0.15 * rng.standard_normal((500, 4))
 
-    def command(tick: int) -> Rotors:
+    def command(tick: int) -> Forces:
         a, b, c, d = (float(x) for x in trims[tick])
         return (a, b, c, d)
 
@@ -99,7 +99,7 @@ def _switching() -> Case:
 
     # Thrown upwards with the rotors at rest, the vehicle is braked by its drag and the load flies on; then
     # full thrust until the cable snaps taut, and again. The rotors' lag puts the release inside a step.
-    def command(tick: int) -> Rotors:
+    def command(tick: int) -> Forces:
         return (0.0, 0.0, 0.0, 0.0) if tick % 100 < 30 else (1.9, 1.93, 1.91, 1.92)
 
     return truth, start, command, 1.2
@@ -113,7 +113,7 @@ CASES: dict[str, Callable[[], Case]] = {
 }
 
 
-def fly(case: Case, h: float) -> tuple[NDArray[np.float64], PlantState]:
+def fly(case: Case, h: float) -> tuple[NDArray[np.float64], Flown]:
     """Positions (m) and attitude after every tick, shape (ticks, 10), and the last state."""
     truth, state, command, duration = case
     per_tick = round(TICK / h)

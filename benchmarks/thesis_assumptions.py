@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.control import thesis_cascade as thesis
-from autopilot.control.actuators.mixer import mix
+from autopilot.control.actuators.mixer import FORCE, mix, new_rotors
 from autopilot.control.command_filter import filter_acceleration, filter_step
 from autopilot.control.load_attitude import (
     DirectionCommand,
@@ -50,10 +50,14 @@ from autopilot.geometry.linear import Mat3, Vec3, add, column, from_columns, nor
 from autopilot.geometry.s2 import unit_derivatives
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.signals import Jet, SignalTable, evaluate, signal_table
+from autopilot.vehicle.layout import PLUS
+from autopilot.vehicle.rotors import allocate
 from gcs.analysis.step import Step, StepResponse, step_response
 from missions.fileformat import load_mission
 from missions.model import Signals, Term
 from sitl.plant.records import PlantState, Truth
+from sitl.plant.rotors import COMMAND, RotorRows, rotor_table, rotors_at_rest
+from sitl.plant.rotors import FORCE as ROTOR_FORCE
 from sitl.plant.step import advance, initial_state
 from sitl.vehicles.truth import load_truth
 
@@ -174,6 +178,9 @@ def run(
     filters: thesis.ThesisFilters,
     vehicle: Vehicle,
     limited: float,
+    table_of_mixer: NDArray[np.float64],
+    asked: NDArray[np.float64],
+    rotors: RotorRows,
     dt: float,
     out: NDArray[np.float64],
 ) -> int:
@@ -192,7 +199,7 @@ def run(
             thrust, moment = command.thrust, command.moment
         else:
             memory, thrust, moment = cascade(memory, state, x_d, feed, gains, filters, vehicle)
-        mixed = mix(thrust, moment, vehicle, limited)
+        mixed = mix(thrust, moment, vehicle, limited, table_of_mixer, asked)
         error = norm(sub(plant.x_load, x_d))
         out[k, 0] = k * dt
         out[k, 1], out[k, 2], out[k, 3] = plant.x_load
@@ -201,19 +208,19 @@ def run(
         out[k, 6] = 1.0 if mixed.saturated != 0 else 0.0
         if not error < LOST_M or R[2][2] < LOST_COSINE or plant.diverged > 0.0:
             return k
-        plant = advance(plant, truth, mixed.forces, ZERO, dt)
+        for i in range(4):
+            rotors.rows[COMMAND, i] = asked[FORCE, i]
+        plant = advance(plant, truth, rotors, ZERO, dt)
     return len(out)
 
 
 def hanging(truth: Truth) -> PlantState:
-    """At rest in the air, rotors at hover."""
-    hover = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
+    """At rest in the air."""
     return initial_state(truth)._replace(
         x_load=(0.0, 0.0, ALTITUDE_M),
         x_quad=(0.0, 0.0, ALTITUDE_M + truth.cable_length),
         q_cable=(0.0, 0.0, -1.0),
         taut=1.0,
-        rotor_force=(hover,) * 4,
         vehicle_on_ground=0.0,
         load_on_ground=0.0,
     )
@@ -233,6 +240,8 @@ def fly(truth: Truth, terms: Sequence[Term], duration_s: float, feed: Feed, hz: 
         truth.rotor_max,
     )
     rows = np.zeros((round(duration_s * hz), COLUMNS))
+    rotors = RotorRows(rotor_table(PLUS), rotors_at_rest())
+    rotors.rows[ROTOR_FORCE, :4] = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
     flown = run(
         hanging(truth),
         truth,
@@ -242,6 +251,9 @@ def fly(truth: Truth, terms: Sequence[Term], duration_s: float, feed: Feed, hz: 
         thesis.thesis_filters(1.0 / hz),
         vehicle,
         1.0 if np.isfinite(truth.rotor_max) else 0.0,
+        allocate(PLUS),
+        new_rotors(),
+        rotors,
         1.0 / hz,
         rows,
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
@@ -18,10 +19,13 @@ from gcs.shell.display import say
 # name: (module in gcs.commands, summary)
 COMMANDS = {
     "fly": ("fly", "Fly a mission from start to report."),
+    "new": ("new", "Write a commented file of your own that flies as it is."),
     "missions": ("missions", "List the shipped missions."),
     "check": ("missions", "Check whether a vehicle can fly a mission."),
     "report": ("report", "Make the report of a captured flight again."),
     "compare": ("compare", "Compare flights: figures, settings, tracks and errors."),
+    "identify": ("recorded", "Find cable, load and drag from a recorded flight."),
+    "replay": ("recorded", "Estimate the load of a recorded flight, and score it."),
     "experiments": (
         "experiments",
         "Repeat published experiments beside their printed results.",
@@ -30,6 +34,7 @@ COMMANDS = {
     "view": ("view", "Show running vehicles live in a browser."),
     "warmup": ("warmup", "Compile the flight software before the first flight."),
     "status": ("status", "Show what the vehicle says of itself."),
+    "texts": ("status", "List what the vehicle has told the operators."),
     "capture": ("capture", "Capture telemetry until Ctrl-C."),
     "upload": ("transfer", "Put a mission on the vehicle."),
     "download": ("transfer", "Fetch the mission from the vehicle."),
@@ -40,6 +45,7 @@ COMMANDS = {
     "pause": ("control", "Hold the load where it is."),
     "resume": ("control", "Go on with a paused mission."),
     "takeoff": ("control", "Lift the load and hold it."),
+    "goto": ("control", "Take the load to a place and hold it there."),
     "land": ("control", "Set the load down, and the vehicle beside it."),
     "mode": ("control", "Change the flight mode."),
     "param": ("param", "Read and write parameters."),
@@ -58,6 +64,15 @@ class Gcs(click.Group):
         module = import_module(f"gcs.commands.{COMMANDS[cmd_name][0]}")
         command: click.Command = getattr(module, f"{cmd_name}_command")
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        word = args[0]
+        near = [] if word in COMMANDS else get_close_matches(word, COMMANDS, n=1)
+        if near:
+            ctx.fail(f"No such command {word!r}; did you mean {near[0]}?")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
+from autopilot.own.chosen import NOTHING_OWN, Own, parameters_for
 from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
+from autopilot.vehicle.file import load_belief
+from autopilot.vehicle.parameters import apply_settings
 from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
@@ -35,14 +36,16 @@ class Conditions:
     sensors: str = "lab"
     seed: int = 1
     settings: Mapping[str, float] = field(default_factory=dict)  # SIM_ and autopilot parameters by name
+    own: Own = NOTHING_OWN  # what somebody has brought, as it is named; with a law CTL_LAW is this one's
 
 
 def build_onboard(conditions: Conditions, home: Home, mission: StoredMission | None = None) -> Onboard:
     """An autopilot under these conditions."""
-    table = autopilot_parameters(load_vehicle(conditions.vehicle))
+    table = parameters_for(load_belief(conditions.vehicle), conditions.own)
     apply_settings(table, conditions.settings.items())
     table.freeze()
-    return Onboard(table, identity_of(table), Options(home, LOCKSTEP_BOOT_UNIX_US), mission)
+    options = Options(home, LOCKSTEP_BOOT_UNIX_US, own=conditions.own)
+    return Onboard(table, identity_of(table), options, mission)
 
 
 def build_simulator(conditions: Conditions, home: Home, lockstep: bool = True) -> HilSimulator:

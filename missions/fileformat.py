@@ -37,20 +37,25 @@ def load_mission(name_or_path: str | PathLike[str]) -> Mission:
 
 def parse_mission(text: str, name: str, where: str) -> Mission:
     """The mission that a TOML text describes. `where` begins each line of a MissionFileError."""
-    head = MISSIONS.record(FileSpec, MISSIONS.table(text, where), where)
+    return mission_of(MISSIONS.table(text, where), name, where)
+
+
+def mission_of(table: Mapping[str, Any], name: str, where: str) -> Mission:
+    """The mission of these keys and values. `where` begins each line of a MissionFileError."""
+    head = MISSIONS.record(FileSpec, table, where)
     items: list[Item] = []
     wrong: list[str] = []
-    for index, table in enumerate(head.items):
+    for index, item in enumerate(head.items):
         at = f"items[{index}]"
-        kind = table.get("type")
+        kind = item.get("type")
         if not isinstance(kind, str) or kind not in ITEMS:
-            wrong.append(f"{where}: {at}.type {_kind_problem(table)}")
+            wrong.append(f"{where}: {at}.type {_kind_problem(item)}")
             continue
         try:
-            items.append(ITEMS[kind].model_validate({k: v for k, v in table.items() if k != "type"}))
+            items.append(ITEMS[kind].model_validate({k: v for k, v in item.items() if k != "type"}))
         except ValidationError as error:
             wrong += problems(error, ITEMS[kind], where, at)
-    wrong = wrong or _order_problems([table["type"] for table in head.items], where)
+    wrong = wrong or _order_problems([item["type"] for item in head.items], where)
     if wrong:
         raise MissionFileError(wrong)
     steps = tuple(item.step() for item in items)

@@ -123,6 +123,26 @@ class AttitudeRun:
     duration_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class TurnNose:
+    """Turn to a heading, from east to north, or by an angle (`relative`). `sense`: 1 counter-clockwise seen
+    from above, -1 clockwise, 0 whichever is shorter; `rate_rad_s` None: as fast as MPC_YAWRAUTO_MAX."""
+
+    angle_rad: float
+    relative: bool = False
+    sense: int = 0
+    rate_rad_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LookAt:
+    """Keep the nose turned to a place, ENU from home; None: no more."""
+
+    east_m: float | None
+    north_m: float | None
+
+
+NoseAim = TurnNose | LookAt  # asked for on the way, beside the steps
 Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | Signals | AttitudeRun
 
 

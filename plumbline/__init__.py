@@ -15,12 +15,73 @@ telemetry. What is wrong with an argument is told by an `Error` of one line.
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
 from gcs.errors import GcsError as Error
+from missions.model import (
+    AttitudeRun,
+    Delay,
+    Land,
+    Release,
+    ReturnHome,
+    Signals,
+    Sine,
+    Speed,
+    Takeoff,
+    Term,
+    Waypoint,
+    Winch,
+)
 from plumbline.flights import Flight, fly
+from plumbline.missions import Mission
 from plumbline.sweeps import sweep
+from plumbline.vehicles import Vehicle
 
-__all__ = ["Error", "Flight", "__version__", "fly", "sweep"]
+if TYPE_CHECKING:
+    from plumbline.running import RunningVehicle, connect
+    from plumbline.sensors import Sensors
+    from plumbline.state import State
+
+__all__ = [
+    "AttitudeRun",
+    "Delay",
+    "Error",
+    "Flight",
+    "Land",
+    "Mission",
+    "Release",
+    "ReturnHome",
+    "RunningVehicle",
+    "Sensors",
+    "Signals",
+    "Sine",
+    "Speed",
+    "State",
+    "Takeoff",
+    "Term",
+    "Vehicle",
+    "Waypoint",
+    "Winch",
+    "__version__",
+    "connect",
+    "fly",
+    "sweep",
+]
 
 __version__ = version("plumbline")
+
+_WHEN_ASKED_FOR = {
+    "RunningVehicle": "plumbline.running",
+    "Sensors": "plumbline.sensors",
+    "State": "plumbline.state",
+    "connect": "plumbline.running",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """What only some scripts need is loaded when it is asked for: the simulator's sensors, the link."""
+    if name not in _WHEN_ASKED_FOR:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_WHEN_ASKED_FOR[name]), name)

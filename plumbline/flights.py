@@ -9,30 +9,38 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
+from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError
+from gcs.folders import make_folder
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
-from gcs.workflows.mission_file import load
-from missions.model import Mission
+from missions import model
+from plumbline.arguments import number, positive, told_in_python, whole
 from plumbline.frames import as_frame
+from plumbline.made_files import name_or_path
+from plumbline.missions import Mission
+from plumbline.references import estimator_reference, law_reference, planner_reference
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
     from gcs.analysis.samples import Samples
     from gcs.analysis.tracks import Telemetry
     from gcs.clients.flight import Outcome
+    from plumbline.sensors import Sensors
+    from plumbline.vehicles import Vehicle
 
 Settings = Mapping[str, float]  # parameters of simulator (SIM_) and autopilot by name
 
 
 def fly(
-    mission: str | Path | Mission,
+    mission: str | Path | model.Mission,
     *,
-    law: str = DEFAULT_LAW,
-    sensors: str | Path = "lab",
-    vehicle: str | Path = "bebop",
+    law: str | type = DEFAULT_LAW,
+    estimator: str | type | None = None,
+    planner: str | type | None = None,
+    sensors: str | Path | Sensors = "lab",
+    vehicle: str | Path | Vehicle = "bebop",
     seed: int = 1,
     settings: Settings | None = None,
     timeout_s: float | None = None,
@@ -41,40 +49,47 @@ def fly(
 ) -> Flight:
     """Fly a mission from take-off to landing, as fast as this machine does it.
 
-    `mission`: the name of a shipped one, the path of a file, or a `missions.model.Mission`. `sensors` and
-    `vehicle`: a shipped name or the path of a file. `settings`: parameters of the simulator (`SIM_...`) and
-    of the autopilot that are not to be their defaults. `timeout_s`: the flight is given up after so many
-    seconds of its own clock; by default one and a half times what is expected, and a minute. `force`: fly
-    even what the vehicle cannot do. Progress is shown on stderr unless `quiet`.
+    `mission`: the name of a shipped one, the path of a file, or a `Mission`. `sensors` and `vehicle`: a
+    shipped name, the path of a file, a `Sensors` or a `Vehicle`. `law`: the name of a shipped one,
+    `FILE.py:CLASS`, `MODULE:CLASS` (docs/laws.md), or the class itself. `estimator` and `planner`: one of
+    your own, named in the same ways (docs/estimators.md, docs/planners.md). `settings`: parameters of the
+    simulator (`SIM_...`) and of the autopilot that are not to be their defaults. `timeout_s`: the flight is
+    given up after so many seconds of its own clock; by default one and a half times what is expected, and a
+    minute.
+    `force`: fly even what the vehicle cannot do. Progress is shown on stderr unless `quiet`.
 
     A lost flight is a result: see `Flight.outcome`. `Error` if there is no such mission, vehicle, sensor
-    profile, law or parameter, if a value is out of its range, or if the vehicle cannot fly the mission.
+    profile, law, estimator, planner or parameter, if a value is no number or out of its range, if what you
+    have brought fails before it flies, or if the vehicle cannot fly the mission.
     """
     from gcs.workflows.flight_here import fly_here
 
-    known = isinstance(mission, Mission)
-    flown = mission if isinstance(mission, Mission) else load(str(mission))
-    if law not in LAWS:
-        raise GcsError(f"law {law!r}: there is none of that name; must be one of {', '.join(LAWS)}")
+    known = isinstance(mission, model.Mission)
+    flown = mission if isinstance(mission, model.Mission) else Mission.load(mission)
     options = FlightOptions(
         mission=flown.name if known else str(mission),
-        law=law,
-        sensors=str(sensors),
-        vehicle=str(vehicle),
-        seed=seed,
+        law=law_reference(law),
+        sensors=name_or_path(sensors, "sensors"),
+        vehicle=name_or_path(vehicle, getattr(vehicle, "name", "") or "vehicle"),
+        seed=whole("seed", seed, 0),
         speed=None,
         real_time=False,
         out=None,
-        settings=tuple(f"{name}={float(value)!r}" for name, value in (settings or {}).items()),
+        settings=tuple(
+            f"{name}={number(f'settings[{name!r}]', value)!r}" for name, value in (settings or {}).items()
+        ),
         connect=None,
         quiet=quiet,
         force=force,
         overwrite=False,
-        limit_s=timeout_s,
+        limit_s=None if timeout_s is None else positive("timeout_s", timeout_s),
+        estimator=estimator_reference(estimator),
+        planner=planner_reference(planner),
     )
     log = io.BytesIO()
     began_s = time.perf_counter()
-    outcome = fly_here(flown, options, TlogWriter(log))
+    with told_in_python():
+        outcome = fly_here(flown, options, TlogWriter(log))
     wall_s = time.perf_counter() - began_s
     return Flight(flown, outcome, log.getvalue(), meta_of(flown, options, outcome, wall_s))
 
@@ -86,7 +101,7 @@ class Flight:
     says why it was not completed; `tlog` is its telemetry as the bytes of a `.tlog`, those of `gcs fly`.
     """
 
-    def __init__(self, mission: Mission, outcome: Outcome, tlog: bytes, meta: FlightMeta) -> None:
+    def __init__(self, mission: model.Mission, outcome: Outcome, tlog: bytes, meta: FlightMeta) -> None:
         self.mission = mission
         self.outcome = outcome.name
         self.reason = outcome.reason
@@ -128,7 +143,7 @@ class Flight:
         from gcs.workflows.report import TLOG_FILE, make_report
 
         folder = Path(out)
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder, str(folder))
         (folder / TLOG_FILE).write_bytes(self.tlog)
         make_report(folder / TLOG_FILE, folder, self._meta, quiet)
         return folder / PAGE_FILE

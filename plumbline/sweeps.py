@@ -8,23 +8,34 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.errors import EXIT_INTERRUPTED, GcsError, InputError
+from gcs.workflows.flight_options import own_words
+from plumbline.arguments import number, numbers, told_in_python, whole
 from plumbline.frames import as_frame, check_kind
+from plumbline.made_files import name_or_path
+from plumbline.references import estimator_reference, law_reference, planner_reference
+
+if TYPE_CHECKING:
+    from plumbline.missions import Mission
+    from plumbline.sensors import Sensors
+    from plumbline.vehicles import Vehicle
 
 _SAYS = "gcs: "  # begins the line of a known error
 
 
 def sweep(
-    mission: str | Path,
+    mission: str | Path | Mission,
     *,
     vary: Mapping[str, Iterable[float]] | None = None,
     seeds: int = 1,
     laws: Sequence[str] = (DEFAULT_LAW,),
-    sensors: str | Path = "lab",
-    vehicle: str | Path = "bebop",
+    estimator: str | None = None,
+    planner: str | None = None,
+    sensors: str | Path | Sensors = "lab",
+    vehicle: str | Path | Vehicle = "bebop",
     settings: Mapping[str, float] | None = None,
     jobs: int | None = None,
     scheduler: Any = None,
@@ -34,12 +45,13 @@ def sweep(
 ) -> Any:
     """Fly a mission under every value of what is varied, with every law and the seeds 1 ... `seeds`.
 
-    `mission`, `sensors` and `vehicle`: a shipped name or the path of a file. `vary`: values by the name of a
-    parameter of simulator or autopilot; `settings`: parameters that are the same for all flights. `jobs`
-    flights are flown at a time, by default one on each core; `scheduler` is the address of a Dask scheduler,
-    or a Dask client, that flies them instead. `out`: the directory that keeps table and page (docs/cli.md),
-    from which a sweep that was interrupted goes on; by default nothing is kept. Progress is shown on stderr
-    unless `quiet`.
+    `mission`, `sensors` and `vehicle`: a shipped name, the path of a file, or one made in Python. `vary`:
+    values by the name of a parameter of simulator or autopilot; `settings`: parameters that are the same for
+    all flights. `estimator` and `planner`: one of your own, as `FILE.py:CLASS`, of all flights. `jobs`
+    flights are flown at a time, by default one on each core; `scheduler` is the address
+    of a Dask scheduler, or a Dask client, that flies them instead. `out`: the directory that keeps table and
+    page (docs/cli.md), from which a sweep that was interrupted goes on; by default nothing is kept. Progress
+    is shown on stderr unless `quiet`.
 
     A table with a row for each flight, its columns those of flights.parquet (docs/cli.md): a DataFrame of
     pandas, or of polars, or a table of Arrow, as `kind` says. The flights are flown by a program of their
@@ -48,22 +60,36 @@ def sweep(
     check_kind(kind)
     with ExitStack() as stack:
         folder = Path(out or stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-")))
-        words = [str(mission), "--sensors", str(sensors), "--vehicle", str(vehicle), "--seeds", str(seeds)]
-        for law in laws:
-            words += ["--law", law]
+        words = [
+            name_or_path(mission, getattr(mission, "name", "") or "mission"),
+            "--seeds",
+            str(whole("seeds", seeds, 1)),
+        ]
+        words += ["--sensors", name_or_path(sensors, "sensors")]
+        words += ["--vehicle", name_or_path(vehicle, getattr(vehicle, "name", "") or "vehicle")]
+        for law in _laws(laws):
+            words += ["--law", law_reference(law)]
+        words += own_words(estimator_reference(estimator), planner_reference(planner))
         for name, values in (vary or {}).items():
-            words += ["--vary", f"{name}={','.join(repr(float(value)) for value in values)}"]
+            words += ["--vary", f"{name}={','.join(map(repr, numbers(f'vary[{name!r}]', values)))}"]
         for name, value in (settings or {}).items():
-            words += ["--set", f"{name}={float(value)!r}"]
+            words += ["--set", f"{name}={number(f'settings[{name!r}]', value)!r}"]
         if jobs is not None:
-            words += ["--jobs", str(jobs)]
+            words += ["--jobs", str(whole("jobs", jobs, 1))]
         if scheduler is not None:
             words += ["--scheduler", _address(scheduler)]
-        _run([*words, "--out", str(folder)], quiet)
+        with told_in_python():
+            _run([*words, "--out", str(folder)], quiet)
 
         from pyarrow import parquet
 
         return as_frame(parquet.read_table(folder / "flights.parquet"), kind)
+
+
+def _laws(laws: Sequence[str]) -> Sequence[str]:
+    if isinstance(laws, str) or not laws:
+        raise GcsError(f"laws = {laws!r}; must be a list of laws, as [{DEFAULT_LAW!r}]")
+    return laws
 
 
 def _address(scheduler: Any) -> str:

@@ -14,7 +14,11 @@ import numpy as np
 
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import ZERO
-from autopilot.geometry.packed import Row, packed
+from autopilot.geometry.packed import Row, packed, unpack
+from autopilot.geometry.so3 import rotation_from_quat
+from autopilot.vehicle.battery import open_voltage
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
@@ -22,6 +26,7 @@ from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.simulator_frames import Answer, answer_in
+from sitl.interfaces.frame import Frame, frame_of
 from sitl.messages import (
     CAMERA,
     DIALECT_COMPONENT,
@@ -30,20 +35,25 @@ from sitl.messages import (
     NOTHING_NEW,
     SIMULATOR_COMPONENT,
     VEHICLE_SYSTEM,
+    Newest,
     Statement,
     put_sensors,
     put_truth,
 )
 from sitl.parameter_server import ParameterServer
-from sitl.plant.records import Rotors, Truth
+from sitl.plant.attachment import effective_mass
+from sitl.plant.records import Truth
 from sitl.sensors.barometer import BarometerReading
+from sitl.sensors.chosen import with_chosen
 from sitl.sensors.files import load_profile
+from sitl.sensors.imu import ImuReading
 from sitl.sensors.profile import Profile, stated_of
-from sitl.settings import SECOND_US, settings_of
-from sitl.sim_core import STOPPED, SimCore
+from sitl.settings import SECOND_US, Settings, settings_of
+from sitl.sim_core import Forces, SimCore
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
-from sitl.vehicles.truth import load_truth
+from sitl.vehicles.truth import truth_of
+from sitl.world import rotors_of
 
 STATUS_PERIOD_US = 200_000
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
@@ -85,6 +95,7 @@ class HilSimulator:
         lockstep: bool,
         truth_every: int = 2,
         boot_id: int = 0,
+        layout: Layout = PLUS,
     ) -> None:
         """`truth` as its file has it; `table` holds the SIM_* parameters, which may change in flight.
 
@@ -92,6 +103,7 @@ class HilSimulator:
         """
         self.pacing = PacingFigures()
         self._file_truth = truth
+        self._layout = layout
         self._profile = profile
         self._seed = seed
         self.parameters = ParameterServer(table)
@@ -107,19 +119,22 @@ class HilSimulator:
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._dialect_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
+        # a count of its own: it is not recorded, and the frames that are must be numbered without a gap
+        self._run_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
         self._begin()
 
     def _begin(self) -> None:
         """The world at time 0, with the parameters in force."""
         table = self.parameters.table
         settings = settings_of(table)
-        core = SimCore(apply_parameters(self._file_truth, table), self._profile, settings, self._seed)
+        truth = apply_parameters(self._file_truth, table)
+        core = SimCore(truth, self._profile, settings, self._seed, self._layout)
         self.missed = 0  # ticks without an answer in time
         self.rejected = 0  # controls that were not numbers
         self.answered = False  # the present tick was
         self.core = core
-        self._statement = self._stating(settings.noise_scale)
-        self._command: Rotors = STOPPED
+        self._statement = self._stating(settings)
+        self._stopped = self._command = (0.0,) * len(self._layout)
         self._rotors = mavlink.PLUMBLINE_ROTORS_DISARMED
         self._gripper_open = False
         self._reel_rate = 0.0
@@ -127,8 +142,9 @@ class HilSimulator:
         height = BarometerReading(core.state.x_quad[2])
         self._newest = packed(NOTHING_NEW._replace(height=height))
         sensors, waiting, _ = core.rows.queue.shape
-        # a frame of each reading that can be on its way, and HIL_SENSOR
-        self._buffer = np.zeros((sensors * waiting + 1) * FRAME_ROOM, np.uint8)
+        # a frame of each reading that can be on its way, of four rotors, and HIL_SENSOR
+        frames = sensors * waiting + len(self._layout) + 1
+        self._buffer = np.zeros(frames * FRAME_ROOM, np.uint8)
         self._written = self._buffer.data
         self._introduced = False  # at the next tick too
         self._sensors = self._sensor_frames()
@@ -136,6 +152,7 @@ class HilSimulator:
         self._truth_made = False
         self._gust_told = ZERO
         self._reboot = False  # asked for
+        self._snap_mass()  # compiled before the first tick, not at the first snap
 
     @classmethod
     def build(
@@ -154,13 +171,15 @@ class HilSimulator:
         Of `settings` the SIM_* are taken, but for SIM_LOSS_PCT, which belongs to the autopilot's ground link.
         Raises ValueError with one line on what is wrong.
         """
-        truth = load_truth(vehicle)
+        file = load_vehicle(vehicle)
+        truth = truth_of(file)
         table = sim_parameters(truth)
         for name, value in (settings or {}).items():
             if name.startswith("SIM_") and name != "SIM_LOSS_PCT":
                 table.set(name, value)
         table.freeze()
-        return cls(truth, table, load_profile(sensors), seed, home or Home(), lockstep, truth_every, boot_id)
+        profile, place = load_profile(sensors), home or Home()
+        return cls(truth, table, profile, seed, place, lockstep, truth_every, boot_id, file.layout)
 
     @property
     def now_us(self) -> int:
@@ -187,6 +206,11 @@ class HilSimulator:
             self._truth = self._truth_frames()
             self._truth_made = True
         return self._truth
+
+    def run_datagram(self) -> bytes | None:
+        """Whose truth it is: SIM_BOOT, as the autopilot hears it; None on the ticks that do not tell."""
+        due = self.core.now_us % STATUS_PERIOD_US == 0
+        return self._run_writer.frame(self._boot()) if due else None
 
     def greets(self, datagram: bytes) -> bool:
         """Is this a HEARTBEAT of the vehicle's autopilot? It asks to be served, from wherever it came."""
@@ -232,7 +256,7 @@ class HilSimulator:
                     self._retune()
         return self.answered
 
-    def _take(self, time_us: int, forces: Rotors, armed: bool, gripper_open: bool, reel_rate: float) -> None:
+    def _take(self, time_us: int, forces: Forces, armed: bool, gripper_open: bool, reel_rate: float) -> None:
         """Take an answer, if it is the one of this tick or, in real time, the newest of those before."""
         now_us = self.core.now_us
         if time_us == now_us:
@@ -241,15 +265,45 @@ class HilSimulator:
             self.answered = True
         elif self._lockstep or not self._command_us < time_us < now_us:
             return
-        if not isfinite(forces[0] + forces[1] + forces[2] + forces[3]):
+        if not isfinite(sum(forces)):
             self.rejected += 1
         else:
-            self._command = forces if armed else STOPPED
+            self._command = forces[: len(self._layout)] if armed else self._stopped
             obeying, disarmed = mavlink.PLUMBLINE_ROTORS_OBEYING, mavlink.PLUMBLINE_ROTORS_DISARMED
             self._rotors = obeying if armed else disarmed
         self._gripper_open = gripper_open
         self._reel_rate = reel_rate
         self._command_us = time_us
+
+    def obey(self, forces: Forces, armed: bool, gripper_open: bool = False) -> None:
+        """The answer to the present tick, of an autopilot that speaks another language than MAVLink."""
+        self._take(self.core.now_us, forces, armed, gripper_open, 0.0)
+
+    @property
+    def inertial(self) -> ImuReading:
+        """What the inertial unit has read last, body FLU."""
+        return unpack(Newest, self._newest, 0).inertial
+
+    @property
+    def navigates(self) -> bool:
+        """Whether it has what autopilots navigate by outdoors: GNSS, barometer and magnetometer."""
+        profile = self._profile
+        return None not in (profile.gnss, profile.barometer, profile.magnetometer)
+
+    @property
+    def home(self) -> Home:
+        """Where on the earth the origin of the world is."""
+        return self._home
+
+    @property
+    def frame(self) -> Frame:
+        """The vehicle as firmwares know it; ValueError if it is none that they fly."""
+        return frame_of(self._layout, self.core.truth.rotor_min, self.core.truth.rotor_max)
+
+    def begin_anew(self) -> None:
+        """The world at time 0 again, with the parameters in force: another run."""
+        self._boot_id += 1
+        self._begin()
 
     def _retune(self) -> None:
         """A parameter has changed."""
@@ -260,13 +314,14 @@ class HilSimulator:
             self.parameters.tell("SIM_GUST_NOW", 0.0)
         settings = settings_of(table)
         self.core.retune(apply_parameters(self._file_truth, table), settings)
-        self._statement = self._stating(settings.noise_scale)
+        self._statement = self._stating(settings)
 
-    def _stating(self, noise_scale: float) -> Row:
-        gnss, cable = self._profile.gnss, self._profile.cable_sensor
+    def _stating(self, settings: Settings) -> Row:
+        profile = with_chosen(self._profile, settings.chosen)
+        gnss, cable = profile.gnss, profile.cable_sensor
         return packed(
             Statement(
-                stated_of(self._profile, noise_scale),
+                stated_of(profile, settings.noise_scale),
                 self._home,
                 _FIX[gnss.fix] if gnss else 0,
                 gnss.satellites if gnss else 0,
@@ -277,14 +332,13 @@ class HilSimulator:
     def advance(self) -> None:
         """Move the world to the next tick under the last command, or back to its beginning if so asked."""
         if self._reboot:
-            self._boot_id += 1
-            self._begin()
+            self.begin_anew()
             return
         if not self._lockstep:
             if not self.answered:
                 self.missed += 1
             if self.core.now_us - self._command_us > COMMAND_TIMEOUT_US:
-                self._command = STOPPED
+                self._command = self._stopped
                 if self._rotors == mavlink.PLUMBLINE_ROTORS_OBEYING:
                     self._rotors = mavlink.PLUMBLINE_ROTORS_UNHEARD
         self.answered = False
@@ -298,6 +352,8 @@ class HilSimulator:
         if self._introduced or core.now_us % SECOND_US == 0:
             self._introduced = False
             aside.append(self._boot())
+        if core.truth.drive.battery > 0.0 and core.now_us % STATUS_PERIOD_US == 0:
+            aside.append(self._battery())
         if not self._lockstep and core.now_us % SECOND_US == 0:  # how punctual the answers are
             aside.append(self._status())
         first = b"".join(map(writer.frame, aside)) if aside else b""
@@ -320,7 +376,7 @@ class HilSimulator:
         writer, dialect, datagram = self._truth_writer, self._dialect_writer, b""
         if due:
             room = (self._buffer, self._payload)
-            rows = (core.rows.world, core.rows.model, self._statement)
+            rows = (core.rows.world, core.rows.model, rotors_of(core.rows), self._statement)
             if self._put_truth is None:
                 self._put_truth = entry_of(put_truth, *rows, *room, writer.sequence, dialect.sequence)
             length = self._put_truth(*rows, *room, writer.sequence, dialect.sequence)
@@ -341,9 +397,8 @@ class HilSimulator:
             self._gust_told = core.pulse
             messages.append(convert.wind_state_message(now_us, core.settings.wind, core.pulse))
         if snapped:
-            truth, speed = core.truth, core.snap_speed
-            reduced_mass = truth.quad_mass * truth.load_mass / (truth.quad_mass + truth.load_mass)
-            messages.append(mavlink.MAVLink_cable_snap_message(now_us, speed, reduced_mass * speed))
+            speed = core.snap_speed
+            messages.append(mavlink.MAVLink_cable_snap_message(now_us, speed, self._snap_mass() * speed))
         if status_due:
             messages.append(self._status())
         return messages
@@ -352,8 +407,29 @@ class HilSimulator:
         """Which run of the world this is, and what an autopilot finds that starts now."""
         core = self.core
         reeled_m = core.cable_length - core.truth.cable_length
+        forces = convert.padded(self._command)
         return mavlink.MAVLink_sim_boot_message(
-            core.now_us, self._boot_id, self._command, reeled_m, self._rotors, int(core.released)
+            core.now_us,
+            self._boot_id,
+            forces[:4],
+            reeled_m,
+            self._rotors,
+            int(core.released),
+            forces[4:],
+        )
+
+    def _snap_mass(self) -> float:
+        """The mass that a cable feels that comes taut now, kg."""
+        state = self.core.state
+        return effective_mass(state.q_cable, rotation_from_quat(state.quat_wxyz), self.core.truth)
+
+    def _battery(self) -> Any:
+        """What a power module measures."""
+        drive, supply = self.core.truth.drive, self.core.world.supply
+        left = max(0.0, drive.charge - supply.used_as / drive.capacity_as)
+        voltage = supply.voltage if self.core.tick_count else drive.cells * open_voltage(drive.charge)
+        return convert.battery_status_message(
+            convert.BatteryReading(voltage, supply.current, supply.used_as / 3.6, left)
         )
 
     def _status(self) -> object:

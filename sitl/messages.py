@@ -18,14 +18,18 @@ from autopilot.wire.convert.simulator import (
     MAG,
     PRESSURE,
     TEMPERATURE,
+    esc_status_values,
+    forces_in,
     hil_gps_values,
     hil_sensor_values,
     hil_state_quaternion_values,
     load_sensor_values,
     odometry_values,
+    speed_rpm,
 )
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.simulator_frames import (
+    ESC_STATUS,
     HIL_GPS,
     HIL_SENSOR,
     HIL_STATE_QUATERNION,
@@ -34,9 +38,11 @@ from autopilot.wire.simulator_frames import (
     ODOMETRY,
     ROTOR_STATE,
 )
+from sitl.plant.attachment import attached_at
+from sitl.plant.rotors import COMMAND, FORCE, STRENGTH, RotorRows
 from sitl.sensors.barometer import BarometerReading
 from sitl.sensors.cable_sensor import CableReading
-from sitl.sensors.gnss import GnssReading
+from sitl.sensors.gnss import FLOATING, LOST, GnssReading
 from sitl.sensors.imu import ImuReading
 from sitl.sensors.load_tracker import LoadReading
 from sitl.sensors.magnetometer import MagnetometerReading
@@ -55,6 +61,7 @@ from sitl.world import (
     WorldModel,
     WorldRows,
     arrived,
+    rotors_of,
 )
 from sitl.world import MAG as MAGNETOMETER
 
@@ -64,7 +71,10 @@ SIMULATOR_COMPONENT = 26
 DIALECT_COMPONENT = 27
 TRACKER, CAMERA, ENCODER = 0, 1, 2  # LOAD_SENSOR.sensor_id
 DIALECT_FRAMES = 2  # that `put_truth` writes, behind one of the common dialect
+SPEEDS_US = 20_000  # at ticks of this period the speed controllers tell the speeds of the rotors
 _TRUTH = mavlink.PLUMBLINE_SOURCE_TRUTH
+_FLOAT, _NO_FIX = mavlink.GPS_FIX_TYPE_RTK_FLOAT, mavlink.GPS_FIX_TYPE_NO_FIX
+_UNKNOWN_M = 655.35  # UINT16_MAX cm: unknown
 _NAN3: Vec3 = (nan, nan, nan)
 
 
@@ -96,6 +106,27 @@ def pressure_pa(altitude_m: float) -> float:
 @kernel
 def _put(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, sequence: int) -> int:
     return put_frame(kind, values, payload, buffer, at, Origin(sequence, VEHICLE_SYSTEM, SIMULATOR_COMPONENT))
+
+
+@kernel
+def rotor_speed(rows: WorldRows, i: int) -> float:
+    """What the speed controller of a rotor measures, rpm; 0 where there is no such rotor."""
+    rotors = rotors_of(rows)
+    if i >= rotors.table.shape[0]:
+        return 0.0
+    greatest = rotors.table[i, STRENGTH] * unpack(WorldModel, rows.model, 0).truth.rotor_max
+    return speed_rpm(rotors.rows[FORCE, i], greatest)
+
+
+@kernel
+def _speeds(rows: WorldRows, first: int, now_us: int) -> Any:
+    rpm = (
+        rotor_speed(rows, first),
+        rotor_speed(rows, first + 1),
+        rotor_speed(rows, first + 2),
+        rotor_speed(rows, first + 3),
+    )
+    return esc_status_values(now_us, first, rpm)
 
 
 @kernel
@@ -168,19 +199,28 @@ def put_sensors(
     while found >= 0:
         row = queue[GNSS, found]
         fix = unpack(GnssReading, row, READING)
+        fix_type, horizontal, vertical = said.fix_type, stated.gnss_horizontal, stated.gnss_vertical
+        if fix.quality == FLOATING:
+            fix_type, horizontal, vertical = _FLOAT, stated.gnss_float, stated.gnss_float
+        elif fix.quality == LOST:
+            fix_type, horizontal, vertical = _NO_FIX, _UNKNOWN_M, _UNKNOWN_M
         fixed = hil_gps_values(
             int(row[SHOWS]),
-            said.fix_type,
+            fix_type,
             fix.position,
             fix.velocity,
-            stated.gnss_horizontal,
-            stated.gnss_vertical,
+            horizontal,
+            vertical,
             said.satellites,
             said.home,
         )
         at = _put(HIL_GPS, fixed, payload, buffer, at, sequence)
         sequence += 1
         found = arrived(GNSS, now_us, rows)
+    if now_us % SPEEDS_US == 0:
+        for first in range(0, rows.rotor_table.shape[0], 4):
+            at = _put(ESC_STATUS, _speeds(rows, first, now_us), payload, buffer, at, sequence)
+            sequence += 1
     last = unpack(Newest, newest, 0)
     inertial, field, height = last.inertial, last.field, last.height
     found = arrived(IMU, now_us, rows)
@@ -219,6 +259,7 @@ def put_sensors(
 def put_truth(
     world_row: Row,
     model_row: Row,
+    rotors: RotorRows,
     statement: Row,
     buffer: Bytes,
     payload: Bytes,
@@ -232,6 +273,7 @@ def put_truth(
     world, truth = unpack(World, world_row, 0), unpack(WorldModel, model_row, 0).truth
     state, home = world.plant, unpack(Statement, statement, 0).home
     a = state.accel_quad
+    attached = attached_at(state.x_quad, rotation_from_quat(state.quat_wxyz), truth)
     vehicle = hil_state_quaternion_values(
         world.now_us,
         state.quat_wxyz,
@@ -250,7 +292,7 @@ def put_truth(
         state.v_load,
         state.q_cable,
         state.q_cable_dot,
-        norm(sub(state.x_load, state.x_quad)),
+        norm(sub(state.x_load, attached)),
         state.tension,
         state.taut > 0.0,
         int(state.slack_events),
@@ -260,11 +302,14 @@ def put_truth(
     at = put_frame(LOAD_STATE, load, payload, buffer, at, first)
     low, high = truth.rotor_min, truth.rotor_max
     cut = 0
-    for i in range(4):
-        if not low <= world.command[i] <= high:
+    count = rotors.table.shape[0]
+    for i in range(count):
+        strength = rotors.table[i, STRENGTH]
+        if not strength * low <= rotors.rows[COMMAND, i] <= strength * high:
             cut |= 1 << i
-    rotors = rotor_state_values(world.now_us, _TRUTH, state.rotor_force, low, high, cut)
-    return put_frame(ROTOR_STATE, rotors, payload, buffer, at, second)
+    forces = forces_in(rotors.rows[FORCE], 0)
+    told = rotor_state_values(world.now_us, _TRUTH, forces, low, high, cut, count)
+    return put_frame(ROTOR_STATE, told, payload, buffer, at, second)
 
 
 NOTHING_NEW = Newest(ImuReading(ZERO, ZERO), MagnetometerReading(ZERO), BarometerReading(0.0))

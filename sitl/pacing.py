@@ -53,6 +53,13 @@ class Pacing:
             self._window_first = len(self._late_us)
         self._late_us.append(min(max(now_ns - due_ns, 0) // 1000, _LARGEST_US))
 
+    def pause(self, duration_ns: int) -> None:
+        """Somebody else kept the clock waiting for so long: that says nothing of the machine."""
+        self._first_ns += duration_ns
+        self._window_start = self._last_ns + duration_ns
+        self._window_first = len(self._late_us)
+        self._due_ns = -1
+
     def summary(self, missed: int) -> str:
         """One line on the whole run."""
         late = sorted(self._late_us)

@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
+from sitl.sensors.chosen import Chosen, chosen_in
 
 SECOND_US = 1_000_000
 
 
 class Settings(NamedTuple):
-    """Rates, delays, losses and wind."""
+    """Rates, delays, losses, wind, and what of the sensors is not as their profile says."""
 
     tick_us: int
     actuator_delay_us: int
@@ -25,6 +26,15 @@ class Settings(NamedTuple):
     pulse: Vec3  # ENU, m/s, added to the wind for a while
     pulse_at_us: int  # when it begins; negative: never
     pulse_for_us: int
+    failing_rotors: int = 0  # bit i: rotor i+1
+    failing_share: float = 0.0  # of its command that such a rotor gives
+    rotors_fail_at_us: int = 0
+    stamp_offset_us: int = 0  # added to the times that the readings of trackers, camera and receiver carry
+    chosen: Chosen = ()
+
+    def rotor_shares(self, count: int) -> tuple[float, ...]:
+        """The share of its command that each of `count` rotors gives once they fail."""
+        return tuple(self.failing_share if self.failing_rotors >> i & 1 else 1.0 for i in range(count))
 
 
 def settings_of(table: ParameterTable) -> Settings:
@@ -51,4 +61,9 @@ def settings_of(table: ParameterTable) -> Settings:
         pulse=(table["SIM_GUST_E"], table["SIM_GUST_N"], table["SIM_GUST_U"]),
         pulse_at_us=round(table["SIM_GUST_AT_S"] * SECOND_US),
         pulse_for_us=round(table["SIM_GUST_FOR_S"] * SECOND_US),
+        failing_rotors=int(table["SIM_ENGINE_FAIL"]),
+        failing_share=table["SIM_ENGINE_MUL"],
+        rotors_fail_at_us=round(table["SIM_ENGINE_AT_S"] * SECOND_US),
+        stamp_offset_us=round(table["SIM_SENS_OFS_MS"] * 1000.0),
+        chosen=chosen_in(table.__getitem__),
     )

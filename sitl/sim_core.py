@@ -13,33 +13,39 @@ import numpy as np
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import pack, unpack, width
-from sitl.plant.records import PlantState, Rotors, Truth
+from autopilot.vehicle.layout import PLUS, Layout
+from sitl.plant.chain.records import lay, new_chain
+from sitl.plant.records import PlantState, Truth
+from sitl.plant.rotors import ASKED, COMMAND, FORCE, rotor_table
 from sitl.sensors.profile import Profile
 from sitl.settings import Settings
 from sitl.world import (
-    LOSS,
     World,
     command_room,
-    losses,
+    fates,
     model_of,
     new_world,
     world_tick,
 )
 
-STOPPED: Rotors = (0.0, 0.0, 0.0, 0.0)
+Forces = tuple[float, ...]  # N, one of each rotor
 _SNAP_SPEED = width(World) - 1  # where it stands among the numbers of the world
 
 
 class SimCore:
     """The true vehicle at time `now_us`. Same arguments and commands: same readings, to the bit."""
 
-    def __init__(self, truth: Truth, profile: Profile, settings: Settings, seed: int) -> None:
+    def __init__(
+        self, truth: Truth, profile: Profile, settings: Settings, seed: int, layout: Layout = PLUS
+    ) -> None:
         self.truth = truth
+        self._layout = layout
         self.settings = settings
+        self._world: World | None = None
         self._profile = profile
         self._pulse_at_us = settings.pulse_at_us
-        self.rows = new_world(truth, profile, settings, seed)
-        self._world: World | None = None
+        self.rows = new_world(truth, profile, settings, seed, layout)
+        self.chain = new_chain(truth, self.state)
         self._tick: Callable[..., None] | None = None  # the tick's machine code, once it was run
         self.now_us = 0  # simulated time of this tick
         self.tick_count = 0  # ticks so far
@@ -60,11 +66,18 @@ class SimCore:
     def state(self, state: PlantState) -> None:
         self._world = self.world._replace(plant=state)
         pack(self._world, self.rows.world, 0)
+        if self.chain is not None:
+            lay(self.chain, self.truth, state)
 
     @property
-    def command(self) -> Rotors:
-        """Rotor forces in force, N."""
-        return self.world.command
+    def command(self) -> Forces:
+        """Forces that the rotors are asked for, N."""
+        return tuple(self.rows.rotors[COMMAND].tolist()[: len(self._layout)])
+
+    @property
+    def rotor_force(self) -> Forces:
+        """Forces that the rotors give, N."""
+        return tuple(self.rows.rotors[FORCE].tolist()[: len(self._layout)])
 
     @property
     def wind(self) -> Vec3:
@@ -93,11 +106,14 @@ class SimCore:
         blows = begins_us >= 0 and begins_us <= self.now_us < begins_us + self.settings.pulse_for_us
         return self.settings.pulse if blows else ZERO
 
-    def tick(self, command: Rotors, gripper_open: bool = False, reel_rate: float = 0.0) -> None:
-        """Integrate to the next tick; see `world_tick`."""
+    def tick(self, command: Forces, gripper_open: bool = False, reel_rate: float = 0.0) -> None:
+        """Integrate to the next tick; see `world_tick`. Rotors that `command` does not name stand still."""
+        asked = self.rows.rotors[ASKED]
+        asked[:] = 0.0
+        asked[: len(command)] = command
         if self._tick is None:
-            self._tick = entry_of(world_tick, self.rows, command, gripper_open, reel_rate)
-        self._tick(self.rows, command, gripper_open, reel_rate)
+            self._tick = entry_of(world_tick, self.rows, asked, gripper_open, reel_rate, self.chain)
+        self._tick(self.rows, asked, gripper_open, reel_rate, self.chain)
         self._world = None
         self.now_us += self.settings.tick_us
         self.tick_count += 1
@@ -113,12 +129,13 @@ class SimCore:
         self.truth, self.settings = truth, settings
         rows = self.rows
         pack(model_of(truth, self._profile, settings, self._pulse_at_us), rows.model, 0)
-        rows.fate[:, LOSS] = losses(self._profile, settings)
+        rows.fate[:] = fates(self._profile, settings)
         # the commands on their way, oldest first, with room for those to come
         head, length = rows.command_ring
         waiting = np.roll(rows.commands, -head, axis=0)[:length]
-        commands = np.zeros((max(command_room(settings), length + command_room(settings)), 5))
+        commands = np.zeros((length + command_room(settings), waiting.shape[1]))
         commands[:length] = waiting
         commands[:length, 0] += later_us
         rows.command_ring[0] = 0
-        self.rows = rows._replace(commands=commands)
+        table = rotor_table(self._layout, settings.rotor_shares(len(self._layout)))
+        self.rows = rows._replace(commands=commands, rotor_table=table)

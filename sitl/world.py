@@ -20,14 +20,24 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add
 from autopilot.geometry.packed import Row, pack, packed, unpack, with_field
+from autopilot.vehicle.layout import MOST, PLUS, Layout
+from sitl.plant.chain.records import ChainRows, reach_of
+from sitl.plant.chain.step import advance_chain
+from sitl.plant.drive import FULL, Supply, drained
 from sitl.plant.gripper import dropped, takes_hold, without_cable
-from sitl.plant.records import PlantState, Rotors, Truth
+from sitl.plant.records import PlantState, Truth
+from sitl.plant.rotors import COMMAND, FORCE, LEFT, SHARE, RotorRows, rotor_table, rotors_at_rest
 from sitl.plant.step import advance, initial_state
 from sitl.plant.winch import later, reeling
 from sitl.plant.wind import gust
 from sitl.sensors import barometer, cable_sensor, gnss, imu, load_tracker, magnetometer, pose_tracker
+from sitl.sensors.chosen import with_chosen
+from sitl.sensors.elementary import logarithm
+from sitl.sensors.motor_field import motor_field
 from sitl.sensors.noise import Drift, Noise, gaussian, uniform
-from sitl.sensors.profile import Delivery, Profile, Sampled
+from sitl.sensors.profile import Delivery, Profile, Sampled, Stamped
+from sitl.sensors.room import Room
+from sitl.sensors.vibration import VibrationConfig, draw_phases, shaking
 from sitl.settings import SECOND_US, Settings
 
 # rows of the arrays, one a sensor
@@ -39,11 +49,12 @@ GUSTS = 8
 # columns of `clock`
 FITTED, COUNT, NOMINAL, DUE, OUTAGE_END, HEAD, LENGTH, LATENCY, LEAD = range(9)
 # columns of `fate`
-RATE, LOSS, OUTAGE_CHANCE, OUTAGE_S = range(4)
+RATE, LOSS, OUTAGE_CHANCE, OUTAGE_S, JITTER, JITTER_MAX, STAMP_OFFSET = range(7)  # the last three: us
 # columns of `queue`: leaves at (us), shows (us), then the reading
 LEAVES, SHOWS, READING = 0, 1, 2
 _COLUMNS = 15
-_FATE_BLOCK, _OUTAGE_BLOCK = 15, 14  # noise blocks; the sensors use those below
+_FATE_BLOCK, _OUTAGE_BLOCK, _JITTER_BLOCK = 15, 14, 13  # noise blocks; the sensors use those below
+_PHASES = 6  # in the row of the inertial unit's errors: where the angles of the rotors begin
 _SPARE = 4  # entries of a queue beyond those that can be on their way
 _NEVER = 2**62
 
@@ -62,6 +73,8 @@ class WorldModel(NamedTuple):
     gnss: gnss.GnssConfig
     baro: barometer.BarometerConfig
     mag: magnetometer.MagnetometerConfig
+    vibration: VibrationConfig
+    motor_field: float  # gauss, at hover
     tick_us: int
     actuator_delay_us: int
     noise_scale: float
@@ -71,6 +84,7 @@ class WorldModel(NamedTuple):
     pulse: Vec3  # ENU, m/s
     pulse_at_us: int  # negative: never
     pulse_for_us: int
+    rotors_fail_at_us: int
 
 
 class World(NamedTuple):
@@ -79,13 +93,13 @@ class World(NamedTuple):
     plant: PlantState
     tick: int
     now_us: int
-    command: Rotors  # in force, N
     gust: Vec3
     wind: Vec3  # of the last tick, ENU, m/s
     cable_length: float  # m, as the winch has it, held or not
     reel_rate: float  # m/s
     reel_accel: float  # m/s^2
     released: bool  # the gripper has let the cable go
+    supply: Supply
     snap_speed: float  # m/s, at which the cable came taut in the last tick; 0: it did not
 
 
@@ -96,11 +110,19 @@ class WorldRows(NamedTuple):
     model: Row  # WorldModel
     seed: Ints  # (1,)
     clock: Ints  # (sensors, 9)
-    fate: Floats  # (sensors, 4)
-    errors: Floats  # (sensors, 6) biases and drifts
+    fate: Floats  # (sensors, 7)
+    errors: Floats  # (sensors, 20) biases, drifts, angles of the rotors
     queue: Floats  # (sensors, capacity, 15) readings on their way
-    commands: Floats  # (capacity, 5) takes effect at (us), forces (N)
+    commands: Floats  # (capacity, 1 + rotors) takes effect at (us), forces (N)
     command_ring: Ints  # (2,) head, length
+    rotors: Floats  # as `RotorRows.rows`
+    rotor_table: Floats  # as `RotorRows.table`
+
+
+@kernel
+def rotors_of(rows: WorldRows) -> RotorRows:
+    """The rotors."""
+    return RotorRows(rows.rotor_table, rows.rotors)
 
 
 @kernel
@@ -113,12 +135,21 @@ def nominal_us(rate_hz: float, tick_us: int, lead_us: int, n: int) -> int:
 
 @kernel
 def _sample(
-    sensor: int, plant: PlantState, error: Floats, row: Floats, model: WorldModel, noise: Noise
+    sensor: int,
+    plant: PlantState,
+    rotors: RotorRows,
+    error: Floats,
+    row: Floats,
+    model: WorldModel,
+    noise: Noise,
 ) -> None:
     """Measure: the reading goes into `row`, the sensor's drift into `error`."""
     if sensor == IMU:
         inertial, biases = imu.sample(plant, unpack(imu.ImuState, error, 0), model.imu, noise)
-        pack(inertial, row, READING)
+        if model.vibration.accel > 0.0 or model.vibration.gyro > 0.0:
+            force, turning = shaking(rotors, model.truth, error[_PHASES:], model.vibration, noise)
+            inertial = imu.ImuReading(add(inertial.accel_body, force), add(inertial.gyro_body, turning))
+        pack(imu.cut(inertial, model.imu), row, READING)
         pack(biases, error, 0)
     elif sensor == MOCAP:
         pose, offset = pose_tracker.sample(
@@ -150,6 +181,9 @@ def _sample(
         field, iron = magnetometer.sample(
             plant, unpack(magnetometer.MagnetometerState, error, 0), model.mag, noise
         )
+        if model.motor_field > 0.0:
+            disturbed = motor_field(rotors, model.truth, model.motor_field * noise.scale)
+            field = magnetometer.MagnetometerReading(add(field.field_body, disturbed))
         pack(field, row, READING)
         pack(iron, error, 0)
 
@@ -167,6 +201,22 @@ def _delivers(clock: Ints, fate: Floats, noise: Noise) -> bool:
 
 
 @kernel
+def _overtake(queue: Floats, head: int, last: int) -> None:
+    """Put the reading in place `last` behind the head where it belongs by the time at which it leaves: before
+    those that it overtakes."""
+    capacity = queue.shape[0]
+    while last > 0:
+        later, own = queue[(head + last - 1) % capacity], queue[(head + last) % capacity]
+        if later[LEAVES] <= own[LEAVES]:
+            return
+        for column in range(queue.shape[1]):
+            held = own[column]
+            own[column] = later[column]
+            later[column] = held
+        last -= 1
+
+
+@kernel
 def measure(plant: PlantState, now_us: int, model: WorldModel, rows: WorldRows) -> None:
     """Take every measurement that is due."""
     capacity = rows.queue.shape[1]
@@ -175,10 +225,16 @@ def measure(plant: PlantState, now_us: int, model: WorldModel, rows: WorldRows) 
         while clock[DUE] <= now_us:
             noise = Noise(rows.seed[0], STREAMS[sensor], clock[COUNT], model.noise_scale)
             row = rows.queue[sensor, (clock[HEAD] + clock[LENGTH]) % capacity]
-            _sample(sensor, plant, rows.errors[sensor], row, model, noise)
+            _sample(sensor, plant, rotors_of(rows), rows.errors[sensor], row, model, noise)
             if _delivers(clock, fate, noise):
                 row[LEAVES] = clock[NOMINAL] + clock[LATENCY]
                 row[SHOWS] = clock[DUE]
+                if fate[STAMP_OFFSET] != 0.0:
+                    row[SHOWS] = max(clock[DUE] + fate[STAMP_OFFSET], 0.0)
+                if fate[JITTER] > 0.0:
+                    late_us = -logarithm(uniform(noise, _JITTER_BLOCK)[0]) * fate[JITTER]
+                    row[LEAVES] = row[LEAVES] + np.rint(min(late_us, fate[JITTER_MAX]))
+                    _overtake(rows.queue[sensor], clock[HEAD], clock[LENGTH])
                 clock[LENGTH] += 1
             clock[COUNT] += 1
             clock[NOMINAL] = nominal_us(fate[RATE], model.tick_us, clock[LEAD], clock[COUNT])
@@ -209,9 +265,10 @@ def pulse_at(model: WorldModel, now_us: int) -> Vec3:
 @kernel
 def held_truth(model: WorldModel, world: World) -> Truth:
     """The truth of this instant: with the cable as the winch has it, or without one."""
+    supplied = with_field(model.truth, "supply", world.supply.share)
     if world.released:
-        return without_cable(model.truth)
-    tied = with_field(model.truth, "cable_length", world.cable_length)
+        return without_cable(supplied)
+    tied = with_field(supplied, "cable_length", world.cable_length)
     return with_field(with_field(tied, "reel_rate", world.reel_rate), "reel_accel", world.reel_accel)
 
 
@@ -237,17 +294,27 @@ def _gripped(world: World, model: WorldModel, gripper_open: bool) -> World:
         return world
     if gripper_open:
         return with_field(with_field(world, "plant", dropped(world.plant)), "released", True)
-    if takes_hold(world.plant, _as_wound(model, world)):
+    if takes_hold(world.plant, reach_of(_as_wound(model, world))):
         return with_field(world, "released", False)
     return world
 
 
 @kernel
-def world_tick(rows: WorldRows, forces: Rotors, gripper_open: bool, reel_rate: float) -> None:
-    """The world at the next tick; `forces` (N) answer the present one.
+def _failing(rotors: RotorRows, failing: bool) -> None:
+    """Let each rotor give its share from here on."""
+    for i in range(rotors.table.shape[0]):
+        rotors.rows[SHARE, i] = rotors.table[i, LEFT] if failing else 1.0
+
+
+@kernel
+def world_tick(
+    rows: WorldRows, forces: Floats, gripper_open: bool, reel_rate: float, chain: ChainRows | None = None
+) -> None:
+    """The world at the next tick; `forces` (N), one of each rotor, answer the present one.
 
     They take effect after the actuator delay; before the first ones the rotors stand still. The winch reaches
-    `reel_rate` (m/s, positive: out) by the next tick; one without a cable stands.
+    `reel_rate` (m/s, positive: out) by the next tick; one without a cable stands. `chain` is the memory of a
+    cable of links; without it the cable is massless and taut or slack.
     """
     model, world = unpack(WorldModel, rows.model, 0), unpack(World, rows.world, 0)
     world = _gripped(world, model, gripper_open)
@@ -260,19 +327,26 @@ def world_tick(rows: WorldRows, forces: Rotors, gripper_open: bool, reel_rate: f
     room = commands.shape[0]
     last = commands[(ring[0] + ring[1]) % room]
     last[0] = now_us + model.actuator_delay_us
-    for i in range(4):
+    rotors = rotors_of(rows)
+    count = rotors.table.shape[0]
+    for i in range(count):
         last[1 + i] = forces[i]
     ring[1] += 1
+    _failing(rotors, now_us >= model.rotors_fail_at_us)
     wind, gusting = add(model.wind, pulse_at(model, now_us)), world.gust
     if model.gust_std != 0.0:
         normals = gaussian(Noise(rows.seed[0], GUSTS, world.tick, 1.0), 0)
         gusting = gust(gusting, model.gust_std, model.gust_tau_s, tick_s, normals)
         wind = add(wind, gusting)
-    plant, command, snap_speed = world.plant, world.command, 0.0
+    if model.truth.drive.battery > 0.0:
+        drawn = drained(world.supply, rotors.rows[FORCE], count, model.truth, tick_s)
+        world = with_field(world, "supply", drawn)
+    plant, snap_speed = world.plant, 0.0
     while now_us < end_us:
         while ring[1] > 0 and commands[ring[0], 0] <= now_us:
             first = commands[ring[0]]
-            command = (first[1], first[2], first[3], first[4])
+            for i in range(count):
+                rotors.rows[COMMAND, i] = first[1 + i]
             ring[0] = (ring[0] + 1) % room
             ring[1] -= 1
         stop_us = end_us
@@ -281,7 +355,11 @@ def world_tick(rows: WorldRows, forces: Rotors, gripper_open: bool, reel_rate: f
         for sensor in range(SENSORS):
             stop_us = min(stop_us, rows.clock[sensor, DUE])
         h = (stop_us - now_us) / 1000000
-        plant = advance(plant, held_truth(model, world), command, wind, h)
+        truth = held_truth(model, world)
+        if chain is None:
+            plant = advance(plant, truth, rotors, wind, h)
+        else:
+            plant = advance_chain(plant, truth, rotors, wind, h, chain)
         world = _with_winch(world, later(_as_wound(model, world), h))
         snap_speed = max(snap_speed, plant.snap_speed)
         now_us = stop_us
@@ -290,13 +368,13 @@ def world_tick(rows: WorldRows, forces: Rotors, gripper_open: bool, reel_rate: f
         plant,
         world.tick + 1,
         end_us,
-        command,
         gusting,
         wind,
         world.cable_length,
         world.reel_rate,
         world.reel_accel,
         world.released,
+        world.supply,
         snap_speed,
     )
     pack(after, rows.world, 0)
@@ -305,11 +383,12 @@ def world_tick(rows: WorldRows, forces: Rotors, gripper_open: bool, reel_rate: f
 # ---- before the flight, and when parameters change
 
 _NO_DRIFT = Drift(0.0, 1.0, 0.0)
+_NO_ROOM = Room(0.0, 1.0)
 _NOT_FITTED = (
-    pose_tracker.PoseConfig(0.0, 0.0, 0.0, 0.0, _NO_DRIFT),
-    load_tracker.LoadConfig(0.0, 0.0, _NO_DRIFT),
+    pose_tracker.PoseConfig(0.0, 0.0, 0.0, 0.0, _NO_DRIFT, _NO_DRIFT, _NO_ROOM),
+    load_tracker.LoadConfig(0.0, 0.0, _NO_DRIFT, _NO_DRIFT, _NO_ROOM),
     cable_sensor.CableConfig(0.0, _NO_DRIFT, 0.0, 0.0),
-    gnss.GnssConfig(ZERO, ZERO, ZERO, _NO_DRIFT),
+    gnss.GnssConfig(ZERO, ZERO, ZERO, _NO_DRIFT, ZERO, _NO_DRIFT, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     barometer.BarometerConfig(0.0, _NO_DRIFT),
     magnetometer.MagnetometerConfig(ZERO, 0.0, _NO_DRIFT),
 )
@@ -340,11 +419,14 @@ def fitted_sensors(profile: Profile) -> tuple[Delivery | None, ...]:
 
 def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: int) -> WorldModel:
     """The model of a world under these settings."""
+    profile = with_chosen(profile, settings.chosen)
     tick_s = settings.tick_us / SECOND_US
     parts: list[Any] = [truth, profile.imu.config(tick_s, truth.gravity)]
     for table, blank in zip(fitted_sensors(profile)[1:], _NOT_FITTED, strict=True):
         parts.append(blank if table is None else table.config(tick_s))  # type: ignore[attr-defined]
     parts += [
+        profile.imu.vibration(tick_s),
+        0.0 if profile.magnetometer is None else profile.magnetometer.motor_field_gauss,
         settings.tick_us,
         settings.actuator_delay_us,
         settings.noise_scale,
@@ -354,19 +436,35 @@ def model_of(truth: Truth, profile: Profile, settings: Settings, pulse_at_us: in
         settings.pulse,
         pulse_at_us,
         settings.pulse_for_us,
+        settings.rotors_fail_at_us,
     ]
     return WorldModel(*parts)
 
 
-def losses(profile: Profile, settings: Settings) -> list[float]:
-    """Share of each sensor's readings that is lost singly, all of a failed one; the inertial unit is wired to
-    the autopilot and is spared what is lost on the way."""
-    found = []
-    for sensor, table in enumerate(fitted_sensors(profile)):
+def fates(profile: Profile, settings: Settings) -> Floats:
+    """(sensors, 7) rate of each sensor, what is lost of its readings, and how late and how wrongly dated they
+    come.
+
+    Of a failed sensor all is lost. The inertial unit is wired to the autopilot and is spared what is lost on
+    the way.
+    """
+    found = np.zeros((SENSORS, 7))
+    for sensor, table in enumerate(fitted_sensors(with_chosen(profile, settings.chosen))):
+        if table is None:
+            continue
+        row = found[sensor]
+        rate_hz, _, lead_us = _timing(table, settings)
         extra = 0.0 if sensor == IMU else settings.sensor_loss
         if settings.failed_sensors[sensor]:
             extra = 1.0
-        found.append(0.0 if table is None else min(table.loss + extra, 1.0))
+        row[RATE], row[LOSS] = rate_hz, min(table.loss + extra, 1.0)
+        period_us = nominal_us(rate_hz, settings.tick_us, lead_us, 1) + lead_us
+        row[OUTAGE_CHANCE] = table.outages_per_min / 60.0 * period_us / SECOND_US
+        row[OUTAGE_S] = table.outage_s
+        if isinstance(table, Stamped):
+            row[JITTER] = round(table.jitter_ms * 1000.0) if table.latest_ms > 0.0 else 0.0
+            row[JITTER_MAX] = round(table.latest_ms * 1000.0)
+            row[STAMP_OFFSET] = round(table.time_offset_ms * 1000.0) + settings.stamp_offset_us
     return found
 
 
@@ -375,15 +473,16 @@ def command_room(settings: Settings) -> int:
     return settings.actuator_delay_us // settings.tick_us + _SPARE
 
 
-def new_world(truth: Truth, profile: Profile, settings: Settings, seed: int) -> WorldRows:
+def new_world(
+    truth: Truth, profile: Profile, settings: Settings, seed: int, layout: Layout = PLUS
+) -> WorldRows:
     """The world before its first tick, its first readings taken."""
     model = model_of(truth, profile, settings, settings.pulse_at_us)
     configs = model[1 : 1 + SENSORS]
     clock = np.zeros((SENSORS, 9), dtype=np.int64)
-    fate = np.zeros((SENSORS, 4))
-    errors = np.zeros((SENSORS, 6))
+    fate = fates(profile, settings)
+    errors = np.zeros((SENSORS, _PHASES + MOST))
     capacity = _SPARE
-    lost = losses(profile, settings)
     for sensor, (table, config) in enumerate(zip(fitted_sensors(profile), configs, strict=True)):
         clock[sensor, DUE] = _NEVER
         if table is None:
@@ -392,27 +491,26 @@ def new_world(truth: Truth, profile: Profile, settings: Settings, seed: int) -> 
         first_us, second_us = (nominal_us(rate_hz, settings.tick_us, lead_us, n) for n in (0, 1))
         begun = _KINDS[sensor].start(config, Noise(seed, STREAMS[sensor], 0, settings.noise_scale))
         pack(begun, errors[sensor], 0)
-        period_us = second_us - first_us
-        chance = table.outages_per_min / 60.0 * period_us / SECOND_US
-        fate[sensor] = (rate_hz, lost[sensor], chance, table.outage_s)
         clock[sensor, FITTED] = 1
         clock[sensor, NOMINAL] = first_us
         clock[sensor, DUE] = max(first_us, 0)
         clock[sensor, LATENCY] = latency_us
         clock[sensor, LEAD] = lead_us
-        waiting = (latency_us + settings.tick_us) // max(period_us, 1)
+        latest_us = latency_us + int(fate[sensor, JITTER_MAX])
+        waiting = (latest_us + settings.tick_us) // max(second_us - first_us, 1)
         capacity = max(capacity, waiting + _SPARE)
+    draw_phases(errors[IMU, _PHASES:], len(layout), Noise(seed, STREAMS[IMU], 0, settings.noise_scale))
     begun_world = World(
         plant=initial_state(truth),
         tick=0,
         now_us=0,
-        command=(0.0, 0.0, 0.0, 0.0),
         gust=gaussian(Noise(seed, GUSTS, 0, settings.gust_std), 1),
         wind=settings.wind,
         cable_length=truth.cable_length,
         reel_rate=truth.reel_rate,
         reel_accel=truth.reel_accel,
         released=False,
+        supply=FULL,
         snap_speed=0.0,
     )
     rows = WorldRows(
@@ -423,8 +521,10 @@ def new_world(truth: Truth, profile: Profile, settings: Settings, seed: int) -> 
         fate,
         errors,
         np.zeros((SENSORS, capacity, _COLUMNS)),
-        np.zeros((command_room(settings), 5)),
+        np.zeros((command_room(settings), 1 + len(layout))),
         np.zeros(2, dtype=np.int64),
+        rotors_at_rest(),
+        rotor_table(layout, settings.rotor_shares(len(layout))),
     )
     measure(begun_world.plant, 0, model, rows)
     return rows

@@ -5,15 +5,22 @@ from __future__ import annotations
 from autopilot.control.actuators.disturbance_observer import ObserverConstants, observer_constants
 from autopilot.control.actuators.rotor_model import ActuationConstants, actuation_constants
 from autopilot.control.design import Design, Timing, Wanted, design
-from autopilot.control.load_motion import Drag
+from autopilot.control.drag import Drag
 from autopilot.control.records import Vehicle
+from autopilot.vehicle.parameters import AutopilotParameters
+from autopilot.vehicle.rotors import allocate, sizes
 from autopilot.wire.parameter_table import ParameterTable
 
+# A rotor that is asked for its full force shows nothing of it until delay and lag are over, and is judged by
+# three speeds, 60 ms. In this time what is expected of it may rise by less than the tenth of the full force
+# from which on it is judged (`autopilot.core.tick.rotors_lost`): 1 - exp(-t / T) < 0.1 for T = 10 t.
+SPEEDS_S, ROTOR_PATIENCE = 0.06, 10.0
 GREATEST_PUSH = 0.3  # of the weight: more wind than that is not believed
 
 
-def believed_vehicle(table: ParameterTable) -> Vehicle:
+def believed_vehicle(table: AutopilotParameters) -> Vehicle:
     """The vehicle as the parameters describe it."""
+    lift, level = sizes(allocate(table.layout))
     return Vehicle(
         quad_mass=table["VEH_QUAD_MASS"],
         load_mass=table["VEH_LOAD_MASS"],
@@ -24,6 +31,9 @@ def believed_vehicle(table: ParameterTable) -> Vehicle:
         torque_ratio=table["VEH_TORQUE"],
         rotor_min=table["VEH_ROTOR_MIN"],
         rotor_max=table["VEH_ROTOR_MAX"],
+        lift=lift,
+        level=level,
+        attachment=(table["VEH_ATT_X"], table["VEH_ATT_Y"], table["VEH_ATT_Z"]),
     )
 
 
@@ -43,6 +53,13 @@ def believed_delay(table: ParameterTable) -> float:
     return 1e-3 * (table["VEH_ACT_DELAY"] + table["VEH_IMU_DELAY"])
 
 
+def believed_rotor_watch(table: ParameterTable) -> float:
+    """Share of a period in the time for which a rotor must have been asked for a force to be judged by it."""
+    period = 1.0 / table["CTL_RATE_HZ"]
+    silent = believed_delay(table) + 1e-3 * table["VEH_ROTOR_TAU"] + SPEEDS_S
+    return period / (ROTOR_PATIENCE * silent + period)
+
+
 def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
     """The gains of `plumbline` for the vehicle that the parameters describe."""
     lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]
@@ -55,7 +72,9 @@ def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
             zeta=table["PLB_ZETA"],
             noise=table["PLB_NOISE"],
         ),
-        Timing(believed_delay(table), lag, min(lag, shown), 1.0 / table["CTL_RATE_HZ"]),
+        Timing(
+            believed_delay(table), lag, min(lag, shown), 1.0 / table["CTL_RATE_HZ"], table["PLB_T_TORQUE"]
+        ),
         vehicle,
     )
 
@@ -64,5 +83,12 @@ def believed_observer(table: ParameterTable, vehicle: Vehicle) -> ObserverConsta
     """How fast disturbances are learned."""
     weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
     return observer_constants(
-        table["PLB_T_MASS"], table["PLB_T_PUSH"], GREATEST_PUSH * weight, 1.0 / table["CTL_RATE_HZ"]
+        table["PLB_T_MASS"],
+        table["PLB_T_PUSH"],
+        table["PLB_T_DRAG"],
+        table["PLB_T_TORQUE"],
+        GREATEST_PUSH * weight,
+        1.0 / table["CTL_RATE_HZ"],
+        believed_drag(table),
+        vehicle,
     )

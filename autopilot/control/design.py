@@ -13,6 +13,7 @@
 | k_R, k_Omega | k_R, k_Omega | B | N m, N m s | J omega_R^2, 2 zeta omega_R J |
 | d, delta | delay, tolerance | | s | delay believed; unknown delay to survive |
 | tau_a, T | lag, period | | s | lag that the rotors show; of the control law |
+| tau_d | torque_time | | s | in which a torque on the vehicle is learned (`disturbance_observer`) |
 | K, A, b | K, A, b | | | below |
 
 Near hover the law is u = -K x on the chain e_i, x_L, v_L, q, q', theta, Omega of one level axis,
@@ -22,8 +23,11 @@ Near hover the law is u = -K x on the chain e_i, x_L, v_L, q, q', theta, Omega o
 and the poles are those of three loops, one inside the other, and omega_i. With prediction over d the loop
 holds for every delay between d - delta and d + delta, by the small-gain theorem, if
 
-    delta omega |K exp(A d) G(i omega)| / |1 + K G(i omega)| < 1 at all omega,
-    G(s) = (s - A)^-1 b exp(-s T / 2)
+    delta omega |S(i omega)| < 1 at all omega,
+    S(s) = K exp(A d) G (1 - Q exp(-s d)) / (1 + K G) + Q,
+    G(s) = (s - A)^-1 b exp(-s T / 2),    Q(s) = 1 / (1 + s tau_d)
+
+S is what the rotors are asked for against a torque: once it has moved the vehicle, and as it is learned.
 
 What is wanted is delta. The ratios of the bandwidths are given; all three are as high as two conditions
 allow: the tolerance is kept, and three standard deviations of each rotor's command, for the noise that the
@@ -33,12 +37,13 @@ estimate is believed to have, fit between hover and the nearest limit of a rotor
 from __future__ import annotations
 
 import math
+import warnings
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_lyapunov
+from scipy.linalg import LinAlgWarning, expm, solve_discrete_lyapunov
 
 from autopilot.control.plumbline_cascade import PlumblineGains
 from autopilot.control.records import Vehicle
@@ -72,6 +77,7 @@ class Timing(NamedTuple):
     lag: float  # as it is
     lag_shown: float  # as it is made to look
     period: float
+    torque_time: float = 0.0  # in which a torque is learned; 0: it is not
 
 
 class Design(NamedTuple):
@@ -175,21 +181,28 @@ def judged(
         return 0.0, math.inf
     omegas = np.geomspace(0.02 * omega_x, 0.99 * math.pi / T, 300)
     G = response(vehicle, J, lag, T, omegas)
-    tolerance = 1.0 / float(np.max(omegas * np.abs((G @ ahead) / (1.0 + G @ K))))
+    against = (G @ ahead) / (1.0 + G @ K)
+    if timing.torque_time > 0.0:
+        learned = 1.0 / (1.0 + 1j * omegas * timing.torque_time)
+        against = against * (1.0 - learned * np.exp(-1j * omegas * timing.delay)) + learned
+    tolerance = 1.0 / float(np.max(omegas * np.abs(against)))
 
     W = np.zeros((n, n))
     W[:_STATES, :_STATES] = np.diag((noise * np.array(NOISE)) ** 2)
     drive = float(ahead @ W @ ahead)
-    P = solve_discrete_lyapunov(closed, drive * np.outer(b_d, b_d))
+    with warnings.catch_warnings():
+        # the integral of a position beside angular rates: great ratios, and of P only K P K' is used
+        warnings.simplefilter("ignore", LinAlgWarning)
+        P = solve_discrete_lyapunov(closed, drive * np.outer(b_d, b_d))
     moment = math.sqrt(float(K @ P @ K) + drive)
     faster = (1.0 - math.exp(-T / lag)) / (1.0 - math.exp(-T / max(lag, timing.lag)))
-    return tolerance, faster * moment / (2.0 * vehicle.arm)
+    return tolerance, faster * moment / (vehicle.level * vehicle.arm)
 
 
 @lru_cache(maxsize=16)
 def design(wanted: Wanted, timing: Timing, vehicle: Vehicle) -> Design:
     """The fastest gains that keep what is wanted; the slowest looked at where none does."""
-    hover = 0.25 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    hover = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / vehicle.lift
     room = min(vehicle.rotor_max - hover, hover - vehicle.rotor_min)
 
     def bandwidths(omega_R: float) -> tuple[float, float, float, float]:

@@ -32,14 +32,7 @@ from typing import NamedTuple
 
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, apply, axpy, column, cross, dot, norm, scale, sub
-
-
-class Drag(NamedTuple):
-    """Drag of the vehicle, -(linear + quadratic |v|) v."""
-
-    linear: float  # N s/m
-    quadratic: float  # N s^2/m^2
+from autopilot.geometry.linear import Vec3, add, apply, axpy, column, cross, dot, scale, sub
 
 
 class LoadMotion(NamedTuple):
@@ -49,12 +42,6 @@ class LoadMotion(NamedTuple):
     j_load: Vec3  # m/s^3
     q_ddot: Vec3  # 1/s^2
     q_dddot: Vec3  # 1/s^3
-
-
-@kernel
-def air_force(v_quad: Vec3, drag: Drag) -> Vec3:
-    """D, N, world frame, of a vehicle at v_quad (m/s) in air at rest."""
-    return scale(-(drag.linear + drag.quadratic * norm(v_quad)), v_quad)
 
 
 @kernel

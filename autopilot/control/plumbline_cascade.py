@@ -36,6 +36,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from autopilot.control.direction_jet import PositionJet, direction_jet, held_up, position_jet
+from autopilot.control.drag import Drag, air_force
 from autopilot.control.load_attitude import (
     DirectionCommand,
     DirectionResult,
@@ -43,7 +44,7 @@ from autopilot.control.load_attitude import (
     normal_force_tracking,
     thrust_along,
 )
-from autopilot.control.load_motion import Drag, LoadMotion, air_force, load_motion
+from autopilot.control.load_motion import LoadMotion, load_motion
 from autopilot.control.quad_attitude import AttitudeCommand, attitude_from_axes, attitude_moment
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis_cascade import attitude_towards
@@ -167,7 +168,10 @@ def commanded_attitude(
     return AttitudeCommand(
         attitude.R_c,
         no_longer(attitude.Omega_c, _GREATEST_RATE),
-        no_longer(attitude.Omega_c_dot, vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J),
+        no_longer(
+            attitude.Omega_c_dot,
+            0.5 * vehicle.level * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min) / J,
+        ),
     )
 
 
@@ -359,6 +363,6 @@ def load_position(
     held = norm(times(gains.k_i, integral))
     if held > GREATEST_HELD * weight:
         integral = scale(GREATEST_HELD * weight / held, integral)
-    fastest = 4.0 * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
+    fastest = vehicle.lift * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
     thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
     return PlumblineMemory(thrust_rate, integral), command

@@ -17,7 +17,8 @@ Jet = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]
 
 class Vehicle(NamedTuple):
     """What the autopilot believes of the vehicle (Table 4-1). Assumptions: principal axes are the body axes,
-    the cable is massless, inextensible and attached at the centre of mass."""
+    the cable is massless and inextensible. The laws take it for attached at the centre of mass; what becomes
+    of another `attachment` is in `autopilot.core.attachment`."""
 
     quad_mass: float  # m_Q, kg, without the load
     load_mass: float  # m_L, kg
@@ -28,6 +29,9 @@ class Vehicle(NamedTuple):
     torque_ratio: float  # c = d/b, m: drag torque for each newton of thrust
     rotor_min: float  # N, one rotor
     rotor_max: float  # N, one rotor; inf if unlimited
+    lift: float = 4.0  # thrust when the first rotor of strength 1 reaches a force, of that force
+    level: float = 2.0  # the same of a moment about a level axis, of that force times `arm`
+    attachment: Vec3 = (0.0, 0.0, 0.0)  # m, of the cable, from the centre of mass, body
 
 
 class Cable(NamedTuple):

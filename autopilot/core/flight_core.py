@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import nan
+from math import inf, nan
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.control.actuators.disturbance_observer import ObserverConstants, nominal
+from autopilot.control.actuators.mixer import FORCE, TOLD, new_rotors
 from autopilot.control.actuators.rotor_model import ActuationConstants, rows_of, steady
+from autopilot.control.actuators.unlike_rotors import with_lags
+from autopilot.control.drag import Drag
 from autopilot.control.laws.interface import law_of, new_rows
-from autopilot.control.load_motion import Drag
-from autopilot.control.records import Cable, Command, State, Vehicle
+from autopilot.control.records import Cable, State, Vehicle
+from autopilot.core.estimator_seat import Seat
 from autopilot.core.tick import (
     NO_COMMAND,
     STOPPED,
@@ -37,14 +40,19 @@ from autopilot.estimation.records import (
     Array,
     EstimatorState,
     EstimatorTuning,
+    LoadEstimate,
     blank_state,
     new_history,
 )
 from autopilot.geometry.entry import entry_of
-from autopilot.geometry.linear import IDENTITY, ZERO
-from autopilot.geometry.packed import pack, packed, unpack, width
+from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
+from autopilot.geometry.packed import pack, packed, place_of, unpack
 from autopilot.guidance.layout import COLUMNS, jets_ahead
-from autopilot.guidance.legs import Catch, Leg, least_move_s, top_of
+from autopilot.guidance.legs import Brake, Catch, Leg, Slow, least_move_s, top_of
+from autopilot.own.chosen import OwnSetup
+from autopilot.own.estimator import load_estimator
+from autopilot.own.host import Host
+from autopilot.own.law import load_law
 from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.quiescence import RESTING, Stretch, at_rest, next_stretch
@@ -52,8 +60,11 @@ from autopilot.supervisor.recovery import Found, broken_off, take_up
 from autopilot.supervisor.requests.decide import decide
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Report, Text, View, carries, leg_time_s
+from autopilot.vehicle.layout import PLUS, Layout
+from autopilot.vehicle.rotors import allocate, sizes
 
 LAID_OUT = 250  # setpoints that a process lays out at once, a second of them; a sweep takes more
+LAID_OUT_BRAKING = 50  # of a stop, which takes 20 us each: whoever commands one must not cost a tick
 _NO_ROWS = np.zeros((1, COLUMNS))
 _NOTHING = Report()
 
@@ -71,6 +82,11 @@ class Setup:
     tuning: EstimatorTuning
     settings: Settings
     control_every: int  # ticks
+    layout: Layout = PLUS
+    rotor_watch: float = 1.0  # as of `believed_rotor_watch`
+    own: OwnSetup | None = None  # the law that somebody has brought, if it is the one that flies
+    estimator: OwnSetup | None = None  # the estimator that somebody has brought
+    planner: OwnSetup | None = None  # the same of paths through waypoints
 
     @property
     def preview_s(self) -> float:
@@ -96,10 +112,12 @@ class FlightCore:
         self.flight = Flight()
         self.settings = setup.settings  # with the cable as it is
         self._laid_out = laid_out
+        self._lost = 0  # rotors that are known to be lost: bits
         self._cable_m: float | None = None  # that `settings` were made for
         self._dirty = True  # the flight has changed since the winch was told
         self._reeling: tuple[tuple[Leg, ...], bool] = ((), False)  # legs, and whether the first of them reels
-        self.law_rows = new_rows(setup.law)
+        self._host: Host | None = None
+        self._seat: Seat | None = None
         self._fly: Callable[..., int] | None = None  # the tick's machine code for this law, once it was run
         self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
         pilot = Pilot(NO_COMMAND, STOPPED, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
@@ -110,14 +128,20 @@ class FlightCore:
             commands=np.zeros((rows_of(setup.actuation), 4)),
             history=new_history(),
             inbox=new_inbox(),
-            constants=packed(_constants(setup)),
+            constants=packed(self._constants()),
             winch=packed(Winch(Cable(setup.vehicle.cable_length), 0.0, False)),
             stretch=packed(at_rest(0, 0, False)),
             targets=_NO_ROWS,
             references=_NO_ROWS,
+            rotors=new_rotors(),
+            table=with_lags(allocate(setup.layout), setup.layout, setup.actuation),
         )
 
-        self.locate_forces()
+        self.law_rows = self._rows_of_law(setup)
+        if setup.estimator is not None:
+            self._seat = Seat(load_estimator(setup.estimator.reference), self.rows, self._relieve)
+            self._seat.make(setup.estimator.values)
+            self._relieve()
 
     # ---- what there is
 
@@ -127,15 +151,39 @@ class FlightCore:
         return unpack(EstimatorState, self.rows.estimator, 0)
 
     @property
+    def told_rpm(self) -> tuple[float, ...]:
+        """Speeds that the speed controllers told last, rpm, one of each rotor."""
+        return tuple(self.rows.rotors[TOLD, : len(self.setup.layout)].tolist())
+
+    @property
     def pilot(self) -> Pilot:
         """Command, rotor forces, and what is observed."""
         return unpack(Pilot, self.rows.pilot, 0)
 
     @property
-    def forces(self) -> tuple[float, float, float, float]:
-        """What the rotors are to give, N."""
-        f1, f2, f3, f4 = self.force_row.tolist()
-        return (f1, f2, f3, f4)
+    def shown_estimator(self) -> Array:
+        """`EstimatorState` as telemetry shows it: with what an estimator of somebody's own gives."""
+        return self.rows.estimator if self._seat is None or self._seat.fault else self._seat.shown
+
+    @property
+    def built_in(self) -> tuple[Vec3, Vec3, Vec3] | None:
+        """Load (position, velocity) and vehicle as the built-in filter has them beside an estimator of
+        somebody's own; None where that does not fly."""
+        if self._seat is None or self._seat.fault:
+            return None
+        state = self._seat.built_in
+        return state.x_load, state.v_load, state.x_quad
+
+    @property
+    def force_row(self) -> Array:
+        """What the rotors are to give, N; zeros for those that there are not."""
+        row: Array = self.rows.rotors[FORCE]
+        return row
+
+    @property
+    def forces(self) -> tuple[float, ...]:
+        """What each rotor is to give, N."""
+        return tuple(self.force_row[: len(self.setup.layout)].tolist())
 
     @property
     def state(self) -> State:
@@ -161,6 +209,9 @@ class FlightCore:
             oldest_s = self.settings.failsafe.sensor_age_limit_s
             found = complaints(estimator, oldest_s, carried, silent_s)
             lost = loss(estimator, silent_s)
+        seat = self._seat
+        if seat is not None and not seat.fault and not seat.host.known:
+            found += (f"no estimate of {seat.host.estimator.told}",)
         state = seen.state
         return View(
             now_us,
@@ -175,36 +226,77 @@ class FlightCore:
             seen.height_std,
             state.R,
             lost,
+            self._host.fault if self._host is not None else "",
+            seen.rotors_lost,
+            seat.fault if seat is not None else "",
+            bool(self.rows.estimator[_LOAD_AGE] == inf),
         )
 
     # ---- from tick to tick
 
-    def locate_forces(self) -> None:
-        """Find what the rotors are to give in the rows as they lie now."""
-        first = width(Command)  # forces are the first of what the mixer gives
-        self.force_row = self.rows.pilot[first : first + 4]  # N
-
     def take_inbox(self, inbox: Array) -> None:
         """A larger inbox."""
         self.rows = self.rows._replace(inbox=inbox)
+        if self._seat is not None:
+            self._seat.bind(self.rows)
 
     def step(self, count: int, now_us: int, tick: int, dt: float) -> Report:
         """One tick of `dt` seconds with the first `count` readings of the inbox."""
         self.move_cable(now_us)
         if self._fly is None:
             self._fly = entry_of(fly_tick, self.rows, self.law_rows, count, now_us, tick, dt, False)
-        if self._fly(self.rows, self.law_rows, count, now_us, tick, dt, False) != TO_DECIDE:
-            return _NOTHING
-        report = self.decide(now_us, round(dt * 1e6))
-        self._fly(self.rows, self.law_rows, count, now_us, tick, dt, True)
+        report = _NOTHING
+        if self._fly(self.rows, self.law_rows, count, now_us, tick, dt, False) == TO_DECIDE:
+            report = self.decide(now_us, round(dt * 1e6))
+            self._fly(self.rows, self.law_rows, count, now_us, tick, dt, True)
+        self.raise_interruption()
         return report
+
+    def raise_interruption(self) -> None:
+        """Raise what has interrupted law or estimator amid the tick and is not its fault, as Ctrl-C."""
+        if self._host is not None:
+            self._host.guard.raise_interruption()
+        if self._seat is not None:
+            self._seat.host.guard.raise_interruption()
 
     def decide(self, now_us: int, period_us: int) -> Report:
         """The supervisor's part of a tick that is estimated already; the law's is still to come."""
         self.flight, report = advance(self.flight, self.view(now_us, pulls=True), self.settings)
         self._dirty = True
         self._lay_out(now_us, period_us)
+        self._use_rotors()
         return report
+
+    def _use_rotors(self) -> None:
+        """Mix for the rotors that are not lost, where these can carry the vehicle."""
+        lost = self.flight.rotors_lost
+        if lost != self._lost:
+            self._lost = lost
+            self.rows = self.rows._replace(table=self._table())
+            pack(self._constants(), self.rows.constants, 0)
+
+    def _table(self) -> Array:
+        """Of the mixer, for the rotors that are left if these can fly the vehicle."""
+        left = self.setup.settings.rotors.can_fly_without(self._lost)
+        layout = self.setup.layout
+        return with_lags(allocate(layout, self._lost if left else 0), layout, self.setup.actuation)
+
+    def _constants(self) -> CoreConstants:
+        setup, rotors = self.setup, self.setup.settings.rotors
+        lift, level = sizes(self._table())
+        return CoreConstants(
+            setup.tuning,
+            setup.vehicle._replace(lift=lift, level=level),
+            setup.limited,
+            setup.actuation,
+            setup.observer,
+            setup.drag,
+            setup.control_every,
+            setup.settings.failsafe.sensor_age_limit_s,
+            setup.rotor_watch,
+            rotors.can_fly_without(self._lost) and not rotors.can_hold_heading_without(self._lost),
+            *(self._seat.link if self._seat is not None else (0, 0)),
+        )
 
     def move_cable(self, now_us: int) -> None:
         """Let the cable be as the winch has it at this instant."""
@@ -248,10 +340,11 @@ class FlightCore:
             )
             targets = references = np.ravel(jet).reshape(1, COLUMNS)
         else:
-            ticks = max(1, min(self._laid_out, -(-(stretch.stop_us - now_us) // stretch.period_us)))
+            legs = (*flight.legs, *flight.following)
+            most = LAID_OUT_BRAKING if isinstance(leg, Brake | Slow) else self._laid_out
+            ticks = max(1, min(most, -(-(stretch.stop_us - now_us) // stretch.period_us)))
             since_us = now_us - flight.leg_start_us
             times = np.asarray((since_us + stretch.period_us * np.arange(ticks)) * 1e-6, np.float64)
-            legs = (*flight.legs, *flight.following)
             targets = references = jets_ahead(legs, times)
             if preview_s != 0.0:
                 references = jets_ahead(legs, times + preview_s)
@@ -297,9 +390,25 @@ class FlightCore:
         flight, texts = broken_off(self.flight, why, self.view(now_us), self.settings)
         self.change(flight)
         pack(blank_state(), self.rows.estimator, 0)
+        if self._seat is not None:
+            self._seat.host.begin()
         for row, blank in zip(self.rows.history, new_history(), strict=True):
             row[:] = blank
         return texts
+
+    def _rows_of_law(self, setup: Setup) -> Any:
+        """Rows of the law; one that somebody has brought is called from them."""
+        rows = new_rows(setup.law)
+        if setup.own is not None:
+            if self._host is None:
+                self._host = Host(load_law(setup.own.reference), self.interrupt)
+            self._host.bind(rows, setup.own.values)
+        return rows
+
+    def _relieve(self) -> None:
+        """Let the tick call the estimator that somebody has brought, as long as it has not failed."""
+        pack(self._constants(), self.rows.constants, 0)
+        self.interrupt()
 
     def interrupt(self) -> None:
         """Let the supervisor look at the next tick."""
@@ -311,14 +420,16 @@ class FlightCore:
         before, self.setup = self.setup, setup
         self._cable_m, self.settings = None, setup.settings
         self._dirty = True
-        pack(_constants(setup), self.rows.constants, 0)
+        if self._seat is not None and setup.estimator is not None:
+            self._seat.make(setup.estimator.values)
+        pack(self._constants(), self.rows.constants, 0)
         commands = np.zeros((rows_of(setup.actuation), 4))
         kept = min(len(commands), len(self.rows.commands))
         commands[:kept] = self.rows.commands[:kept]
         # a longer delay asks for more than is remembered: before, they were asked for about the same
         commands[kept:] = self.rows.commands[-1]
-        self.rows = self.rows._replace(commands=commands)
-        rows = new_rows(setup.law)
+        self.rows = self.rows._replace(commands=commands, table=self._table())
+        rows = self._rows_of_law(setup)
         if law_of(setup.law) is law_of(before.law):
             rows.memory[:] = self.law_rows.memory
         else:
@@ -329,19 +440,6 @@ class FlightCore:
         self._fly = None
         self._follow_cable()
         self.interrupt()
-
-
-def _constants(setup: Setup) -> CoreConstants:
-    return CoreConstants(
-        setup.tuning,
-        setup.vehicle,
-        setup.limited,
-        setup.actuation,
-        setup.observer,
-        setup.drag,
-        setup.control_every,
-        setup.settings.failsafe.sensor_age_limit_s,
-    )
 
 
 def with_cable_now(flight: Flight, now_us: int) -> Flight:
@@ -371,5 +469,6 @@ def commanded_rate(flight: Flight, now_us: int, period_s: float) -> float:
     return -flight.legs[0].jet(leg_time_s(flight, now_us) + period_s)[1][2]
 
 
+_LOAD_AGE = place_of(EstimatorState, "load") + place_of(LoadEstimate, "age_s")
 _REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
-_BLIND = Seen(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0)  # before the first reading
+_BLIND = Seen(_REST, False, 0.0, 0.0, 0.0, NO_POSE, NO_LOAD, 0.0, 0)  # before the first reading

@@ -1,8 +1,7 @@
 """Condition of the vehicle that telemetry shows and nothing flies by: sensors heard, vibration, battery.
 
-No sensor tells of the battery: charge, current and voltage are those of a model. A rotor of force f draws
-power as momentum theory has it, P ~ f^(3/2), scaled so that four rotors that carry the bare vehicle draw
-BAT_HOVER_W. Voltage is that of a lithium cell by its charge, less the sag of the current.
+Where no sensor tells of the battery, charge, current and voltage are those of a model,
+`autopilot.vehicle.battery`, in which rotors that carry the bare vehicle draw BAT_HOVER_W.
 
 Vibration is what ArduPilot calls so: the acceleration less its mean below 5 Hz, squared, averaged below 2 Hz,
 square root.
@@ -19,8 +18,16 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.services import snapshot
+from autopilot.vehicle.battery import (
+    Battery,
+    charge_left,
+    drawn_current,
+    terminal_voltage,
+    watts_per,
+    work_of,
+)
+from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.convert import ACCEL, GYRO, MAG, PRESSURE
-from autopilot.wire.parameter_table import ParameterTable
 
 _FRESH_US = 500_000  # a sensor is healthy while its last word is no older
 _MEAN_HZ, _SQUARE_HZ = 5.0, 2.0
@@ -30,19 +37,7 @@ _FIELDS = (
     (MAG, snapshot.MAG),
     (PRESSURE, snapshot.BARO),
 )
-_ELECTRONICS_W = 3.0  # on the ground: flight computer and radio
-# (share of the charge left, open-circuit voltage of a cell); a common lithium-polymer cell
-_CELL = ((0.0, 3.0), (0.05, 3.45), (0.2, 3.68), (0.5, 3.82), (0.9, 4.05), (1.0, 4.2))
 _NEVER = (-1, -1, -1, -1)
-
-
-class BatteryConstants(NamedTuple):
-    """The battery by its parameters."""
-
-    capacity_as: float  # A s
-    cells: float
-    resistance: float  # ohm
-    watts_per: float  # W / N^(3/2), of one rotor
 
 
 class Condition(NamedTuple):
@@ -56,49 +51,25 @@ class Condition(NamedTuple):
     current: float = 0.0  # A
 
 
-def battery_constants(table: ParameterTable) -> BatteryConstants:
+def battery_constants(table: AutopilotParameters) -> Battery:
     """From the parameters."""
-    weight = table["VEH_QUAD_MASS"] * table["VEH_GRAVITY"]
-    rotor = (weight / 4.0) ** 1.5
-    return BatteryConstants(
-        table["BAT_CAPACITY"] * 3.6, table["BAT_CELLS"], table["BAT_R"], table["BAT_HOVER_W"] / (4.0 * rotor)
+    rotors = len(table.layout)
+    return Battery(
+        table["BAT_CAPACITY"] * 3.6,
+        table["BAT_CELLS"],
+        table["BAT_R"],
+        watts_per(table["BAT_HOVER_W"], table["VEH_QUAD_MASS"] * table["VEH_GRAVITY"], rotors),
     )
 
 
-@kernel
-def open_voltage(charge: float) -> float:
-    """Open-circuit voltage of a cell with this share of its charge."""
-    for i in range(len(_CELL) - 1):
-        low, v_low = _CELL[i]
-        high, v_high = _CELL[i + 1]
-        if charge <= high:
-            return v_low + (v_high - v_low) * max(charge - low, 0.0) / (high - low)
-    return _CELL[-1][1]
-
-
-def remaining(condition: Condition, battery: BatteryConstants) -> float:
+def remaining(condition: Condition, battery: Battery) -> float:
     """Share of the charge that is left."""
-    return max(0.0, 1.0 - condition.used_as / battery.capacity_as)
+    return charge_left(condition.used_as, battery)
 
 
-def voltage(condition: Condition, battery: BatteryConstants) -> float:
+def voltage(condition: Condition, battery: Battery) -> float:
     """V at the terminals."""
-    open_v = battery.cells * open_voltage(remaining(condition, battery))
-    return max(0.0, open_v - battery.resistance * condition.current)
-
-
-@kernel
-def _current(forces: Row, used_as: float, battery: BatteryConstants) -> float:
-    work = 0.0
-    for i in range(4):
-        work += max(forces[i], 0.0) ** 1.5
-    power = _ELECTRONICS_W + battery.watts_per * work
-    open_v = battery.cells * open_voltage(max(0.0, 1.0 - used_as / battery.capacity_as))
-    # P = (U - R I) I; at most what the battery can give
-    root = open_v * open_v - 4.0 * battery.resistance * power
-    if battery.resistance == 0.0:
-        return power / open_v
-    return (open_v - sqrt(max(root, 0.0))) / (2.0 * battery.resistance)
+    return terminal_voltage(condition.used_as, condition.current, battery)
 
 
 @kernel
@@ -112,8 +83,8 @@ def follow(
 ) -> None:
     """Bring a `Condition` to the next tick, `dt` seconds later.
 
-    `imu` is the `ImuReading` of this tick, `forces` what the four rotors give (N), `battery` the
-    `BatteryConstants`; `fields` says what HIL_SENSOR brought, `fixed` whether there was a HIL_GPS.
+    `imu` is the `ImuReading` of this tick, `forces` what the rotors give (N), `battery` the
+    `Battery`; `fields` says what HIL_SENSOR brought, `fixed` whether there was a HIL_GPS.
     """
     before, sample = unpack(Condition, condition, 0), unpack(ImuReading, imu, 0)
     heard = (
@@ -139,7 +110,8 @@ def follow(
             square[2] + fast * ((a[2] - mean[2]) ** 2 - square[2]),
         )
     used = before.used_as + before.current * dt
-    current = _current(forces, used, unpack(BatteryConstants, battery, 0))
+    work = work_of(forces, forces.shape[0])
+    current = drawn_current(work, used, unpack(Battery, battery, 0))
     pack(Condition(heard, now_us if fixed else before.fix_us, mean, square, used, current), condition, 0)
 
 

@@ -21,6 +21,7 @@ from autopilot.estimation.inbox import (
     POSE,
     READING,
     SHOWS,
+    SPEEDS,
     new_inbox,
 )
 from autopilot.estimation.records import (
@@ -51,7 +52,7 @@ from autopilot.wire.convert import (
     read_hil_sensor,
 )
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.simulator_frames import HIL_GPS, HIL_SENSOR, LOAD_SENSOR, ODOMETRY
+from autopilot.wire.simulator_frames import ESC_STATUS, HIL_GPS, HIL_SENSOR, LOAD_SENSOR, ODOMETRY
 
 # what `_read` makes of a datagram, instead of a number of readings
 _NOT_PLAIN = -1  # it holds more than whole, plain frames of the sensors
@@ -62,6 +63,7 @@ _SENSORS = (
     mavlink.MAVLINK_MSG_ID_ODOMETRY,
     mavlink.MAVLINK_MSG_ID_LOAD_SENSOR,
     mavlink.MAVLINK_MSG_ID_HIL_GPS,
+    mavlink.MAVLINK_MSG_ID_ESC_STATUS,
 )
 INERTIAL = ACCEL | GYRO  # of HIL_SENSOR.fields_updated: a sample that is new
 
@@ -137,6 +139,16 @@ def _put_load(inbox: Array, at: int, m: Any) -> int:
 
 
 @kernel
+def _put_speeds(inbox: Array, at: int, m: Any) -> int:
+    """Write what the speed controllers of four rotors say into a row, if there is one left; the next row."""
+    if at < inbox.shape[0]:
+        inbox[at, KIND], inbox[at, READING] = SPEEDS, m.index
+        for i in range(4):
+            inbox[at, READING + 1 + i] = m.rpm[i]
+    return at + 1
+
+
+@kernel
 def _put_fix(inbox: Array, at: int, gps: HilGps) -> int:
     rtk = 1.0 if gps.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT else 0.0
     fix = GnssReading(0.0, gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std, rtk)
@@ -166,6 +178,8 @@ def _read(
             count = _put_pose(inbox, count, taken(ODOMETRY, payload))
         elif holds(LOAD_SENSOR, datagram, start, payload):
             count = _put_load(inbox, count, taken(LOAD_SENSOR, payload))
+        elif holds(ESC_STATUS, datagram, start, payload):
+            count = _put_speeds(inbox, count, taken(ESC_STATUS, payload))
         elif holds(HIL_GPS, datagram, start, payload):
             gps, fixed = read_hil_gps(taken(HIL_GPS, payload), place), True
         else:

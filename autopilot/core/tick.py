@@ -13,15 +13,23 @@ from __future__ import annotations
 from math import isnan
 from typing import Any, NamedTuple
 
-from autopilot.control.actuators.disturbance_observer import Observed, ObserverConstants, nominal, observe
-from autopilot.control.actuators.mixer import MixerResult, mix
+from autopilot.control.actuators.disturbance_observer import (
+    Observed,
+    ObserverConstants,
+    nominal,
+    observe,
+    rested,
+)
+from autopilot.control.actuators.mixer import EXPECTED, FORCE, MISSED, TOLD, MixerResult, mix, spread
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.actuators.rotor_model import advance as actuate
+from autopilot.control.actuators.unlike_rotors import make_alike
+from autopilot.control.drag import Drag, air_force
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
 from autopilot.control.laws.interface import constants_of, kernels_of, memory_of
-from autopilot.control.load_motion import Drag, air_force
-from autopilot.control.records import Cable, Command, Jet, Reference, State, Vehicle, with_length
+from autopilot.control.records import Cable, Command, Jet, Nose, Reference, State, Vehicle, with_length
 from autopilot.control.thesis_cascade import attitude_towards
+from autopilot.core.attachment import cable_moment, off_centre, tell_attachment
 from autopilot.estimation.filter import (
     control_state,
     estimate,
@@ -29,7 +37,7 @@ from autopilot.estimation.filter import (
     load_complaint,
     vehicle_complaint,
 )
-from autopilot.estimation.inbox import IMU, KIND, READING, SHOWS, is_sane
+from autopilot.estimation.inbox import IMU, KIND, READING, SHOWS, SPEEDS, is_sane
 from autopilot.estimation.records import (
     RECEIVER,
     Array,
@@ -38,19 +46,24 @@ from autopilot.estimation.records import (
     History,
     ImuReading,
 )
+from autopilot.geometry.addresses import call_at, numbers_at
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import rows_in, taken
-from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, scale, sub
+from autopilot.geometry.lanes import if_above, rows_in, taken
+from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, norm, scale, sub
 from autopilot.geometry.packed import Each, Row, pack, unpack, with_field
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_POSITION
 from autopilot.supervisor.quiescence import RESTING, Stretch, may_decide
+from autopilot.vehicle.rotors import STRENGTH
+from autopilot.wire.convert.simulator import force_at
 
 HEIGHT_GAIN, CLIMB_GAIN = 12.0, 5.5  # 1/s^2, 1/s: k_x and k_v of Table 4-3 by the mass of Table 4-1
 IDLE_FORCE_N = 0.05  # of each rotor while armed on the ground
 NO_COMMAND = Command(0.0, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, neg(E3), IDENTITY)
-STOPPED = MixerResult((0.0, 0.0, 0.0, 0.0), 0, 0.0, ZERO)
-IDLE = MixerResult((IDLE_FORCE_N, IDLE_FORCE_N, IDLE_FORCE_N, IDLE_FORCE_N), 0, 4.0 * IDLE_FORCE_N, ZERO)
+STOPPED = MixerResult(0, 0.0, ZERO)
+# a rotor is lost that gives less than this share of what it has long been asked for (but for this share of
+# the greatest force), as this many of its speeds show in turn
+LOST_SHARE, UNTOLD_SHARE, LOST_SPEEDS = 0.3, 0.03, 3
 
 # what became of a tick
 ESTIMATED, FLOWN, TO_DECIDE = 0, 1, 2
@@ -67,6 +80,10 @@ class CoreConstants(NamedTuple):
     drag: Drag
     control_every: int  # ticks
     sensor_age_s: float  # greatest age of a reading to fly by
+    rotor_watch: float  # share of a period in the time for which a rotor must have been asked to give a force
+    nose_free: bool  # yaw is given up: the nose points where it points
+    estimator: int  # address of what lets somebody's own estimate take the place of ours; 0: nothing does
+    seat: int  # address that it is called with (`autopilot.core.estimator_seat`)
 
 
 class Winch(NamedTuple):
@@ -101,6 +118,7 @@ class Seen(NamedTuple):
     vehicle_complaint: int
     load_complaint: int
     inertial_age: float  # s, since the last new sample of the inertial unit
+    rotors_lost: int  # bit i: rotor i+1 does not do what it is asked for
 
 
 class CoreRows(NamedTuple):
@@ -117,6 +135,8 @@ class CoreRows(NamedTuple):
     stretch: Row  # Stretch
     targets: Array  # (ticks, 21) where load or vehicle are to be, from the stretch's first tick on
     references: Array  # the same as the law is told it: later by its preview
+    rotors: Array  # (7, MOST) forces of the rotors and what they are watched by, rows as in the mixer
+    table: Array  # (rotors + 1, 10) of the mixer, and what makes the rotors alike
 
 
 @kernel
@@ -155,10 +175,44 @@ def felt_pull(pilot: Pilot, state: State, constants: CoreConstants) -> float:
 
 
 @kernel
+def rotors_lost(rows: CoreRows, count: int, vehicle: Vehicle) -> int:
+    """The rotors whose speeds, in the inbox, say time and again that they do not do what they are asked for;
+    and those that are known to be lost."""
+    table, rotors = rows.table, rows.rotors
+    for i in range(count):
+        if rows.inbox[i, KIND] != SPEEDS:
+            continue
+        first = int(rows.inbox[i, READING])
+        for j in range(first, min(first + 4, table.shape[0] - 1)):
+            full = table[j, STRENGTH] * vehicle.rotor_max
+            given = force_at(rows.inbox[i, READING + 1 + j - first], full)
+            least = LOST_SHARE * rotors[EXPECTED, j] - UNTOLD_SHARE * full
+            rotors[TOLD, j] = rows.inbox[i, READING + 1 + j - first]
+            rotors[MISSED, j] = if_above(least, max(given, 0.0), rotors[MISSED, j] + 1.0, 0.0)
+    lost = unpack(Stretch, rows.stretch, 0).rotors_lost
+    for j in range(table.shape[0] - 1):
+        if rotors[MISSED, j] >= LOST_SPEEDS:
+            lost |= 1 << j
+    return lost
+
+
+@kernel
+def expect(rows: CoreRows, share: float) -> None:
+    """What each rotor has been asked for at least, for so long that it must give it."""
+    rotors = rows.rotors
+    for j in range(rows.table.shape[0] - 1):
+        asked, before = rotors[FORCE, j], rotors[EXPECTED, j]
+        rotors[EXPECTED, j] = if_above(before, asked, asked, before + share * (asked - before))
+
+
+@kernel
 def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
     """The estimate `dt` seconds later, after the first `count` readings of the inbox, and what is seen."""
     constants = unpack(CoreConstants, rows.constants, 0)
     winch, pilot = unpack(Winch, rows.winch, 0), unpack(Pilot, rows.pilot, 0)
+    if off_centre(constants.vehicle):
+        known = unpack(EstimatorState, rows.estimator, 0)
+        tell_attachment(rows.inbox, count, known, constants.vehicle.attachment)
     tied = winch.cable
     if winch.released:
         tied = Cable(float("inf"), winch.cable.rate, winch.cable.accel)
@@ -173,6 +227,7 @@ def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         winch.grown,
         dt,
         pilot.thrust,
+        pilot.moment,
     )
     pack(estimator, rows.estimator, 0)
     state = control_state(estimator, winch.cable)
@@ -181,6 +236,7 @@ def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         new = rows.inbox[i, KIND] == IMU and rows.inbox[i, SHOWS] == now_us
         if new and is_sane(unpack(ImuReading, rows.inbox[i], READING)):
             silent_s = 0.0
+    lost = rotors_lost(rows, count, constants.vehicle)
     complaint = inertial_complaint(silent_s)
     if complaint == 0:
         complaint = vehicle_complaint(estimator, constants.sensor_age_s)
@@ -193,6 +249,7 @@ def sense(rows: CoreRows, count: int, now_us: int, dt: float) -> None:
         complaint,
         load_complaint(estimator, constants.sensor_age_s),
         silent_s,
+        lost,
     )
     pack(seen, rows.seen, 0)
 
@@ -261,25 +318,37 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     pilot, seen = unpack(Pilot, rows.pilot, 0), unpack(Seen, rows.seen, 0)
     stretch, cable = unpack(Stretch, rows.stretch, 0), unpack(Winch, rows.winch, 0).cable
     state, vehicle = seen.state, constants.vehicle
+    turned = ZERO  # N m, by the cable
     slack_events = pilot.slack_events
     if pilot.was_taut and not seen.taut and not stretch.released:
         slack_events += 1
+    estimator = unpack(EstimatorState, rows.estimator, 0)
     observed = observe(
         pilot.observed,
         state,
         1.0 if seen.taut else 0.0,
         pilot.thrust,
-        constants.observer,
+        pilot.moment,
+        rested(constants.observer, estimator.vibration.accel_var),
         constants.drag,
         with_length(vehicle, cable.length),
     )
+    air = estimator.air
+    gust = axpy(air.load_drag, state.v_load, (air.load[0], air.load[1], 0.0))
+    observed = with_field(observed, "load_air", (gust[0], gust[1], 0.0))
+    observed = with_field(observed, "load_drag", air.load_drag)
     actuation = Actuation(rows.commands, pilot.thrust, pilot.moment)
     if stretch.mode == RESTING:
-        command, mixed = NO_COMMAND, IDLE if stretch.idle else STOPPED
+        command = NO_COMMAND
+        mixed = spread(IDLE_FORCE_N if stretch.idle else 0.0, rows.table, rows.rotors)
         fresh = nominal(vehicle)
         fresh = with_field(fresh, "support", observed.support)
         observed = with_field(fresh, "load_ground", observed.load_ground)
     else:
+        if constants.nose_free:
+            ahead = column(state.R, 0)
+            level = (ahead[0], ahead[1], 0.0)
+            stretch = with_field(stretch, "nose", Nose(scale(1.0 / norm(level), level), ZERO, ZERO))
         law = constants_of(law_rows)
         jet = _jet(rows.references, row_at(stretch, now_us))
         if stretch.mode == pilot.control_mode:
@@ -289,8 +358,16 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         pushed = reeled(observed, state, cable.accel, vehicle.quad_mass)
         memory, command = fly_law(law, memory, state, jet, stretch, actuation, pushed, cable, vehicle)
         pack(memory, law_rows.memory, 0)
-        mixed = mix(command.thrust, command.moment, vehicle, constants.limited)
-    actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, constants.actuation)
+        moment = command.moment
+        if off_centre(vehicle) and seen.taut:
+            turned = cable_moment(state, pilot.thrust, observed.load_mass, cable.length, vehicle)
+            moment = sub(moment, turned)
+        mixed = mix(command.thrust, moment, vehicle, constants.limited, rows.table, rows.rotors)
+    make_alike(rows.rotors, rows.table, vehicle, constants.limited)
+    expect(rows, constants.rotor_watch)
+    # rotors and cable together turn the vehicle
+    moment_done = add(mixed.moment_done, turned) if off_centre(vehicle) else mixed.moment_done
+    actuation = actuate(actuation, mixed.thrust_done, moment_done, constants.actuation)
     pilot = Pilot(
         command,
         mixed,
@@ -307,12 +384,23 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
 @kernel
 def _to_decide(rows: CoreRows, now_us: int) -> bool:
     stretch, seen = unpack(Stretch, rows.stretch, 0), unpack(Seen, rows.seen, 0)
+    if seen.rotors_lost != stretch.rotors_lost:
+        return True
     at = row_at(stretch, now_us)
     target = ZERO
     if stretch.mode != RESTING and 0 <= at < rows_in(rows.targets):
         target = vector_at(rows.targets, at, 0)
     known = seen.vehicle_complaint == 0 and (not stretch.carried or seen.load_complaint == 0)
     return may_decide(stretch, now_us, seen.state, known, seen.taut, seen.tilt_rad, seen.pull_n, target)
+
+
+@kernel
+def estimate_instead(constants: CoreConstants, count: int, now_us: int, dt: float) -> None:
+    """Let somebody's own estimator write into what is seen, if there is one."""
+    if constants.estimator != 0:
+        seat = numbers_at(constants.seat, 3)
+        seat[0], seat[1], seat[2] = count, now_us, dt
+        call_at(constants.estimator, constants.seat)
 
 
 @kernel
@@ -326,6 +414,7 @@ def fly_tick(
     if not decided:
         sense(rows, count, now_us, dt)
         constants = unpack(CoreConstants, rows.constants, 0)
+        estimate_instead(constants, count, now_us, dt)
         if tick % constants.control_every != 0:
             return ESTIMATED
         if _to_decide(rows, now_us):

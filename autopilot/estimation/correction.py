@@ -22,6 +22,8 @@ from autopilot.estimation.history import carry_back, past3, past4, row_before
 from autopilot.estimation.records import (
     ACCEL_BIAS,
     ACROSS,
+    AIDED_SIZE,
+    AIR,
     ATTITUDE,
     BAROMETER,
     CAMERA,
@@ -32,6 +34,7 @@ from autopilot.estimation.records import (
     LENGTH,
     MOUNTING,
     POSITION,
+    PUSH,
     Q_CABLE,
     Q_RATE,
     QUAT,
@@ -49,6 +52,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, add, axpy, cross, dot, scale, sub
+from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import Quat, quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
@@ -157,69 +161,26 @@ def enter_direction(history: History, k: int, past: Past, first: float, second: 
 @kernel
 def with_vehicle(state: EstimatorState, vehicle: VehicleEstimate, resets: float) -> EstimatorState:
     """The state with its vehicle replaced."""
-    return EstimatorState(
-        state.time_s,
-        vehicle,
-        state.load,
-        state.aids,
-        state.doubt,
-        state.last_imu,
-        resets,
-        state.memory_s,
-        state.head,
-        state.size,
-    )
+    return with_field(with_field(state, "vehicle", vehicle), "resets", resets)
 
 
 @kernel
 def with_load(state: EstimatorState, load: LoadEstimate, resets: float) -> EstimatorState:
     """The state with its load replaced."""
-    return EstimatorState(
-        state.time_s,
-        state.vehicle,
-        load,
-        state.aids,
-        state.doubt,
-        state.last_imu,
-        resets,
-        state.memory_s,
-        state.head,
-        state.size,
-    )
+    return with_field(with_field(state, "load", load), "resets", resets)
 
 
 @kernel
 def with_aids(state: EstimatorState, aids: AidEstimate) -> EstimatorState:
     """The state with its aids replaced."""
-    return EstimatorState(
-        state.time_s,
-        state.vehicle,
-        state.load,
-        aids,
-        state.doubt,
-        state.last_imu,
-        state.resets,
-        state.memory_s,
-        state.head,
-        state.size,
-    )
+    return with_field(state, "aids", aids)
 
 
 @kernel
 def heard(state: EstimatorState, age: float, size: int) -> EstimatorState:
     """The state with its ring corrected as far back as `age` from now on, and at least `size` errors."""
-    return EstimatorState(
-        state.time_s,
-        state.vehicle,
-        state.load,
-        state.aids,
-        state.doubt,
-        state.last_imu,
-        state.resets,
-        max(state.memory_s, age),
-        state.head,
-        max(state.size, size),
-    )
+    state = with_field(state, "memory_s", max(state.memory_s, age))
+    return with_field(state, "size", max(state.size, size))
 
 
 @kernel
@@ -318,7 +279,7 @@ def inject(state: EstimatorState, history: History) -> EstimatorState:
         v.source,
     )
     aids = a
-    if state.size == SIZE:
+    if state.size >= AIDED_SIZE:
         aids = AidEstimate(
             (a.mounting[0] + e[MOUNTING], a.mounting[1] + e[MOUNTING + 1]),
             a.heading + e[HEADING],
@@ -333,16 +294,13 @@ def inject(state: EstimatorState, history: History) -> EstimatorState:
             a.barometer_age,
             a.rejected,
         )
+    air = state.air
+    pushed = air.vehicle
+    if state.size == SIZE:
+        pushed = (pushed[0] + e[PUSH], pushed[1] + e[PUSH + 1])
+    air = with_field(air, "load", (air.load[0] + e[AIR], air.load[1] + e[AIR + 1]))
+    air = with_field(air, "vehicle", pushed)
     carry_back(state.head, history, state.memory_s)
-    return EstimatorState(
-        state.time_s,
-        vehicle,
-        moved_load(state.load, vehicle, history, 1.0 if a.reversion < 1.0 else 0.0),
-        aids,
-        state.doubt,
-        state.last_imu,
-        state.resets,
-        state.memory_s,
-        state.head,
-        state.size,
-    )
+    load = moved_load(state.load, vehicle, history, 1.0 if a.reversion < 1.0 else 0.0)
+    state = with_vehicle(with_aids(state, aids), vehicle, state.resets)
+    return with_load(with_field(state, "air", air), load, state.resets)

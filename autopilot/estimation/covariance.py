@@ -15,6 +15,8 @@ from typing import NamedTuple
 
 from autopilot.estimation.records import (
     ACCEL_BIAS,
+    AIDED_SIZE,
+    AIR,
     ATTITUDE,
     BAROMETER,
     DIRECTION,
@@ -23,6 +25,7 @@ from autopilot.estimation.records import (
     INNOVATION,
     LENGTH,
     POSITION,
+    PUSH,
     RATE,
     SIZE,
     VARIANCE,
@@ -50,6 +53,9 @@ class Transit(NamedTuple):
     horizontal_slow: float
     vertical_slow: float
     reversion: float  # of the receiver's slow error, in units of the rate at which it changes
+    accel_var: float  # (m/s^2)^2, of a sample
+    gyro_var: float  # (rad/s)^2
+    air_walk: float  # m/s^2 per square root of a second, of the air on the load
     cable_accel_std: float  # rad/s^2
     parting_std: float  # m/s, at which the ends of the cable part
 
@@ -61,6 +67,7 @@ class CableDrive(NamedTuple):
     bias: Vec3  # of the accelerometer
     length: float
     direction: tuple[float, float]
+    air: tuple[float, float]
 
 
 @kernel
@@ -79,6 +86,7 @@ def _cable_drive(to: Transit, dt: float, i: int) -> CableDrive:
         scale(s, apply_transposed(to.R, axis)),
         s / to.length * dot(axis, f),
         (own, other) if i == 0 else (other, own),
+        (s * axis[0], s * axis[1]),
     )
 
 
@@ -96,14 +104,17 @@ def _move_rows(
         g0, g1, g2 = wide_at(P, GYRO_BIAS, j), wide_at(P, GYRO_BIAS + 1, j), wide_at(P, GYRO_BIAS + 2, j)
         if to.taut > 0.0 and j + step > cable_from:
             r0, r1, length = wide_at(P, RATE, j), wide_at(P, RATE + 1, j), wide_at(P, LENGTH, j)
+            w0, w1 = wide_at(P, AIR, j), wide_at(P, AIR + 1, j)
             d0 = wide_at(P, DIRECTION, j) + half * r0
             d1 = wide_at(P, DIRECTION + 1, j) + half * r1
             c, e, m = first, first.attitude, first.bias
             r0 = r0 + e[0] * a0 + e[1] * a1 + e[2] * a2 + m[0] * b0 + m[1] * b1 + m[2] * b2
             r0 = r0 + c.length * length + c.direction[0] * d0 + c.direction[1] * d1
+            r0 = r0 + c.air[0] * w0 + c.air[1] * w1
             c, e, m = second, second.attitude, second.bias
             r1 = r1 + e[0] * a0 + e[1] * a1 + e[2] * a2 + m[0] * b0 + m[1] * b1 + m[2] * b2
             r1 = r1 + c.length * length + c.direction[0] * d0 + c.direction[1] * d1
+            r1 = r1 + c.air[0] * w0 + c.air[1] * w1
             put_wide(P, RATE, j, r0)
             put_wide(P, RATE + 1, j, r1)
             put_wide(P, DIRECTION, j, d0 + half * r0)
@@ -130,12 +141,29 @@ def _move_rows(
 
 
 @kernel
-def _forget_slow(P: Array, keep: float, n: int) -> None:
-    """The rows of the receiver's slow error, of which a share is kept."""
+def _fade(P: Array, first: int, last: int, keep: float, n: int) -> None:
+    """The rows from `first` to before `last`, of whose errors a share is kept."""
     step = columns_at_once(P)
-    for i in range(GNSS, n):
+    for i in range(first, last):
         for j in range(0, n, step):
             put_wide(P, i, j, keep * wide_at(P, i, j))
+
+
+@kernel
+def _forget_slow(P: Array, slow: float, tuning: EstimatorTuning, dt: float, n: int) -> None:
+    """What returns to zero: the air's doings, and the receiver's slow error, of which the share `slow` is
+    kept."""
+    _fade(P, AIR, AIR + 2, kept(tuning.air_std, tuning.air_walk, dt), n)
+    if n >= AIDED_SIZE:
+        _fade(P, GNSS, GNSS + 3, slow, n)
+    if n == SIZE:
+        _fade(P, PUSH, PUSH + 2, kept(tuning.push_std, tuning.push_walk, dt), n)
+
+
+@kernel
+def kept(std: float, walk: float, dt: float) -> float:
+    """The share of an error that is left after dt (s), so that with this walk it stays of this deviation."""
+    return 1.0 - 0.5 * dt * walk * walk / (std * std)
 
 
 @kernel
@@ -147,16 +175,17 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
     keep = 1.0 - forget * to.reversion
     first, second = _cable_drive(to, dt, 0), _cable_drive(to, dt, 1)
     _move_rows(P, to, first, second, dt, n, 0)
-    _forget_slow(P, keep, n)
+    _forget_slow(P, keep, tuning, dt, n)
     for i in range(0, n, step):
         for j in range(i, n, step):
             transpose_blocks(P, i, j)
     # what lies below the diagonal is written over in the end
     _move_rows(P, to, first, second, dt, n, DIRECTION)
-    _forget_slow(P, keep, n)
+    _forget_slow(P, keep, tuning, dt, n)
 
-    accel = tuning.accel_std * tuning.accel_std * dt * dt
-    gyro = tuning.gyro_std * tuning.gyro_std * dt * dt
+    accel = to.accel_var * dt * dt
+    gyro = to.gyro_var * dt * dt
+    air, push = to.air_walk * to.air_walk * dt, tuning.push_walk * tuning.push_walk * dt
     gyro_walk = tuning.gyro_bias_walk * tuning.gyro_bias_walk * dt
     accel_walk = tuning.accel_bias_walk * tuning.accel_bias_walk * dt
     for i in range(3):
@@ -174,7 +203,11 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
         P[RATE, RATE] += model
         P[RATE + 1, RATE + 1] += model
         P[LENGTH, LENGTH] += to.parting_std * to.parting_std * dt * dt
-    if n == SIZE:
+    for i in range(2):
+        P[AIR + i, AIR + i] += air
+        if n == SIZE:
+            P[PUSH + i, PUSH + i] += push
+    if n >= AIDED_SIZE:
         P[BAROMETER, BAROMETER] += tuning.barometer_walk * tuning.barometer_walk * dt
         level, climb = to.horizontal_slow, to.vertical_slow
         P[GNSS, GNSS] += 2.0 * forget * level * level

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import isfinite, isinf, radians
 
+from autopilot.control.drag import Drag
 from autopilot.control.records import Cable, State
 from autopilot.estimation.inbox import (
     DIRECTION,
@@ -29,10 +30,11 @@ from autopilot.estimation.inbox import (
 )
 from autopilot.estimation.measurements.barometer import correct_barometer
 from autopilot.estimation.measurements.direction import correct_direction
-from autopilot.estimation.measurements.gnss import correct_gnss
+from autopilot.estimation.measurements.gnss import correct_gnss, found_load
 from autopilot.estimation.measurements.load import correct_load
 from autopilot.estimation.measurements.magnetic import correct_magnetic
 from autopilot.estimation.measurements.pose import correct_pose
+from autopilot.estimation.measurements.pull import correct_pull, unseen
 from autopilot.estimation.measurements.standing import correct_standing
 from autopilot.estimation.measurements.tautened import correct_tautened
 from autopilot.estimation.predict import predict
@@ -40,6 +42,7 @@ from autopilot.estimation.records import (
     CAMERA,
     NOBODY,
     RECEIVER,
+    TRACKER,
     Array,
     EstimatorState,
     EstimatorTuning,
@@ -48,7 +51,7 @@ from autopilot.estimation.records import (
 )
 from autopilot.estimation.release import parted
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import axpy, norm, sub
+from autopilot.geometry.linear import Vec3, axpy, norm, sub
 from autopilot.geometry.packed import unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.wire.parameter_table import ParameterTable
@@ -61,6 +64,8 @@ PROMISE = 1.2  # times the deviation that the receiver states
 COASTING_S = 2.0  # that the IMU bridges between fixes
 TILT_STD_TO_LAND = 0.2  # rad
 POSITION_STD_TO_LAND = 10.0  # m
+UNSEEN_S = 0.5  # after which a load of which no tracker has told is taken for one that none will tell of
+TELLING_S = 1.0  # in which the direction of a cable that came taut shows in its pull
 INERTIAL_S = 0.1  # for which an inertial sample stands for those that are missing
 
 
@@ -80,6 +85,13 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         accel_bias_walk=table["EST_ACC_WALK"],
         cable_accel_std=table["EST_CABLE_STD"],
         load_drag=table["EST_LOAD_DRAG"],
+        air_std=table["EST_AIR_STD"],
+        air_walk=table["EST_AIR_WALK"],
+        push_std=table["EST_PUSH_STD"],
+        push_walk=table["EST_PUSH_WALK"],
+        drag=Drag(table["PLB_DRAG"], table["PLB_DRAG_2"]),
+        inertia=(table["VEH_J_XX"], table["VEH_J_YY"], table["VEH_J_ZZ"]),
+        turn_std=table["EST_TURN_STD"],
         length_std=table["EST_LEN_STD"],
         gate_sigma=table["EST_GATE"],
         imu_age=1e-3 * table["VEH_IMU_DELAY"],
@@ -96,7 +108,7 @@ def estimator_tuning(table: ParameterTable) -> EstimatorTuning:
         magnetic_age=1e-3 * table["EST_MAG_LAT"],
         declination=radians(table["EST_MAG_DECL"]),
         mounting_std=table["EST_CAM_BIAS"],
-        gear_height=table["EST_GEAR_H"],
+        gear_height=table["EST_GEAR_H"] + table["VEH_ATT_Z"],
         load_height=table["EST_LOAD_H"],
         laid_forward=table["EST_LAID_FWD"] * length,
         laid_std=table["EST_LAID_STD"] * length,
@@ -124,13 +136,14 @@ def estimate(
     grown: float,
     dt: float,
     thrust: float,
+    moment: Vec3,
 ) -> EstimatorState:
     """The state after `dt` seconds and the first `count` readings of the inbox. `history` is written in
     place.
 
-    `thrust` (N) is what the rotors are believed to give; the cable has grown by `grown` (m) since the last
-    tick. The estimator knows a cable of one length: the winch's speed is taken from what the load tracker
-    measures, v_L = v_Q + L q' + L' q.
+    `thrust` (N) and `moment` (N m, body) are what the rotors are believed to give; the cable has grown by
+    `grown` (m) since the last tick. The estimator knows a cable of one length: the winch's speed is taken
+    from what the load tracker measures, v_L = v_Q + L q' + L' q.
     """
     state = lengthened(state, grown)
     tuning = with_field(tuning, "cable_length", cable.length)
@@ -144,8 +157,9 @@ def estimate(
             if is_sane(imu):
                 used = imu
     load = state.load
-    state = predict(state, history, used, tuning, dt, thrust)
+    state = predict(state, history, used, tuning, dt, thrust, moment)
     state = correct_tautened(state, history, load, tuning)
+    state = correct_pull(state, history, tuning, thrust)
     for i in range(count):
         if inbox[i, KIND] == POSE:
             believed, pose = pose_in(inbox[i], age_of(inbox[i], now_us, tuning.imu_age))
@@ -180,6 +194,8 @@ def estimate(
                 state = correct_direction(state, history, sight, tuning)
     if state.vehicle.source == RECEIVER:
         state = correct_standing(state, history, tuning, thrust)
+    if state.vehicle.source == TRACKER and state.load.source == NOBODY and state.time_s > UNSEEN_S:
+        state = with_field(state, "load", found_load(state, history, tuning, thrust))
     return state
 
 
@@ -260,6 +276,8 @@ def load_complaint(state: EstimatorState, oldest_s: float) -> int:
     if load.source == CAMERA:
         if load.taut == 0.0:  # it lies where it was laid, seen or not
             return 0
+        if unseen(load):
+            return 0 if load.held_s < TELLING_S or doubt.load <= LOAD_STD_TO_FLY else LOAD_VAGUE
         if not load.age_s <= oldest_s:
             return NO_SIGHT
         return 0 if doubt.load <= LOAD_STD_TO_FLY else LOAD_VAGUE

@@ -29,7 +29,7 @@ from autopilot.geometry.so3 import Quat
 
 KIND, SHOWS, READING = 0, 1, 2  # columns
 COLUMNS = 16
-IMU, POSE, FIELD, FIX, HEIGHT, LOAD, DIRECTION = range(7)
+IMU, POSE, FIELD, FIX, HEIGHT, LOAD, DIRECTION, SPEEDS = range(8)  # the last: of rotors, not of the estimate
 ROOM = 16  # rows of a new inbox
 
 # so that the filter stays conditioned

@@ -3,28 +3,31 @@
 The pendulum needs neither thrust nor masses: while the cable is taut the load feels gravity and the cable
 alone, so that the direction q from vehicle to load obeys
 
-    L q'' = -P_q (x_Q'' + g e3) - L |q'|^2 q,        P_q = I - q q^T,
+    L q'' = -P_q (x_Q'' + g e3 - d) - L |q'|^2 q,        P_q = I - q q^T,
 
-and x_Q'' + g e3 = R a is what the accelerometer reads.
+where x_Q'' + g e3 = R a is what the accelerometer reads, and d, which is estimated, what the air does to the
+load: drag and wind by the load's mass, level.
 """
 
 from __future__ import annotations
 
 from math import sqrt
 
+from autopilot.estimation.air import air_walk, predict_air
 from autopilot.estimation.covariance import Transit, transit
 from autopilot.estimation.history import remember
 from autopilot.estimation.records import (
+    AIDED_SIZE,
     ATTITUDE,
     DIRECTION,
     GNSS,
     LENGTH,
     POSITION,
     RING_LENGTH,
-    SIZE,
     TRACKER,
     VELOCITY,
     AidEstimate,
+    AirEstimate,
     Covariance2,
     Doubt,
     EstimatorState,
@@ -34,9 +37,10 @@ from autopilot.estimation.records import (
     LoadEstimate,
     VehicleEstimate,
 )
-from autopilot.estimation.tautness import frame, loosely_tied, watch
+from autopilot.estimation.tautness import frame, jerked, loosely_tied, unfelt_pull, watch
+from autopilot.estimation.vibration import accel_noise, gyro_noise, shaken
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Mat3, Vec3, add, apply, axpy, cross, dot, norm, scale, sub
+from autopilot.geometry.linear import Mat3, Vec3, add, apply, axpy, cross, dot, norm, scale, sub, times
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_exp, quat_multiply, quat_normalise, rotation_from_quat
 
@@ -62,8 +66,29 @@ def _mean(a: Vec3, b: Vec3) -> Vec3:
 
 
 @kernel
+def turn_rate(
+    vehicle: VehicleEstimate, gyro: Vec3, moment: Vec3, gyro_var: float, tuning: EstimatorTuning, dt: float
+) -> Vec3:
+    """Body rate (rad/s): as the rotors' moment (N m) turns the vehicle, corrected by the gyroscope as far as
+    its noise is small beside the error of that."""
+    W, J = vehicle.omega_body, tuning.inertia
+    torque = sub(moment, cross(W, times(J, W)))
+    ahead = axpy(dt, (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2]), W)
+    unknown = tuning.turn_std * dt
+    ratio = unknown * unknown / gyro_var
+    share = 0.5 * (sqrt(ratio * ratio + 4.0 * ratio) - ratio)
+    return axpy(share, sub(sub(gyro, vehicle.gyro_bias), ahead), ahead)
+
+
+@kernel
 def predict_vehicle(
-    vehicle: VehicleEstimate, imu: ImuReading, last: ImuReading, tuning: EstimatorTuning, dt: float
+    vehicle: VehicleEstimate,
+    imu: ImuReading,
+    last: ImuReading,
+    moment: Vec3,
+    gyro_var: float,
+    tuning: EstimatorTuning,
+    dt: float,
 ) -> tuple[VehicleEstimate, Mat3]:
     """Strapdown integration by the trapezoidal rule over the last two samples; also R of half way."""
     gyro = sub(_mean(imu.gyro, last.gyro), vehicle.gyro_bias)
@@ -75,7 +100,7 @@ def predict_vehicle(
         axpy(0.5 * dt * dt, accel_quad, axpy(dt, vehicle.v_quad, vehicle.x_quad)),
         axpy(dt, accel_quad, vehicle.v_quad),
         quat_normalise(quat_multiply(vehicle.quat_wxyz, quat_exp(scale(dt, gyro)))),
-        sub(imu.gyro, vehicle.gyro_bias),
+        turn_rate(vehicle, imu.gyro, moment, gyro_var, tuning, dt),
         vehicle.gyro_bias,
         vehicle.accel_bias,
         accel_quad,
@@ -88,16 +113,15 @@ def predict_vehicle(
 
 @kernel
 def predict_taut(
-    load: LoadEstimate, vehicle: VehicleEstimate, tuning: EstimatorTuning, dt: float
+    load: LoadEstimate, vehicle: VehicleEstimate, air: AirEstimate, tuning: EstimatorTuning, dt: float
 ) -> LoadEstimate:
     """The pendulum; `vehicle` is already at the new time."""
-    q, q_dot = load.q_cable, load.q_cable_dot
+    q, q_dot, d = load.q_cable, load.q_cable_dot, air.load
     accel_quad = vehicle.accel_quad
-    force = (accel_quad[0], accel_quad[1], accel_quad[2] + tuning.gravity)
+    force = (accel_quad[0] - d[0], accel_quad[1] - d[1], accel_quad[2] + tuning.gravity)
     half = normalise(axpy(0.5 * dt, q_dot, q))  # as `force` is of half way
     q_ddot = axpy(-dot(q_dot, q_dot), half, scale(-1.0 / load.length, tangent(half, force)))
-    accel_load = axpy(load.length, q_ddot, accel_quad)
-    tension = max(0.0, -tuning.load_mass * (dot(half, accel_load) + tuning.gravity * half[2]))
+    tension = max(0.0, -tuning.load_mass * (load.length * dot(half, q_ddot) + dot(half, force)))
     q_next = normalise(axpy(0.5 * dt * dt, q_ddot, axpy(dt, q_dot, q)))
     rate = tangent(q_next, axpy(dt, q_ddot, q_dot))
     return LoadEstimate(
@@ -162,19 +186,12 @@ def predict_slack(load: LoadEstimate, vehicle: VehicleEstimate, history: History
 
 
 @kernel
-def pendulum_error(load: LoadEstimate, tuning: EstimatorTuning) -> float:
-    """Standard deviation (rad/s^2) of the hanging load's model; drag grows with the square of the speed."""
-    still, drag = tuning.cable_accel_std, tuning.load_drag * dot(load.v_load, load.v_load) / load.length
-    return sqrt(still * still + drag * drag)
-
-
-@kernel
 def doubt(history: History, load: LoadEstimate, n: int) -> Doubt:
     """Standard deviations of what the covariance says."""
     P = history.covariance
     level = 0.5 * (P[POSITION, POSITION] + P[POSITION + 1, POSITION + 1])
     relative = level
-    if n == SIZE:
+    if n >= AIDED_SIZE:
         relative += P[POSITION, GNSS] + P[POSITION + 1, GNSS + 1]
         relative += 0.5 * (P[GNSS, GNSS] + P[GNSS + 1, GNSS + 1])
     of_load = load.covariance[0]
@@ -208,13 +225,17 @@ def predict(
     tuning: EstimatorTuning,
     dt: float,
     thrust: float,
+    moment: Vec3,
 ) -> EstimatorState:
-    """The state dt seconds on; `thrust` (N) is what the rotors are believed to give."""
-    load, aids = state.load, state.aids
-    vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, tuning, dt)
+    """The state dt seconds on; `thrust` (N) and `moment` (N m, body): what the rotors are thought to give."""
+    load, aids, air = state.load, state.aids, state.air
+    vibration = shaken(state.vibration, imu, state.last_imu, tuning, dt)
+    accel_var = accel_noise(vibration, tuning)
+    gyro_var = gyro_noise(vibration, tuning)
+    vehicle, R = predict_vehicle(state.vehicle, imu, state.last_imu, moment, gyro_var, tuning, dt)
     a = vehicle.accel_quad
-    swaying, parting = pendulum_error(load, tuning), 0.0
-    if loosely_tied(load, state.memory_s):
+    swaying, parting = tuning.cable_accel_std, 0.0
+    if load.taut > 0.0 and loosely_tied(load, state.memory_s, state.unfelt):
         tracked = load.source == TRACKER
         swaying = LIFTING_TRACKED_ACCEL_STD if tracked else LIFTING_ACCEL_STD
         parting = PARTING_STD if tracked else 0.0
@@ -230,16 +251,20 @@ def predict(
         aids.horizontal_slow,
         aids.vertical_slow,
         aids.reversion,
+        accel_var,
+        gyro_var,
+        air_walk(load, air, a, tuning),
         swaying,
         parting,
     )
     if vehicle.source > 0.0:
         transit(history, motion, tuning, dt, state.size)
     if load.taut > 0.0:
-        at_end = predict_taut(load, vehicle, tuning, dt)
+        at_end = predict_taut(load, vehicle, air, tuning, dt)
     else:
         at_end = predict_slack(load, vehicle, history, dt)
-    load = watch(at_end, vehicle, history, imu, thrust, tuning, dt)
+    load = watch(at_end, vehicle, history, imu, thrust, state.unfelt, tuning, dt)
+    jerked(load, state.load.pull, history, tuning)
     predicted = EstimatorState(
         state.time_s + dt,
         vehicle,
@@ -258,8 +283,11 @@ def predict(
             aids.barometer_age + dt,
             aids.rejected,
         ),
+        predict_air(air, state.load, load, tuning, dt),
         doubt(history, load, state.size),
         imu,
+        vibration,
+        unfelt_pull(load, vehicle, state.unfelt, tuning, dt),
         state.resets,
         state.memory_s,
         (state.head + 1) % RING_LENGTH,

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.control.drag import Drag
 from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.geometry.so3 import IDENTITY_QUAT, Quat
 
@@ -15,13 +16,17 @@ Array = NDArray[np.float64]
 
 # The error state, all but the biases in world axes: position, velocity and attitude of the vehicle
 # (R = exp(attitude error) R estimated), biases of gyro and accelerometer (body), then the cable in its own
-# two axes: direction, rate, and its length. Flights with trackers alone need no more.
+# two axes: direction, rate, and its length; and what the air does to the load, level. Flights with trackers
+# alone need no more.
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS = 0, 3, 6, 9, 12
-DIRECTION, RATE, LENGTH = 15, 17, 19
-TRACKED_SIZE = 20
+DIRECTION, RATE, LENGTH, AIR = 15, 17, 19, 20
+TRACKED_SIZE = 22
 # mounting of the camera (about the body's forward and left axes), magnetic heading, barometer, receiver
-MOUNTING, HEADING, BAROMETER, GNSS = 20, 22, 23, 24
-SIZE = 27
+MOUNTING, HEADING, BAROMETER, GNSS = 22, 24, 25, 26
+AIDED_SIZE = 29
+# what the air does to the vehicle, level: only where the load is known by its pull alone
+PUSH = 29
+SIZE = 31
 
 ROOM = 32  # whole eights
 SCALARS, ENTRIES = 9, 13  # of one reading; of a scalar's Jacobian, behind their number
@@ -33,11 +38,12 @@ X_QUAD, V_QUAD, QUAT, Q_CABLE, ACROSS, Q_RATE = 1, 4, 7, 11, 14, 17
 RING_COLUMNS = 20
 
 # sensors, as rows of `History.consistency`
-POSE, LOAD, FIX, PRESSURE, MAGNETIC, SIGHT, REST = 0, 1, 2, 3, 4, 5, 6
-SENSORS = 7
+POSE, LOAD, FIX, PRESSURE, MAGNETIC, SIGHT, REST, PULL = 0, 1, 2, 3, 4, 5, 6, 7
+SENSORS = 8
 
 NOBODY, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what tells the vehicle where it is
-CAMERA = 2.0  # what tells where the load is, beside NOBODY and TRACKER
+# what tells where the load is, beside NOBODY and TRACKER: a camera, or what the load does to the vehicle
+CAMERA = 2.0
 
 Covariance2 = tuple[float, float, float]  # (aa, ab, bb)
 
@@ -121,6 +127,13 @@ class EstimatorTuning(NamedTuple):
     accel_bias_walk: float  # m/s^2 per square root of a second
     cable_accel_std: float  # rad/s^2, error of the pendulum model while taut
     load_drag: float  # 1/m, drag on the load that the model leaves out: acceleration over square of speed
+    air_std: float  # m/s^2, level, of the air on the load
+    air_walk: float  # m/s^2 per square root of a second
+    push_std: float  # m/s^2, level, of the air on the vehicle beyond its believed drag
+    push_walk: float  # m/s^2 per square root of a second
+    drag: Drag  # of the vehicle
+    inertia: Vec3  # kg m^2, body
+    turn_std: float  # rad/s^2, error of the angular acceleration by which the rotors turn the vehicle
     length_std: float  # m, of the believed length
     gate_sigma: float
     imu_age: float  # s, of an inertial sample when it comes
@@ -137,7 +150,7 @@ class EstimatorTuning(NamedTuple):
     magnetic_age: float  # s
     declination: float  # rad, east of north
     mounting_std: float  # rad, of the camera
-    gear_height: float  # m, of the standing vehicle's centre of mass
+    gear_height: float  # m, of the standing vehicle, where its cable is attached
     load_height: float  # m, of the lying load's centre
     laid_forward: float  # m ahead of the standing vehicle: where the load was laid
     laid_std: float  # m
@@ -195,6 +208,28 @@ class AidEstimate(NamedTuple):
     rejected: float  # sights of the load in a row that failed the gate
 
 
+class AirEstimate(NamedTuple):
+    """What the air does beside the models, level, m/s^2: to the load beyond the pendulum, to the vehicle
+    beyond its believed drag."""
+
+    load: tuple[float, float]
+    vehicle: tuple[float, float]
+    load_drag: float  # 1/s: how what the air does to the load follows its speed
+    mean_speed: tuple[float, float]  # m/s, level, of the load: of some seconds
+    mean_load: tuple[float, float]  # m/s^2, the same of what the air does to it
+    together: float  # mean of both, each without its mean, m^2/s^3
+    alone: float  # of the speed's square, m^2/s^2
+
+
+class Vibration(NamedTuple):
+    """The noise of the inertial unit as its samples show it."""
+
+    accel_var: float  # (m/s^2)^2, of one sample and axis
+    gyro_var: float  # (rad/s)^2
+    turning: float  # rad^2/s, by which the gyroscope's noise lets the attitude wander
+    step: ImuReading  # from the last sample but one to the last
+
+
 class Doubt(NamedTuple):
     """Standard deviations of the estimate, as of the last prediction."""
 
@@ -213,8 +248,11 @@ class EstimatorState(NamedTuple):
     vehicle: VehicleEstimate
     load: LoadEstimate
     aids: AidEstimate
+    air: AirEstimate
     doubt: Doubt
     last_imu: ImuReading
+    vibration: Vibration
+    unfelt: float  # N, slowly: what the pendulum says of the cable's pull less what is felt of it
     resets: float
     memory_s: float  # age of the oldest reading so far: so much of the ring follows corrections
     head: int  # row of the ring that holds this state
@@ -271,8 +309,11 @@ def blank_state() -> EstimatorState:
             source=NOBODY,
         ),
         aids=AidEstimate((0.0, 0.0), 0.0, 0.0, ZERO, 1.0, 1.0, 1.0, ZERO, ZERO, inf, inf, 0.0),
+        air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0),
         doubt=Doubt(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
+        vibration=Vibration(0.0, 0.0, 0.0, ImuReading(ZERO, ZERO)),
+        unfelt=0.0,
         resets=0.0,
         memory_s=0.0,
         head=0,

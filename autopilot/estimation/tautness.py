@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from autopilot.estimation.covariance import forget
 from autopilot.estimation.records import (
+    AIR,
     DIRECTION,
     LENGTH,
     POSITION,
@@ -41,7 +42,18 @@ PULL_TIME_S = 0.04  # in which the felt pull is smoothed
 # lying: pendulum and length then mean little.
 LIFTING_S, LIFTING_PULL = 4.0, 0.8
 REFUSED_LOOSE = 4.0  # readings refused in a row that show the same
-SEEN_S = 1.0  # a cable is not taken as taut while the load has not been seen for so long
+# A taut cable whose felt pull is less than this share of the pendulum's does not carry, whatever its length.
+LOOSE_PULL = 0.4
+UNFELT_S = 2.0  # in which it is learned what of the pull is not felt
+# A cable that begins to pull, at this share of the load's weight, stops vehicle and load along it at once: at
+# about this speed (m/s) their ends part. It is over between two samples of the accelerometer.
+JERK_PULL, JERK_SPEED = 0.3, 0.2
+JERK_FELT_S = 0.015  # after which it is felt
+# of the air's deviation, that a tracked load begins with: wind soon shows, and a law that lifts the load is
+# spared the search for it
+STILL_SHARE = 0.1
+HOP_SPEED = 0.02  # m/s, across the cable, of a load that has begun to be pulled
+SEEN_S = 1.0  # a cable is not taken as taut while a load that is seen has not been for so long
 
 
 @kernel
@@ -64,17 +76,56 @@ def felt_pull(
 
 
 @kernel
-def loosely_tied(load: LoadEstimate, memory_s: float) -> bool:
+def loosely_tied(load: LoadEstimate, memory_s: float, unfelt: float) -> bool:
     """Whether a cable that counts as taut does not carry its load yet.
 
     A tracked load counts as tied some per cent of the cable's length before it is, and readings up to
-    `memory_s` old still show that.
+    `memory_s` old still show that; and as long after it has come to lie. `unfelt` (N) is what of the pull has
+    not been felt for long, by a wrong belief of thrust or mass.
     """
+    if load.source == TRACKER and load.pull + unfelt < LOOSE_PULL * load.tension:
+        return True
     if load.held_s > LIFTING_S:
         return False
     if load.source == TRACKER:
         return not load.pulled_s > memory_s or load.rejected >= REFUSED_LOOSE
-    return load.pull < LIFTING_PULL * load.tension
+    return load.pull + unfelt < LIFTING_PULL * load.tension
+
+
+@kernel
+def unfelt_pull(
+    load: LoadEstimate, vehicle: VehicleEstimate, before: float, tuning: EstimatorTuning, dt: float
+) -> float:
+    """What of the pull has not been felt for long, N: less than nothing where rotors that give less than they
+    are thought to are taken for a load. A camera's slack cable does not pull while its ends are near."""
+    if load.source == TRACKER:
+        if load.taut == 0.0:
+            return 0.0
+    elif load.taut == 0.0:
+        if norm(sub(load.x_load, vehicle.x_quad)) > PULL_DISTANCE * tuning.cable_length:
+            return before
+        return min(before - dt / UNFELT_S * (load.pull + before), 0.0)
+    elif load.held_s <= LIFTING_S:
+        return before
+    return before + dt / UNFELT_S * (load.tension - load.pull - before)
+
+
+@kernel
+def jerked(load: LoadEstimate, pull_before: float, history: History, tuning: EstimatorTuning) -> None:
+    """Where the cable has begun to pull since the pull was so much (N), the vehicle's velocity along it is
+    less well known."""
+    begins = JERK_PULL * tuning.load_mass * tuning.gravity
+    if pull_before >= begins or load.pull < begins:
+        return
+    P, q = history.covariance, load.q_cable
+    std = JERK_SPEED * tuning.load_mass / (tuning.load_mass + tuning.quad_mass)
+    for i in range(3):
+        for j in range(3):
+            variance = std * std * q[i] * q[j]
+            P[VELOCITY + i, VELOCITY + j] += variance
+            P[POSITION + i, VELOCITY + j] += JERK_FELT_S * variance
+            P[VELOCITY + j, POSITION + i] += JERK_FELT_S * variance
+            P[POSITION + i, POSITION + j] += 2.0 * JERK_FELT_S * JERK_FELT_S * variance
 
 
 @kernel
@@ -118,7 +169,12 @@ def tauten(load: LoadEstimate, history: History, tuning: EstimatorTuning, length
     P[LENGTH, LENGTH] = tuning.length_std * tuning.length_std
     across, along = load.across, cross(load.q_cable, load.across)
     aa, ab, bb = load.covariance
-    if load.source == TRACKER:
+    if load.source != TRACKER:
+        bb += HOP_SPEED * HOP_SPEED
+    else:
+        doubt = STILL_SHARE * tuning.air_std
+        forget(P, AIR, 2)
+        P[AIR, AIR], P[AIR + 1, AIR + 1] = doubt * doubt, doubt * doubt
         _tie(P, DIRECTION, POSITION, across, along, length)
     _tie(P, RATE, VELOCITY, across, along, length)
     s = 1.0 / length
@@ -161,10 +217,11 @@ def watch(
     history: History,
     imu: ImuReading,
     thrust: float,
+    unfelt: float,
     tuning: EstimatorTuning,
     dt: float,
 ) -> LoadEstimate:
-    """The load with its cable found taut or slack."""
+    """The load with its cable found taut or slack; `unfelt` (N) as `unfelt_pull` has it."""
     share = dt / (PULL_TIME_S + dt)
     felt = felt_pull(load, vehicle, imu, thrust, tuning.quad_mass)
     pull = load.pull + share * (felt - load.pull)
@@ -179,14 +236,15 @@ def watch(
         return load
     weight = tuning.load_mass * tuning.gravity
     if load.taut == 0.0:
-        pulled = pull > PULL_TAUT * weight and distance > PULL_DISTANCE * tuning.cable_length
+        pulled = pull + unfelt > PULL_TAUT * weight and distance > PULL_DISTANCE * tuning.cable_length
         load = _with(load, 0.0, load.length, pull, load.pulled_s + dt if pulled else 0.0)
-        if load.pulled_s > PULL_TAUT_S and load.age_s < SEEN_S:
+        if load.pulled_s > PULL_TAUT_S and (load.age_s < SEEN_S or load.age_s == float("inf")):
             load = tauten(load, history, tuning, tuning.cable_length)
             x_load = axpy(load.length, load.q_cable, vehicle.x_quad)
             return moved(load, x_load)
         return load
-    load = _with(load, 1.0, load.length, pull, load.pulled_s + dt if pull < PULL_SLACK * weight else 0.0)
+    lost = pull + unfelt < PULL_SLACK * weight
+    load = _with(load, 1.0, load.length, pull, load.pulled_s + dt if lost else 0.0)
     if load.pulled_s > PULL_SLACK_S:
         P = history.covariance
         L = load.length

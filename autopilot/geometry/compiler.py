@@ -72,16 +72,21 @@ class _OuterLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 def _needed(libraries: list[Any]) -> list[Any]:
-    """These libraries, and those that they need, each once."""
+    """These libraries, and those that they need, each once and before any that it needs: of a library LLVM
+    leaves out the functions that nothing linked so far calls."""
     found: dict[Any, None] = {}
-    ahead = list(libraries)
-    while ahead:
-        library = ahead.pop(0)
-        if library not in found:
-            found[library] = None
-            if isinstance(library, _InnerLibrary):
-                ahead += library._linking_libraries
-    return list(found)
+
+    def visit(library: Any) -> None:
+        if library in found:
+            return
+        if isinstance(library, _InnerLibrary):
+            for needed in library._linking_libraries:
+                visit(needed)
+        found[library] = None
+
+    for library in libraries:
+        visit(library)
+    return list(reversed(found))
 
 
 def _link_in(module: Any, library: Any) -> None:
@@ -167,10 +172,11 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
     """A compiled function with two faces: one for Python, whose machine code is kept in a cache, and one for
     other kernels. Most kernels never show the first: their cache is not looked for."""
 
-    def __init__(self, function: Any, cache_of: Callable[[Any], Any]) -> None:
+    def __init__(self, function: Any, cache_of: Callable[[Any], Any], nogil: bool = False) -> None:
         self._kept: Any = None
         self._cache_of = cache_of
-        super().__init__(function, targetoptions=dict(_OPTIONS), pipeline_class=_OuterCompiler)
+        options = dict(_OPTIONS, nogil=nogil)
+        super().__init__(function, targetoptions=options, pipeline_class=_OuterCompiler)
 
     @cached_property
     def _inner(self) -> _Inner:

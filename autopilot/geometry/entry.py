@@ -1,4 +1,4 @@
-"""The machine code of a kernel, called without its dispatcher.
+"""The machine code of a kernel, called without its dispatcher: from Python, or from other machine code.
 
 At each call numba's dispatcher looks up the types of the arguments. For records of arrays, as the two ticks
 take them, that costs several times what it costs to unpack them. Who always calls with arguments of the same
@@ -27,3 +27,11 @@ def entry_of(kernel: Callable[..., T], *arguments: Any) -> Callable[..., T]:
     kernel.compile(types)  # type: ignore[attr-defined]
     entry: Callable[..., T] = kernel.overloads[types].entry_point
     return entry
+
+
+def address_of(kernel: Callable[..., T], *arguments: Any) -> int:
+    """The address of a compiled kernel as a C function of such numbers, compiled or loaded where need be."""
+    types = tuple(map(typeof, arguments))
+    kernel.compile(types)  # type: ignore[attr-defined]
+    found = kernel.overloads[types]  # type: ignore[attr-defined]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))

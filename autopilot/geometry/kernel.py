@@ -163,3 +163,14 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
         return function
     compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache), function)
     return compiled
+
+
+def threaded(function: Callable[P, T]) -> Callable[P, T]:
+    """A kernel that lets other threads run while it does, for one that works for long at each call.
+
+    It must not fly flights in lanes: of what notes that these part there is one for all threads.
+    """
+    if config.DISABLE_JIT:
+        return function
+    compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache, nogil=True), function)
+    return compiled

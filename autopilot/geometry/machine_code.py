@@ -25,7 +25,9 @@ from platformdirs import user_cache_path
 ROOT = Path(__file__).resolve().parents[2]
 CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
 # it begins with letters, which are found fast: what is found in a text too does no harm
-_IMPORT = re.compile(rb"from[ \t]+((?:autopilot|sitl|missions|gcs)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)")
+_IMPORT = re.compile(
+    rb"from[ \t]+((?:autopilot|sitl|missions|gcs|plumbline)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)"
+)
 _NAME = re.compile(rb"\w+")
 _CPU_INFO = Path("/proc/cpuinfo")
 _CPU_FIELDS = ("model name", "flags", "Features", "CPU implementer", "CPU part")

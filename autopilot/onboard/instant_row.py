@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.core.tick import Pilot, Seen
+from autopilot.estimation.filter import NO_LOAD, NO_SIGHT
 from autopilot.estimation.records import Array, EstimatorState
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm, sub
@@ -89,7 +90,6 @@ _OF_PILOT = _copies(
         "control_mode": "control_mode",
         "slack_events": "slack_events",
         "saturated": "mixed.saturated",
-        "forces": "mixed.forces",
     },
 )
 _VEHICLE_COMPLAINT, _LOAD_COMPLAINT = _place(Seen, "vehicle_complaint"), _place(Seen, "load_complaint")
@@ -101,7 +101,10 @@ _X_LOAD, _X_QUAD, _X_QUAD_D = (_place(Instant, name) for name in ("x_load", "x_q
 _X_LOAD_D, _V_LOAD_D, _A_LOAD_D = (_place(Instant, name) for name in ("x_load_d", "v_load_d", "a_load_d"))
 _X_ASKED, _V_ASKED = _place(Instant, "x_load_asked"), _place(Instant, "v_load_asked")
 _QUAT_C, _E_X, _E_V = (_place(Instant, name) for name in ("quat_c_wxyz", "e_x", "e_v"))
+_TENSION, _TAUT = _place(Instant, "tension"), _place(Instant, "taut")
+_DISARMED, _ARMED = mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED
 _LEAST, _MOST = _place(Instant, "rotor_min"), _place(Instant, "rotor_max")
+_FORCES, _ROTORS = _place(Instant, "forces"), _place(Instant, "rotors")
 
 
 @kernel
@@ -109,6 +112,7 @@ def put_instant(
     seen: Row,
     estimator: Row,
     pilot: Row,
+    forces: Row,
     targets: Array,
     asked: Array,
     at: int,
@@ -122,11 +126,13 @@ def put_instant(
     carries: bool,
     rotor_min: float,
     rotor_max: float,
+    rotors: int,
     instant: Row,
 ) -> None:
     """Write an `Instant` into its row.
 
-    `seen`, `estimator` and `pilot` are those of `CoreRows`. The leg in force has this control mode (NO_LEG:
+    `seen`, `estimator` and `pilot` are those of `CoreRows`, `forces` (14) those of the rotors. The leg in
+    force has this control mode (NO_LEG:
     there is none); `targets[at]` is its setpoint, as `layout.jets` gives it, and `asked[at]` what the
     mission asks for. `carrying`: in a phase in which the load is tracked; `carries`: the load must be known.
     """
@@ -138,9 +144,15 @@ def put_instant(
         instant[_OF_PILOT[i, 0]] = pilot[_OF_PILOT[i, 1]]
     instant[_NOW_US], instant[_PHASE], instant[_SEQ] = now_us, phase, seq
     instant[_ELAPSED], instant[_DURATION] = elapsed_s, duration_s
-    instant[_LEAST], instant[_MOST] = rotor_min, rotor_max
+    instant[_LEAST], instant[_MOST], instant[_ROTORS] = rotor_min, rotor_max, rotors
+    for i in range(forces.shape[0]):
+        instant[_FORCES + i] = forces[i]
     vague = seen[_VEHICLE_COMPLAINT] != 0.0 or (carries and seen[_LOAD_COMPLAINT] != 0.0)
     instant[_FLAGS] = 0 if vague else _ESTIMATING
+    unseen = seen[_LOAD_COMPLAINT] == NO_LOAD or seen[_LOAD_COMPLAINT] == NO_SIGHT
+    if unseen and instant[_TAUT] != 0.0 and phase in (_DISARMED, _ARMED):
+        # in the air the vehicle feels the pull; on the ground only sight tells that it is over
+        instant[_TENSION], instant[_TAUT] = nan, 0.0
     x_load = (instant[_X_LOAD], instant[_X_LOAD + 1], instant[_X_LOAD + 2])
     x_quad = (instant[_X_QUAD], instant[_X_QUAD + 1], instant[_X_QUAD + 2])
     instant[_DISTANCE] = norm(sub(x_load, x_quad))

@@ -7,7 +7,7 @@ heads and constants are there already.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite, isinf
+from math import isfinite, isinf, nan
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -19,6 +19,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, packed, width
 from autopilot.onboard.log_topics import FAST, Column, Derived, Sample
 from autopilot.services.instant import Instant
+from autopilot.vehicle.layout import MOST
 from autopilot.wire.compiled import Bytes
 from autopilot.wire.convert import Home
 from autopilot.wire.ulog import RECORD_HEAD, UlogWriter
@@ -38,6 +39,7 @@ def _place(record: Any, name: str) -> int:
 _DERIVED = width(Instant)
 _TIME = _DERIVED + width(Derived)
 _FORCES, _MOST = _place(Instant, "forces"), _place(Instant, "rotor_max")
+_ROTORS = _place(Instant, "rotors")
 _QUAT, _QUAT_C = _place(Instant, "quat_wxyz"), _place(Instant, "quat_c_wxyz")
 _FLAGS = _place(Instant, "estimator_flags")
 _HOME, _IMU = _DERIVED + _place(Derived, "latitude_deg"), _DERIVED + _place(Derived, "gyro")
@@ -79,12 +81,16 @@ def put_sample(
         most = 1.0
     for i in range(4):
         row[_QUAT_NED + i], row[_QUAT_C_NED + i] = q_ned[i], c_ned[i]
+    for i in range(MOST):
         share = instant[_FORCES + i] / most
         if share < 0.0:
             share = 0.0
         elif share > 1.0:
             share = 1.0
-        row[_SHARES + i], row[_PULSES + i] = share, _STOP + (_FULL - _STOP) * share
+        pulse = _STOP + (_FULL - _STOP) * share
+        if i >= instant[_ROTORS]:
+            share, pulse = nan, 0.0
+        row[_SHARES + i], row[_PULSES + i] = share, pulse
     doubles, floats, integers = wide.view(np.float64), wide.view(np.float32), wide.view(np.int64)
     for k in range(copies.shape[0]):
         number = row[copies[k, 0]]

@@ -17,14 +17,13 @@ from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
 from autopilot.services import identity
 from autopilot.services.snapshot import Snapshot
+from autopilot.vehicle.layout import MOST
 from autopilot.wire.convert import Forces
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.ulog import Topic
 
 OUTPUTS = 16  # actuator_outputs.output
-MOTORS = 12  # actuator_motors.control
-ROTORS = 4
 # PX4's vehicle_status
 _DISARMED, _ARMED = 1, 2
 _NAV_STATES = {
@@ -113,9 +112,9 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
     (Topic("sensor_combined", (_vector("gyro_rad"), _vector("accelerometer_m_s2"))), _frd("gyro", "accel")),
     (
         Topic("actuator_outputs", ("uint32_t noutputs", f"float[{OUTPUTS}] output")),
-        ((ROTORS,), *_of("pulses"), (0.0,) * (OUTPUTS - ROTORS)),
+        (*_of("rotors", "pulses"), (0.0,) * (OUTPUTS - MOST)),
     ),
-    (Topic("actuator_motors", (f"float[{MOTORS}] control",)), (*_of("shares"), (nan,) * (MOTORS - ROTORS))),
+    (Topic("actuator_motors", (f"float[{MOST}] control",)), _of("shares")),
     (
         Topic("vehicle_local_position_setpoint", (*_AXES, _vector("acceleration"))),
         (*_ned("x_quad_d"), ned_from_enu(ZERO), ned_from_enu(ZERO)),
@@ -165,8 +164,17 @@ FAST: tuple[tuple[Topic, tuple[Column | Numbers, ...]], ...] = (
         ),
     ),
     (
-        Topic("rotor_forces", ("float[4] force", "float force_min", "float force_max", "uint8_t saturated")),
-        _of("forces", "rotor_min", "rotor_max", "saturated"),
+        Topic(
+            "rotor_forces",
+            (
+                f"float[{MOST}] force",
+                "float force_min",
+                "float force_max",
+                "uint16_t saturated",
+                "uint8_t rotors",
+            ),
+        ),
+        _of("forces", "rotor_min", "rotor_max", "saturated", "rotors"),
     ),
 )
 

@@ -16,12 +16,12 @@ from autopilot.control.believed import (
     believed_actuation,
     believed_drag,
     believed_observer,
+    believed_rotor_watch,
     believed_vehicle,
 )
-from autopilot.control.laws import build_law, chosen_law
+from autopilot.control.laws import build_law, chosen_law, is_own
 from autopilot.core.flight_core import FlightCore, Setup, commanded_rate
 from autopilot.core.health import Condition, battery_constants
-from autopilot.core.scheduler import RateError, divider
 from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse
 from autopilot.estimation.filter import estimator_tuning
@@ -34,9 +34,11 @@ from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, Loss
 from autopilot.onboard.punctuality import Punctuality
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
-from autopilot.onboard.snapshot import UNARMED, Moment, Moments, Options
+from autopilot.onboard.snapshot import UNARMED, MeasuredBattery, Moment, Moments, Options
 from autopilot.onboard.tick_answer import answer_tick
 from autopilot.onboard.warmup import rehearse_answer, rehearse_telemetry
+from autopilot.own.chosen import NOTHING_OWN, Own, OwnSetup
+from autopilot.own.planning import planner_for
 from autopilot.services.endpoint import VehicleEndpoint
 from autopilot.services.files import LOG_FOLDER, Card, FileError
 from autopilot.services.heartbeat import heartbeat_message
@@ -56,13 +58,14 @@ from autopilot.supervisor.recovery import Found
 from autopilot.supervisor.settings import settings_from
 from autopilot.supervisor.state import MissionPlan, Phase, off_mission
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
+from autopilot.vehicle.parameters import AutopilotParameters
+from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
-from autopilot.wire.convert import Home
+from autopilot.wire.convert import Home, read_battery_status
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_from, located_steps, unflown
-from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
@@ -85,12 +88,13 @@ LEAST_THRUST = 0.3  # of the vehicle's weight: rotors that were asked for less d
 class Gains(NamedTuple):
     """What is derived from the parameters, the gains of the law above all; for another process, as `Work`."""
 
-    parameters: ParameterTable
+    parameters: AutopilotParameters
     control_every: int
+    own: Own = NOTHING_OWN  # what somebody has brought, as it was named
 
     def done(self) -> Setup:
         """What comes of it; takes up to half a second."""
-        return build_setup(self.parameters, self.control_every)
+        return build_setup(self.parameters, self.control_every, self.own)
 
     def failed(self, why: str) -> None:
         """What comes of it where it could not be done: nothing."""
@@ -103,10 +107,12 @@ class Work(NamedTuple):
     sequence: tuple[int, ...]
     limits: Limits
     home: Vec3 = ZERO  # where a return leads
+    planner: OwnSetup | None = None  # that somebody has brought
 
     def done(self) -> Prepared:
         """What comes of it; takes from a millisecond to some seconds."""
-        return prepare(self.steps, self.sequence, self.limits, self.home)
+        planner = planner_for(self.planner)
+        return prepare(self.steps, self.sequence, self.limits, self.home, planner)
 
     def failed(self, why: str) -> Prepared:
         """What comes of it where it could not be done."""
@@ -125,8 +131,9 @@ class Rehearsal(NamedTuple):
         self.gains.done()
 
 
-def build_setup(table: ParameterTable, control_every: int) -> Setup:
-    """What the flight core is given, from the parameters and the ticks between two runs of the law."""
+def build_setup(table: AutopilotParameters, control_every: int, own: Own = NOTHING_OWN) -> Setup:
+    """What the flight core is given, from the parameters and the ticks between two runs of the law; `own`
+    names what somebody has brought, of which the law flies if CTL_LAW says so."""
     kind, law, vehicle = chosen_law(table), build_law(table), believed_vehicle(table)
     return Setup(
         vehicle=vehicle,
@@ -138,17 +145,31 @@ def build_setup(table: ParameterTable, control_every: int) -> Setup:
         tuning=estimator_tuning(table),
         settings=settings_from(table, kind.ramp_lag_s(law), kind.reels, kind.follows_shaped),
         control_every=control_every,
+        own=OwnSetup(own.law, table.values()) if is_own(law) else None,
+        estimator=OwnSetup(own.estimator, table.values()) if own.estimator else None,
+        planner=OwnSetup(own.planner, table.values()) if own.planner else None,
+        layout=table.layout,
+        rotor_watch=believed_rotor_watch(table),
     )
 
 
-def plan_of(mission: StoredMission, home: Home, limits: Limits | None, return_to: Vec3 = ZERO) -> MissionPlan:
+def plan_of(
+    mission: StoredMission,
+    home: Home,
+    limits: Limits | None,
+    return_to: Vec3 = ZERO,
+    planner: OwnSetup | None = None,
+) -> MissionPlan:
     """The steps of a mission as it was uploaded, prepared for a vehicle of these limits; None: not yet. A
-    return leads to `return_to`."""
+    return leads to `return_to`; `planner` is one that somebody has brought."""
     steps = located_steps(mission.items, home, return_to)
     flown, sequence = tuple(s.step for s in steps), tuple(s.last for s in steps)
-    prepared = PENDING if limits is None else prepare(flown, sequence, limits, return_to)
+    prepared = PENDING
+    if limits is not None:
+        prepared = prepare(flown, sequence, limits, return_to, planner_for(planner))
     again_from = endless_from(mission.items, steps)
-    return MissionPlan(flown, sequence, len(mission.items), prepared, again_from)
+    aims = tuple(s.aims for s in steps)
+    return MissionPlan(flown, sequence, len(mission.items), prepared, aims, again_from)
 
 
 class Onboard:
@@ -156,7 +177,7 @@ class Onboard:
 
     def __init__(
         self,
-        parameters: ParameterTable,
+        parameters: AutopilotParameters,
         identity: Identity,
         options: Options,
         mission: StoredMission | None,
@@ -201,7 +222,7 @@ class Onboard:
         self._world_told = False  # what parameters it has
         self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is asked to begin anew
-        self.core = FlightCore(build_setup(parameters, 1))
+        self.core = FlightCore(build_setup(parameters, 1, options.own))
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
         self._moments = Moments(self.core, options, parameters, self._health, self._sensors)
         # what waits for `finish`
@@ -209,7 +230,7 @@ class Onboard:
         self._gains: Gains | None = None
         # values of our parameters that are in force, or will be, and the period of the ticks
         self._followed: tuple[dict[str, float], int] = ({}, 0)
-        self._prepared_for = self.core.setup.settings.limits
+        self._prepared_for = (self.core.setup.settings.limits, self.core.setup.planner)
         self._take_plan(self.endpoint.mission)
         self.logged = False  # since the log was taken last
         self._log: FlightLog | None = None
@@ -278,6 +299,11 @@ class Onboard:
     def phase(self) -> Phase:
         """The phase of flight."""
         return self.core.flight.phase
+
+    @property
+    def tick_us(self) -> int:
+        """How long a tick lasts, by the clock of the simulator; 0 until two have come."""
+        return self._shortest_us
 
     @property
     def armed(self) -> bool:
@@ -353,9 +379,13 @@ class Onboard:
             self._hinder("clock", self._punctuality.hear(message, self.tick))
             return
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_SIM_BOOT:
+            self.endpoint.simulator_run = message
             if self._boot_id is None:
                 self._boot_id = message.boot_id
                 self._find(message)
+            return
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_BATTERY_STATUS:
+            self._moments.measured = MeasuredBattery(self.now_us, read_battery_status(message))
             return
         name = self._world.receive(message)
         if name is not None:
@@ -365,7 +395,7 @@ class Onboard:
         """Take up a flight that is under way, which this autopilot has begun before it was started again."""
         if boot.rotors == mavlink.PLUMBLINE_ROTORS_DISARMED:
             return
-        vehicle, thrust_n = self.core.setup.vehicle, float(sum(boot.force))
+        vehicle, thrust_n = self.core.setup.vehicle, float(sum((*boot.force, *boot.more_force)))
         if boot.rotors == mavlink.PLUMBLINE_ROTORS_UNHEARD:
             text = "Restarted in flight after the rotors had stopped: disarmed"
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, text)
@@ -413,8 +443,7 @@ class Onboard:
     def _follow_parameters(self) -> None:
         self._version = self.parameters.version
         try:
-            rate_hz = self.parameters["CTL_RATE_HZ"]
-            every = divider(1e6 / self._shortest_us, rate_hz, "CTL_RATE_HZ") if self._shortest_us else 1
+            every = control_divider(1e6 / self._shortest_us, self.parameters) if self._shortest_us else 1
         except RateError as error:
             self.fault = str(error)
             self.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, self.fault)
@@ -423,7 +452,7 @@ class Onboard:
         self._ground.follow(self.parameters)
         self._moments.battery = battery_constants(self.parameters)
         pack(self._moments.battery, self._battery_row, 0)
-        gains = Gains(self.parameters, every)
+        gains = Gains(self.parameters, every, self._options.own)
         if self._options.clock_waits or self.tick <= FIRST_TICKS:
             self._take_setup(gains.done())
         values, learned = self.parameters.values(), self.parameters.learned
@@ -436,7 +465,8 @@ class Onboard:
         """Fly by other parameters from the next tick on."""
         self.core.follow(setup)
         # a mission under way keeps the paths that it began with
-        if self.core.setup.settings.limits != self._prepared_for and not self.core.flight.mission.active:
+        wanted = (setup.settings.limits, setup.planner)
+        if wanted != self._prepared_for and not self.core.flight.mission.active:
             self._prepare()
 
     # ---- ground
@@ -505,7 +535,7 @@ class Onboard:
         path = Signals(1.0, (Term("x", 0.01, 0.0, 0.5, None, 0.0),))
         steps = (Waypoint(0.0, 0.0, 2.0, 1.0), Waypoint(1.0, 0.0, 2.0), Waypoint(1.0, 1.0, 2.0), path)
         paths = Work(steps, tuple(range(len(steps))), self.core.setup.settings.limits)
-        return Rehearsal(paths, Gains(self.parameters, self.core.setup.control_every))
+        return Rehearsal(paths, Gains(self.parameters, self.core.setup.control_every, self._options.own))
 
     def rehearse(self) -> None:
         """Call every kernel once, so that none is compiled in flight."""
@@ -588,9 +618,10 @@ class Onboard:
 
     def _prepare(self) -> None:
         """Have the paths of the plan made: at once where the clock waits, else by who takes `work`."""
-        plan, limits = self.core.flight.mission.plan, self.core.setup.settings.limits
-        self._prepared_for = limits
-        work = self._paths = Work(plan.steps, plan.sequence, limits, self.core.flight.area.home)
+        plan, setup = self.core.flight.mission.plan, self.core.setup
+        self._prepared_for = limits, planner = setup.settings.limits, setup.planner
+        home = self.core.flight.area.home
+        work = self._paths = Work(plan.steps, plan.sequence, limits, home, planner)
         self._have_prepared(PENDING)
         if self._options.clock_waits or not plan.steps:
             self.finish(work, work.done())

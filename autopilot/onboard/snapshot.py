@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from autopilot.control.load_motion import Drag
+from autopilot.control.drag import Drag
 from autopilot.core.flight_core import FlightCore, LaidOut, Setup
 from autopilot.core.health import Condition, battery_constants, remaining, sensors, vibration, voltage
 from autopilot.core.sensor_inbox import SensorInbox, SlowSensors
@@ -21,6 +21,7 @@ from autopilot.geometry.packed import Row, unpack, width
 from autopilot.guidance.layout import jets
 from autopilot.guidance.legs import LOAD_POSITION, QUAD_POSITION, Leg, Run
 from autopilot.onboard.instant_row import NO_LEG, put_instant
+from autopilot.own.chosen import NOTHING_OWN, Own
 from autopilot.services import identity, snapshot
 from autopilot.services.instant import Instant
 from autopilot.services.mission_store import StoredMission
@@ -38,9 +39,9 @@ from autopilot.supervisor.state import (
     carries,
 )
 from autopilot.supervisor.watches.fence import limited
-from autopilot.wire.convert import HilGps, Home
+from autopilot.vehicle.parameters import AutopilotParameters
+from autopilot.wire.convert import BatteryReading, HilGps, Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameter_table import ParameterTable
 
 FRESH_S = 0.5  # a tracker is healthy while its last reading is no older
 UNARMED = (Phase.DISARMED, Phase.FAILSAFE)  # the rotors stand
@@ -86,6 +87,7 @@ class Options:
     lockstep: bool = True
     clock_waits: bool = True  # for the autopilot, however long it works
     log: bool = False  # flights are logged, and the shell stores what `Onboard.take_log` gives
+    own: Own = NOTHING_OWN  # what somebody has brought, as it was named
     setup_signing: bool = False  # a first signing key is taken from whoever sends one
 
 
@@ -217,6 +219,17 @@ def sortie_after(before: Sortie, was: Flight, now: Flight) -> Sortie:
     return before
 
 
+class MeasuredBattery(NamedTuple):
+    """What a power module said last, and when."""
+
+    at_us: int
+    reading: BatteryReading
+
+
+NOT_MEASURED = MeasuredBattery(-(2**62), BatteryReading())
+_FRESH_BATTERY_US = 2_000_000  # older words of the battery are those of nobody: its model is told
+
+
 class Moments:
     """Makes the snapshots of one flight core; remembers what follows from a flight record while it lasts."""
 
@@ -224,7 +237,7 @@ class Moments:
         self,
         core: FlightCore,
         options: Options,
-        parameters: ParameterTable,
+        parameters: AutopilotParameters,
         health: Row,
         readings: SensorInbox,
     ) -> None:
@@ -237,6 +250,7 @@ class Moments:
         self.fixed = False
         self.sortie = Sortie()
         self.battery = battery_constants(parameters)
+        self.measured = NOT_MEASURED
         self._flight = core.flight
         self._items = 0
         self._told = told(core.flight, 0)
@@ -280,7 +294,7 @@ class _Standing(NamedTuple):
     flight: Flight
     laid: LaidOut | None
     setup: Setup
-    rows: tuple[Row, Row, Row]  # `seen`, `estimator`, `pilot`
+    rows: tuple[Row, Row, Row, Row]  # `seen`, `estimator`, `pilot`, forces of the rotors
     tracks: bool  # the leg has setpoints:
     targets: Array
     asked: Array  # what the mission asks for, row by row as `targets`
@@ -288,7 +302,7 @@ class _Standing(NamedTuple):
     since_us: int  # when the leg began, or without one the phase
     duration_s: float
     phase: int
-    facts: tuple[bool, bool, float, float]  # `carrying`, `carries`, `rotor_min`, `rotor_max`
+    facts: tuple[bool, bool, float, float, int]  # `carrying`, `carries`, `rotor_min`, `rotor_max`, `rotors`
 
 
 def _standing(core: FlightCore, flight: Flight, before: _Standing | None) -> _Standing:
@@ -308,7 +322,7 @@ def _standing(core: FlightCore, flight: Flight, before: _Standing | None) -> _St
         flight,
         laid,
         setup,
-        (rows.seen, rows.estimator, rows.pilot),
+        (rows.seen, core.shown_estimator, rows.pilot, core.force_row),
         mode in (LOAD_POSITION, QUAD_POSITION),
         targets,
         asked,
@@ -316,7 +330,7 @@ def _standing(core: FlightCore, flight: Flight, before: _Standing | None) -> _St
         since_us,
         float(duration_s),
         int(flight.phase),
-        (flight.phase in CARRYING, carries(flight), *limits),
+        (flight.phase in CARRYING, carries(flight), *limits, len(setup.layout)),
     )
 
 
@@ -436,6 +450,11 @@ def _gps(m: Moment) -> tuple[Any, ...]:
     return (None,)
 
 
+@_makes("built_in")
+def _built_in(m: Moment) -> tuple[Any, ...]:
+    return (m.core.built_in,)
+
+
 @_makes("sensed")
 def _sensed(m: Moment) -> tuple[Any, ...]:
     readings = m.moments.readings
@@ -444,6 +463,11 @@ def _sensed(m: Moment) -> tuple[Any, ...]:
         return (None,)
     _, _, field_us, pressure_us = m.condition.heard_us
     return (Sensed(imu.gyro, imu.accel, *slow, field_us, pressure_us),)
+
+
+@_makes("rotor_rpm", "rotors_lost")
+def _rotors(m: Moment) -> tuple[Any, ...]:
+    return m.core.told_rpm, m.flight.rotors_lost
 
 
 @_makes("sortie")
@@ -464,6 +488,9 @@ def _wind(m: Moment) -> tuple[Any, ...]:
 
 @_makes("battery_voltage", "battery_current", "battery_used_mah", "battery_remaining")
 def _battery(m: Moment) -> tuple[Any, ...]:
+    measured = m.moments.measured
+    if m.now_us - measured.at_us <= _FRESH_BATTERY_US:
+        return measured.reading
     condition, battery = m.condition, m.moments.battery
     used_mah = condition.used_as / 3.6
     return voltage(condition, battery), condition.current, used_mah, remaining(condition, battery)

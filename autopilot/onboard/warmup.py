@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, Setup
-from autopilot.core.health import BatteryConstants, Condition
+from autopilot.core.health import Condition
 from autopilot.core.sensor_inbox import SensorInbox
 from autopilot.estimation.records import ImuReading
 from autopilot.geometry.linear import ZERO
@@ -16,14 +16,16 @@ from autopilot.onboard.snapshot import Moment, Moments, Options
 from autopilot.onboard.tick_answer import answer_tick
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.stream_frames import BITS, StreamFrames
+from autopilot.vehicle.battery import Battery
+from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
 from autopilot.wire.convert import Home
-from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.ulog import UlogWriter
 
 
-def rehearse_telemetry(setup: Setup, parameters: ParameterTable) -> None:
+def rehearse_telemetry(setup: Setup, parameters: AutopilotParameters) -> None:
     """Put an instant together, send and log it."""
     core, options = FlightCore(setup), Options(Home(), 0)
     moments = Moments(
@@ -39,7 +41,7 @@ def rehearse_telemetry(setup: Setup, parameters: ParameterTable) -> None:
 def rehearse_answer() -> None:
     """Answer a tick."""
     frame, payload = np.zeros(FRAME_ROOM, np.uint8), np.zeros(PAYLOAD_ROOM, np.uint8)
-    imu, battery = packed(ImuReading(ZERO, ZERO)), packed(BatteryConstants(1.0, 1.0, 0.0, 0.0))
-    condition, forces = packed(Condition()), np.zeros(4)
+    imu, battery = packed(ImuReading(ZERO, ZERO)), packed(Battery(1.0, 1.0, 0.0, 0.0))
+    condition, forces = packed(Condition()), np.zeros(MOST)
     rows = (condition, imu, forces, battery)
     answer_tick(*rows, 0, False, 0, 0.0, frame, payload, 0, 1, 1, False, True, False, 0.0)

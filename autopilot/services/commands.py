@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
-from autopilot.services.identity import Flavour
+from autopilot.services.identity import Flavour, Identity
 from autopilot.services.records import Announce, Decide, Output, Peer, Say, Send, Verdict
 from autopilot.services.requests import (
     Answered,
@@ -26,7 +26,6 @@ from autopilot.services.requests import (
     GetMessageInterval,
     Grab,
     Land,
-    LookAt,
     Orbit,
     Pause,
     Reboot,
@@ -46,12 +45,13 @@ from autopilot.services.requests import (
     StoreParameters,
     Takeoff,
     Terminate,
-    TurnNose,
     Winch,
 )
 from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import turn_nose
 from autopilot.wire.parameter_table import decimal_from_float32
+from missions.model import LookAt
 
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 DENIED = mavlink.MAV_RESULT_DENIED
@@ -88,6 +88,7 @@ class Context(NamedTuple):
 
     home: Home
     flavour: Flavour
+    rotors: int = 4
 
 
 Parser = Callable[[Call, Context], Request | Verdict]
@@ -359,12 +360,7 @@ def _condition_yaw(call: Call, context: Context) -> Request | Verdict:
         return _refused(f"Yaw: param1 = {angle:g} deg; must be -360 ... 360")
     if sense not in (-1.0, 0.0, 1.0) or relative not in (0.0, 1.0):
         return _refused("Yaw: param3 must be -1, 0 or 1, param4 0 (from north) or 1 (from here)")
-    rate_rad_s = math.radians(rate) if rate > 0.0 else None
-    if relative:
-        # counter-clockwise is negative: of an angle without a sign param3 says it
-        clockwise = math.radians(abs(angle) * sense if sense else angle)
-        return TurnNose(-clockwise, relative=True, rate_rad_s=rate_rad_s)
-    return TurnNose(0.5 * math.pi - math.radians(angle), sense=-int(sense), rate_rad_s=rate_rad_s)
+    return turn_nose(angle, rate, int(sense), bool(relative))
 
 
 def _roi_location(call: Call, context: Context) -> Request | Verdict:
@@ -410,9 +406,12 @@ def _inject_failure(call: Call, context: Context) -> Request | Verdict:
         return Verdict(UNSUPPORTED, "Failure: it can be ok (0) or off (1)")
     fail = kind == mavlink.FAILURE_TYPE_OFF
     if motor:
-        if instance is None or instance not in range(5):
-            return _refused(f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... 4, or 0 for all")
-        return FailParts("SIM_ENGINE_FAIL", 0b1111 if instance == 0 else 1 << (instance - 1), fail)
+        if instance is None or instance not in range(context.rotors + 1):
+            return _refused(
+                f"Failure: param3 = {call.p[2]:g}; must be a rotor, 1 ... {context.rotors}, or 0 for all"
+            )
+        every = (1 << context.rotors) - 1
+        return FailParts("SIM_ENGINE_FAIL", every if instance == 0 else 1 << (instance - 1), fail)
     if instance not in (0, 1):
         return _refused(f"Failure: param3 = {call.p[2]:g}; there is one of it, 1, or 0 for all")
     return FailParts("SIM_SENS_FAIL", _SENSORS[unit], fail)
@@ -498,8 +497,8 @@ class _Done(NamedTuple):
 class CommandService:
     """Commands in, COMMAND_ACK out; what happens is decided by the `decide` given with each message."""
 
-    def __init__(self, home: Home, flavour: Flavour) -> None:
-        self.context = Context(home, flavour)
+    def __init__(self, home: Home, identity: Identity) -> None:
+        self.context = Context(home, identity.flavour, identity.rotors)
         self._done: dict[tuple[Peer, int], _Done] = {}
         self._last: tuple[Peer, int] | None = None
 

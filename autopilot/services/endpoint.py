@@ -24,11 +24,13 @@ from autopilot.services.ftp import FtpService
 from autopilot.services.guided import GuidedService
 from autopilot.services.identity import (
     AUTOPILOT_COMPONENT,
+    DIALECT_COMPONENT,
     LOAD_COMPONENT,
     WINCH_COMPONENT,
     Identity,
     available_modes_messages,
 )
+from autopilot.services.kept_texts import KeptTexts
 from autopilot.services.links import LinkState, Outgoing
 from autopilot.services.logs import LogService
 from autopilot.services.mission_store import StoredMission
@@ -95,6 +97,7 @@ REACHED_AGAIN = 4  # times that the end of a mission is said again
 REACHED_US = 300_000  # between two of them
 PATIENCE = 64  # bytes of a datagram that may be part of no message, before the rest of it is passed over
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
+MAKING_ROOM_US = 20_000  # for another not more often: a new link costs as much as ten messages
 _SECOND_US = 1_000_000
 _INT32 = 2**31 - 1
 _UINT16 = 2**16 - 1
@@ -135,23 +138,27 @@ class VehicleEndpoint:
         self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
         self._reached_us: int | None = None
         self._parameters = ParameterService(parameters, identity.parameter_encoding)
-        self._commands = CommandService(home, identity.flavour)
+        self._commands = CommandService(home, identity)
         self._components = ComponentService(self._commands)
         self._guided = GuidedService(home, identity.system)
         made = made_files(identity, parameters, lambda: self._missions.mission)
         self.files = FileTree(MemoryCard() if card is None else card, made)
         self._ftp = FtpService(self.files)
         self._logs = LogService(self.files)
+        self._texts = TextWriter()
+        self.kept_texts = KeptTexts(self._texts)
+        self._now_us = 0  # of what was called last, by which texts are dated
         self._timed = (
             self._signing,
             self._missions,
             self._parameters,
             self._ftp,
             self._logs,
+            self.kept_texts,
         )
         self._faults = Faults()
-        self._texts = TextWriter()
         self._links: dict[Link, LinkState] = {}
+        self._room_us = 0  # when the next link may take the place of another
         self._learned: dict[Link, LinkState] = {}  # of these the ones that were not configured
         load: dict[int, Stream] = LOAD_STREAMS if identity.load_system else {}
         table = STREAMS | COMPONENT_STREAMS | load
@@ -180,6 +187,7 @@ class VehicleEndpoint:
         self._events: list[Event] = []  # of `poll`, until they are taken
         self.ground_us = NEVER_US  # when a ground station's HEARTBEAT came last
         self.on_text: Callable[[int, str], None] | None = None  # hears what the operators are told
+        self.simulator_run: Any = None  # SIM_BOOT of the simulator that is flown in, once it has told
         self.handlers = self._handler_table()  # by message id
 
     @property
@@ -223,12 +231,14 @@ class VehicleEndpoint:
         `program`: what the link is, if it is new (see `add_link`).
         """
         events: list[Event] = []
-        self._stirred = True
+        self._stirred, self._now_us = True, now_us
         for received in decode(datagram, PATIENCE)[0]:
             message_id = received.id
             if self._is_own(received) or not self._signing.hears(received, message_id):
                 continue
             state = self._heard(link, now_us, program)
+            if state is None:
+                break
             if message_id == _HEARTBEAT and received.message.type == mavlink.MAV_TYPE_GCS:
                 self.ground_us = now_us
             handler = self.handlers.get(message_id)
@@ -313,6 +323,7 @@ class VehicleEndpoint:
 
     def poll(self, make_snapshot: SnapshotFactory, now_us: int) -> list[tuple[Link, bytes]]:
         """All that is due now: answers first, then streams, packed into datagrams by link."""
+        self._now_us = now_us
         if self._stirred:
             self._look_ahead()
         if now_us < self._next_us and not self._work:
@@ -434,6 +445,7 @@ class VehicleEndpoint:
                     for state in self._states(link):
                         state.queue.append((source or self._own, message))
                 case Say(severity, text):
+                    self.kept_texts.keep(severity, text, self._now_us)
                     if self.on_text is not None:
                         self.on_text(severity, text)
                     for message in self._texts.messages(severity, text):
@@ -457,10 +469,14 @@ class VehicleEndpoint:
         state.streams.set_interval(WINCH_HEARTBEAT, OFF, now_us)
         return state
 
-    def _heard(self, link: Link, now_us: int, program: bool) -> LinkState:
+    def _heard(self, link: Link, now_us: int, program: bool) -> LinkState | None:
+        """The link on which somebody is heard; None: a new one for which there is no room now."""
         state = self._links.get(link)
         if state is None:
             if len(self._learned) >= MAX_LINKS:
+                if now_us < self._room_us:
+                    return None
+                self._room_us = now_us + MAKING_ROOM_US
                 self._forget(min(self._learned, key=lambda link: self._learned[link].heard_us))
             state = self._links[link] = self._learned[link] = self._new_link(now_us, program)
             self._work = True
@@ -475,7 +491,7 @@ class VehicleEndpoint:
     def _forget(self, link: Link) -> None:
         del self._links[link]
         self._learned.pop(link, None)
-        for service in (self._parameters, self._ftp, self._logs):
+        for service in (self._parameters, self._ftp, self._logs, self.kept_texts):
             service.forget(link)
 
     # ---- receiving
@@ -545,6 +561,9 @@ class VehicleEndpoint:
             number = int(argument) if 0.0 <= argument <= _UINT16 else -1
             return self._request_interval(state, peer, number)
         source = peer.addressed or self._own
+        if message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT and source == self._own:
+            self.kept_texts.ask(peer.link, now_us)
+            return _ACCEPTED
         where = _METADATA.get(message_id)
         if where is not None and source == self._own:
             state.queue.append((source, where(self.identity, self._parameters.table, now_us)))
@@ -555,6 +574,9 @@ class VehicleEndpoint:
                 return Verdict(mavlink.MAV_RESULT_DENIED)
             which = int(argument)  # 0: all
             state.queue += [(source, mode) for mode in (modes[which - 1 : which] if which else modes)]
+            return _ACCEPTED
+        if message_id == mavlink.MAVLINK_MSG_ID_SIM_BOOT and source == self._own and self.simulator_run:
+            state.queue.append(((self.identity.system, DIALECT_COMPONENT), self.simulator_run))
             return _ACCEPTED
         key = self._streams_of[source].get(message_id)
         if key is None:

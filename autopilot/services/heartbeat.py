@@ -7,6 +7,13 @@ from autopilot.services.snapshot import Snapshot
 from autopilot.wire.dialect import plumbline as mavlink
 
 HEARTBEAT_US = 1_000_000
+MULTIROTORS = {  # MAV_TYPE by the number of rotors
+    4: mavlink.MAV_TYPE_QUADROTOR,
+    6: mavlink.MAV_TYPE_HEXAROTOR,
+    8: mavlink.MAV_TYPE_OCTOROTOR,
+    10: mavlink.MAV_TYPE_DECAROTOR,
+    12: mavlink.MAV_TYPE_DODECAROTOR,
+}
 _PROTOCOL_VERSION = 3  # HEARTBEAT.mavlink_version, the same since MAVLink 1
 
 
@@ -18,7 +25,7 @@ def heartbeat_message(snapshot: Snapshot, identity: Identity) -> mavlink.MAVLink
     if snapshot.armed:
         base_mode |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     return mavlink.MAVLink_heartbeat_message(
-        type=flavour.vehicle_type,
+        type=MULTIROTORS.get(identity.rotors, mavlink.MAV_TYPE_GENERIC_MULTIROTOR),
         autopilot=flavour.autopilot,
         base_mode=base_mode,
         custom_mode=mode.custom_mode if mode else 0,

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.parameter_table import ParameterTable
 
 AUTOPILOT_COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 DIALECT_COMPONENT = mavlink.MAV_COMP_ID_USER1
@@ -91,7 +91,6 @@ class Flavour:
     """How one family of autopilots presents itself."""
 
     name: str
-    vehicle_type: int  # MAV_TYPE
     autopilot: int  # MAV_AUTOPILOT
     modes: tuple[Mode, ...]
     takeoff_above_home: bool  # NAV_TAKEOFF in COMMAND_LONG: height above home, else above sea level
@@ -165,11 +164,9 @@ _CAPABILITIES = (
 )
 _BYTEWISE = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
 _CAST = mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
-_QUADROTOR = mavlink.MAV_TYPE_QUADROTOR
 
 PX4 = Flavour(
     name="px4",
-    vehicle_type=_QUADROTOR,
     autopilot=mavlink.MAV_AUTOPILOT_PX4,
     modes=(
         _px4(MANUAL, 0, "MANUAL"),
@@ -191,7 +188,6 @@ PX4 = Flavour(
 
 ARDUPILOT = Flavour(
     name="ardupilot",
-    vehicle_type=_QUADROTOR,
     autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
     modes=(
         # GUIDED is where take-off, "go there" and holding happen; in a request it means holding
@@ -245,6 +241,7 @@ class Identity:
     version: tuple[int, int, int] = (0, 1, 0)  # of this program
     load_system: int = 0
     integers: bool = False  # whole-numbered parameters travel as INT32
+    rotors: int = 4  # how many the vehicle has
 
     @property
     def parameter_encoding(self) -> ParameterEncoding:
@@ -252,12 +249,13 @@ class Identity:
         return ParameterEncoding(self.integers, bool(self.flavour.capabilities & _BYTEWISE))
 
 
-def identity_of(table: ParameterTable) -> Identity:
+def identity_of(table: AutopilotParameters) -> Identity:
     """The identity that the parameters ask for; a load under the vehicle's own id is no system of its own."""
     system, load = int(table["MAV_SYS_ID"]), int(table["MAV_LOAD_SYS_ID"])
     flavour = tuple(FLAVOURS.values())[int(table["MAV_IDENTITY"])]
     integers = table["MAV_PARAM_INT"] > 0.0
-    return Identity(system, flavour, load_system=0 if load == system else load, integers=integers)
+    apart = 0 if load == system else load
+    return Identity(system, flavour, load_system=apart, integers=integers, rotors=len(table.layout))
 
 
 def available_modes_messages(identity: Identity) -> tuple[mavlink.MAVLink_available_modes_message, ...]:

@@ -38,7 +38,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 
 _UINT32 = 0xFFFFFFFF
 _PWM_STOP, _PWM_FULL = 1000, 2000  # SERVO_OUTPUT_RAW as most tools expect it, us
-_NO_MORE_PORTS = (0,) * 13  # the first port has four outputs; others give nothing
 # names of DEBUG_VECT and NAMED_VALUE_FLOAT, in the order in which they are sent
 DEBUG_VECTORS = (b"LOAD_POS", b"LOAD_VEL", b"CABLE_Q", b"LOAD_ERR")
 NAMED_VALUES = (b"TENSION", b"SWING", b"LOAD_ERR", b"PSI_R", b"PSI_Q")
@@ -97,6 +96,7 @@ class Instant(NamedTuple):
     rotor_min: float
     rotor_max: float
     saturated: int
+    rotors: int
 
 
 @register_jitable
@@ -138,7 +138,10 @@ def force_share(force: float, s: Any) -> float:
 @register_jitable
 def vfr_hud_of(s: Any, home: Home) -> tuple[float, ...]:
     """VFR_HUD."""
-    mean = 0.25 * (s.forces[0] + s.forces[1] + s.forces[2] + s.forces[3])
+    total = 0.0
+    for i in range(s.rotors):
+        total += s.forces[i]
+    mean = 1.0 / s.rotors * total
     return vfr_hud_values(s.v_quad, s.quat_wxyz, s.x_quad[2], force_share(mean, s), home)
 
 
@@ -151,20 +154,43 @@ def position_target_local_ned_of(s: Any) -> tuple[float, ...]:
 @register_jitable
 def attitude_target_of(s: Any) -> tuple[float, ...]:
     """ATTITUDE_TARGET."""
-    return attitude_target_values(s.now_us, s.quat_c_wxyz, ZERO, force_share(0.25 * s.thrust, s))
+    return attitude_target_values(s.now_us, s.quat_c_wxyz, ZERO, force_share(1.0 / s.rotors * s.thrust, s))
 
 
 @register_jitable
-def _pulse_us(force: float, s: Any) -> int:
+def _pulse_us(i: int, s: Any) -> int:
+    if i >= s.rotors:
+        return 0
+    force = s.forces[i]
     return saturated(_PWM_STOP + (_PWM_FULL - _PWM_STOP) * force_share(force, s), _PWM_STOP, _PWM_FULL)
 
 
 @register_jitable
 def servo_output_raw_of(s: Any) -> tuple[float, ...]:
     """SERVO_OUTPUT_RAW."""
-    f = s.forces
-    pulses = (_pulse_us(f[0], s), _pulse_us(f[1], s), _pulse_us(f[2], s), _pulse_us(f[3], s))
-    return (s.now_us & _UINT32, *pulses, *_NO_MORE_PORTS)
+    pulses = pulses_of(s)
+    return (s.now_us & _UINT32, *pulses[:8], 0, *pulses[8:], 0, 0)
+
+
+@register_jitable
+def pulses_of(s: Any) -> tuple[int, ...]:
+    """The pulse of each of the most rotors, us; 0 for those that there are not."""
+    return (
+        _pulse_us(0, s),
+        _pulse_us(1, s),
+        _pulse_us(2, s),
+        _pulse_us(3, s),
+        _pulse_us(4, s),
+        _pulse_us(5, s),
+        _pulse_us(6, s),
+        _pulse_us(7, s),
+        _pulse_us(8, s),
+        _pulse_us(9, s),
+        _pulse_us(10, s),
+        _pulse_us(11, s),
+        _pulse_us(12, s),
+        _pulse_us(13, s),
+    )
 
 
 @register_jitable
@@ -248,4 +274,4 @@ def cascade_errors_of(s: Any) -> tuple[float, ...]:
 @register_jitable
 def rotor_state_of(s: Any) -> tuple[float, ...]:
     """ROTOR_STATE."""
-    return rotor_state_values(s.now_us, _ESTIMATED, s.forces, s.rotor_min, s.rotor_max, s.saturated)
+    return rotor_state_values(s.now_us, _ESTIMATED, s.forces, s.rotor_min, s.rotor_max, s.saturated, s.rotors)

@@ -10,6 +10,7 @@ from math import nan
 
 from autopilot.geometry.linear import Vec3
 from autopilot.wire.items import LocatedStep
+from missions.model import LookAt, TurnNose
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,25 +107,6 @@ class Reposition:
     change_mode: bool
     speed_m_s: float | None = None
     heading_rad: float | None = None  # from east to north
-
-
-@dataclass(frozen=True, slots=True)
-class TurnNose:
-    """Turn to a heading, from east to north, or by an angle (`relative`). `sense`: 1 counter-clockwise seen
-    from above, -1 clockwise, 0 whichever is shorter; `rate_rad_s` None: as fast as MPC_YAWRAUTO_MAX."""
-
-    angle_rad: float
-    relative: bool = False
-    sense: int = 0
-    rate_rad_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class LookAt:
-    """Keep the nose turned to a place, ENU from home; None: no more."""
-
-    east_m: float | None
-    north_m: float | None
 
 
 @dataclass(frozen=True, slots=True)

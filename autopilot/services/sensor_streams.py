@@ -11,7 +11,7 @@ from typing import Any
 
 from autopilot.geometry.linear import Vec3
 from autopilot.services.identity import Identity
-from autopilot.services.instant import attitude_quaternion_of, servo_output_raw_of
+from autopilot.services.instant import attitude_quaternion_of, pulses_of
 from autopilot.services.snapshot import Sensed, Snapshot
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import boot_ms, saturated
@@ -25,7 +25,7 @@ _ACTUATOR_OUTPUT_STATUS = layout_of(mavlink.MAVLink_actuator_output_status_messa
 
 _UINT16, _INT16 = 0xFFFF, 0x7FFF
 _CHANNELS = 18  # of RC_CHANNELS
-_OUTPUTS, _ROTORS = 32, 4  # of ACTUATOR_OUTPUT_STATUS, and of the vehicle
+_OUTPUTS = 32  # of ACTUATOR_OUTPUT_STATUS
 _STANDARD_GRAVITY = 9.80665  # m/s^2, of a milli-g
 # HIGHRES_IMU.fields_updated
 _INERTIAL, _FIELD, _PRESSURE = 0x003F, 0x01C0, 0x1A00
@@ -127,8 +127,8 @@ def odometry(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
 
 def actuator_output_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     """ACTUATOR_OUTPUT_STATUS: the pulses of SERVO_OUTPUT_RAW, us."""
-    pulses = servo_output_raw_of(s)[1 : 1 + _ROTORS]
-    return ((_ACTUATOR_OUTPUT_STATUS, (s.now_us, _ROTORS, *pulses, *(0.0,) * (_OUTPUTS - _ROTORS))),)
+    pulses = pulses_of(s)
+    return ((_ACTUATOR_OUTPUT_STATUS, (s.now_us, s.rotors, *pulses, *(0.0,) * (_OUTPUTS - len(pulses)))),)
 
 
 def rc_channels(s: Snapshot, identity: Identity) -> tuple[Any, ...]:

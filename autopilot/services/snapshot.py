@@ -12,7 +12,7 @@ from typing import NamedTuple
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
-from autopilot.wire.convert import Forces, Home
+from autopilot.wire.convert import NO_FORCES, Forces, Home
 from autopilot.wire.dialect import plumbline as mavlink
 
 _UNKNOWN: Vec3 = (math.nan, math.nan, math.nan)
@@ -115,6 +115,9 @@ class Snapshot:
     taut: bool = False
     slack_events: int = 0
 
+    # load (position, velocity) and vehicle as the built-in filter has them, where somebody's own flies
+    built_in: tuple[Vec3, Vec3, Vec3] | None = None
+
     # what the cascade tracks
     control_mode: int = mavlink.PLUMBLINE_CONTROL_NONE
     seq: int = 0  # mission item in force
@@ -142,10 +145,13 @@ class Snapshot:
     moment: Vec3 = ZERO
 
     # rotors
-    forces: Forces = (0.0, 0.0, 0.0, 0.0)  # commanded, N
+    forces: Forces = NO_FORCES  # commanded, N
     rotor_min: float = 0.0
     rotor_max: float = math.inf
     saturated: int = 0  # bit i: rotor i+1 was cut
+    rotors: int = 4  # how many there are
+    rotor_rpm: tuple[float, ...] = (0.0,) * 4  # as the speed controllers told last, one of each
+    rotors_lost: int = 0  # bit i: rotor i+1 does not do what it is asked for
 
     # the rest of the vehicle
     sensors_present: int = 0  # the bits above

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import cross, dot
+from autopilot.services.esc_streams import esc_info, esc_status
 from autopilot.services.heartbeat import (
     HEARTBEAT_US,
     heartbeat_message,
@@ -61,12 +62,17 @@ from autopilot.services.snapshot import GEOFENCE, PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
 from autopilot.wire.convert import (
+    BatteryReading,
+    battery_ca,
+    battery_mv,
+    battery_percent,
+    battery_status_message,
     boot_ms,
+    filter_state_message,
     global_position_int_message,
     gps_global_origin_message,
     gps_raw_int_message,
     home_position_message,
-    saturated,
     uint16,
     winch_status_message,
 )
@@ -105,15 +111,16 @@ def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     health = s.sensors_healthy | (0 if s.breach else GEOFENCE)
     present = s.sensors_present | PREARM
     enabled = present if s.guarded else present & ~GEOFENCE
+    battery = _battery(s)
     return (
         mavlink.MAVLink_sys_status_message(
             onboard_control_sensors_present=present,
             onboard_control_sensors_enabled=enabled,
             onboard_control_sensors_health=health,
             load=0,
-            voltage_battery=_battery_mv(s),
-            current_battery=_battery_ca(s),
-            battery_remaining=_battery_percent(s),
+            voltage_battery=battery_mv(battery),
+            current_battery=battery_ca(battery),
+            battery_remaining=battery_percent(battery),
             drop_rate_comm=0,
             errors_comm=0,
             errors_count1=0,
@@ -124,40 +131,12 @@ def _sys_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     )
 
 
-def _battery_mv(s: Snapshot) -> int:
-    if math.isnan(s.battery_voltage):
-        return _UINT16
-    return saturated(s.battery_voltage * 1e3, 0, _UINT16 - 1)
-
-
-def _battery_percent(s: Snapshot) -> int:
-    return -1 if math.isnan(s.battery_remaining) else saturated(s.battery_remaining * 100.0, 0, 100)
-
-
-def _battery_ca(s: Snapshot) -> int:
-    """cA"""
-    return -1 if math.isnan(s.battery_current) else saturated(s.battery_current * 100.0, 0, _INT16)
-
-
-def _battery_used(s: Snapshot) -> int:
-    """mAh"""
-    return -1 if math.isnan(s.battery_used_mah) else saturated(s.battery_used_mah, 0, 2**31 - 1)
+def _battery(s: Snapshot) -> BatteryReading:
+    return BatteryReading(s.battery_voltage, s.battery_current, s.battery_used_mah, s.battery_remaining)
 
 
 def _battery_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
-    return (
-        mavlink.MAVLink_battery_status_message(
-            id=0,
-            battery_function=mavlink.MAV_BATTERY_FUNCTION_ALL,
-            type=mavlink.MAV_BATTERY_TYPE_LIPO,
-            temperature=_INT16,
-            voltages=(_battery_mv(s), *(_UINT16,) * 9),
-            current_battery=_battery_ca(s),
-            current_consumed=_battery_used(s),
-            energy_consumed=-1,
-            battery_remaining=_battery_percent(s),
-        ),
-    )
+    return (battery_status_message(_battery(s)),)
 
 
 def _extended_sys_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
@@ -319,6 +298,10 @@ def _load_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     return ((_LOAD_STATE, load_state_of(s)),)
 
 
+def _filter_state(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    return () if s.built_in is None else (filter_state_message(s.now_us, *s.built_in),)
+
+
 def _load_setpoint(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
     return ((_LOAD_SETPOINT, load_setpoint_of(s)),)
 
@@ -387,6 +370,8 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: Stream(_AUTOPILOT, OFF, highres_imu),
     mavlink.MAVLINK_MSG_ID_ODOMETRY: Stream(_AUTOPILOT, OFF, odometry),
     mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: Stream(_AUTOPILOT, OFF, actuator_output_status),
+    mavlink.MAVLINK_MSG_ID_ESC_STATUS: Stream(_AUTOPILOT, OFF, esc_status),
+    mavlink.MAVLINK_MSG_ID_ESC_INFO: Stream(_AUTOPILOT, OFF, esc_info),
     mavlink.MAVLINK_MSG_ID_RC_CHANNELS: Stream(_AUTOPILOT, OFF, rc_channels),
     mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: Stream(_AUTOPILOT, OFF, flight_information),
     mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(_AUTOPILOT, _rate(25), _attitude),
@@ -413,12 +398,15 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: Stream(_DIALECT, _rate(20), _load_setpoint),
     mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: Stream(_DIALECT, _rate(20), _cascade_errors),
     mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _rate(20), _rotor_state),
+    mavlink.MAVLINK_MSG_ID_FILTER_STATE: Stream(_DIALECT, _rate(50), _filter_state),
 }
 
 # What a link to a program has besides, as PX4's profile `onboard`
 PROGRAM_INTERVALS_US: dict[int, int] = {
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _rate(50),
     mavlink.MAVLINK_MSG_ID_ODOMETRY: _rate(30),
+    mavlink.MAVLINK_MSG_ID_ESC_STATUS: _rate(5),
+    mavlink.MAVLINK_MSG_ID_ESC_INFO: _rate(1),
 }
 
 _GROUPED: dict[int, tuple[int, ...]] = {

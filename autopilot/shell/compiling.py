@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from autopilot.geometry.machine_code import ROOT, is_ready, mark_ready
+from autopilot.vehicle.parameters import LAWS
 
 ONCE = "compiling the flight software, once; it takes a minute or two (gcs warmup shows how far it is)"
 
@@ -38,19 +39,27 @@ class Part:
 
 _ONBOARD = ROOT / "autopilot" / "onboard" / "onboard.py"
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
-SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 10.0)
+SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 16.0)
+
+
+OWN = "own"  # stands for any law that somebody has brought: they are compiled for once
+
+
+def compiled_for(laws: Iterable[str]) -> tuple[str, ...]:
+    """What is compiled to fly with these laws, each once."""
+    return tuple(dict.fromkeys(law if law in LAWS else OWN for law in laws))
 
 
 def autopilot_parts(*laws: str) -> tuple[Part, ...]:
     """What the autopilot needs to fly with these laws, the longest first; what they share is there once."""
-    module, any_law = "autopilot.shell.warmup", laws[0]
+    module, any_law = "autopilot.shell.warmup", compiled_for(laws)[0]
     return (
         *(
-            Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 26.0)
-            for law in dict.fromkeys(laws)
+            Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 33.0)
+            for law in compiled_for(laws)
         ),
-        Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 8.0),
-        Part("the paths", module, ("paths", any_law), _AUTOPILOT, "paths", 3.0),
+        Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 18.0),
+        Part("the paths", module, ("paths", any_law), _AUTOPILOT, "paths", 5.0),
     )
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from autopilot.onboard.onboard import GROUND_WINDOW_US, Onboard
+from autopilot.services.endpoint import PATIENCE
 from autopilot.services.records import Event, Link, TimesyncAnswered
 from autopilot.shell.options import Address, StopRequest, datagram_socket, reason, receive, set_timeout, shown
 from autopilot.shell.storing import Storing
@@ -23,7 +24,10 @@ _LONGEST_SILENCE_US = 1_000_000  # that a ground station which shares our clock 
 _MOST_SAID = 32_768  # bytes in a datagram to a ground station that shares our clock, which is on this machine
 _TOGETHER = 4  # windows that are sent at once to a ground station that says nothing meanwhile
 _LARGEST_HEARD = 2048  # bytes of a datagram from the ground; what is behind them is not heard
+_LARGEST_AT_ONCE = 280  # bytes of one that are handed over together, as large as a frame may be
 _BUDGET_S = 0.5e-3  # for all that the ground says between two ticks; a flood must not stop the clock
+_SENDING_S = 1e-3  # for all that is sent between two ticks, where much has waited for the disk
+_MOST_WAITING = 16_384  # datagrams
 _GONE_S = 30.0  # a ground station in lockstep that is silent so long is gone
 _LINK: Link = "ground"
 
@@ -55,6 +59,14 @@ def _is_loopback(host: str) -> bool:
     return host == "localhost" or host.startswith("127.")
 
 
+def _pieces(datagram: bytes, link: Link) -> list[tuple[bytes, Link]]:
+    """A datagram of many messages in pieces: a hundred at once cost more time than there is between ticks."""
+    if len(datagram) <= _LARGEST_AT_ONCE:
+        return [(datagram, link)]
+    frames = [received.frame for received in decode(datagram, PATIENCE)[0]] or [b""]
+    return [(frame, link) for frame in frames]
+
+
 class GroundStations:
     """Sockets towards ground stations and programs, one for each address that we were pointed at.
 
@@ -71,11 +83,14 @@ class GroundStations:
         """What is said waits for what is to be stored."""
         self._tcp = tcp
         self._storing = storing
-        self._waiting: deque[tuple[int, Link, bytes]] = deque()  # until so much is stored
+        # until so much is stored; the oldest are lost where nobody could take as many
+        self._waiting: deque[tuple[int, Link, bytes]] = deque(maxlen=_MOST_WAITING)
         addresses = (*stations, *programs)
         self._sockets = [open_socket(address, "ground station") for address in addresses]
         self._is_program = [i >= len(stations) for i in range(len(addresses))]
         self._links: list[Link] = [(i, address) for i, address in enumerate(addresses)]
+        # what came by each of the sockets, and by TCP, and is not handed over yet
+        self._heard: list[deque[tuple[bytes, Link]]] = [deque() for _ in range(len(addresses) + 1)]
 
     def join(self, onboard: Onboard) -> None:
         """Serve the configured links from now on."""
@@ -85,17 +100,30 @@ class GroundStations:
             self._tcp.join(onboard)
 
     def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None], stop: StopRequest) -> None:
-        """Hand over what came and send what is due."""
-        if self._tcp is not None:
-            self._tcp.exchange(onboard, handle)
+        """Hand over what came, as far as there is time for it, and send what is due."""
         until = time.perf_counter() + _BUDGET_S
-        for i, sock in enumerate(self._sockets):
-            while (arrived := receive(sock, socket.MSG_DONTWAIT, _LARGEST_HEARD)) is not None:
-                datagram, sender = arrived
-                handle(onboard.receive_ground(datagram, (i, sender), self._is_program[i]))
+        for i in range(len(self._heard)):
+            program = i < len(self._is_program) and self._is_program[i]
+            while (heard := self._next(i, onboard)) is not None:
+                handle(onboard.receive_ground(*heard, program))
                 if time.perf_counter() > until:  # the others have their turn, and the rest waits
                     break
         self.send(onboard)
+
+    def _next(self, i: int, onboard: Onboard) -> tuple[bytes, Link] | None:
+        """What is to be handed over next of what came by a socket, or behind the last of them by TCP."""
+        waiting = self._heard[i]
+        if not waiting:
+            arrived = self._arrived(i, onboard)
+            if arrived is not None:
+                waiting.extend(_pieces(*arrived))
+        return waiting.popleft() if waiting else None
+
+    def _arrived(self, i: int, onboard: Onboard) -> tuple[bytes, Link] | None:
+        if i < len(self._sockets):
+            arrived = receive(self._sockets[i], socket.MSG_DONTWAIT, _LARGEST_HEARD)
+            return None if arrived is None else (arrived[0], (i, arrived[1]))
+        return None if self._tcp is None else self._tcp.take(onboard)
 
     def send(self, onboard: Onboard) -> None:
         """Send what is due."""
@@ -109,7 +137,8 @@ class GroundStations:
     def _send(self, datagrams: list[tuple[Link, bytes]], onboard: Onboard) -> None:
         waiting, asked = self._waiting, self._storing.asked
         waiting.extend((asked, link, datagram) for link, datagram in datagrams)
-        while waiting and waiting[0][0] <= self._storing.done:
+        until = time.perf_counter() + _SENDING_S
+        while waiting and waiting[0][0] <= self._storing.done and time.perf_counter() < until:
             _, link, datagram = waiting.popleft()
             i, address = link  # type: ignore[misc]
             if self._tcp is not None and i == "tcp":  # type: ignore[has-type]

@@ -10,6 +10,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from autopilot.onboard.onboard import Gains, Onboard, Rehearsal, Work
+from autopilot.shell.watched_calls import watched_calls
 from autopilot.supervisor.state import ON_GROUND
 
 _LONGEST_IN_VAIN_S = 1.0  # about what another process takes to load
@@ -85,7 +86,7 @@ class Aside:
 def _serve(rehearsal: Rehearsal, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
     rehearsal.done()
-    with suppress(EOFError, OSError):  # our parent is gone
+    with suppress(EOFError, OSError), watched_calls():  # our parent is gone
         pipe.send(None)  # ready
         while True:
             work: Work | Gains = pipe.recv()

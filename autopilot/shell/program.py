@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,10 @@ from platformdirs import user_state_path
 
 from autopilot.onboard.onboard import SIMULATOR_SYSTEM, Onboard
 from autopilot.onboard.snapshot import Options
+from autopilot.own.chosen import Own, parameters_for
+from autopilot.own.law import law_number, own_law
+from autopilot.own.source import OwnError
+from autopilot.own.trial import try_all
 from autopilot.services.identity import AUTOPILOT_COMPONENT, identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import (
@@ -27,7 +32,7 @@ from autopilot.services.records import (
     SigningChanged,
     WorldSaved,
 )
-from autopilot.shell.compiling import ONCE, autopilot_parts, ready
+from autopilot.shell.compiling import ONCE, OWN, autopilot_parts, ready
 from autopilot.shell.ground import AutopilotError, GroundInStep, GroundStations, listen, open_socket
 from autopilot.shell.options import (
     LARGEST_DATAGRAM,
@@ -48,8 +53,10 @@ from autopilot.shell.path_worker import Aside
 from autopilot.shell.steady_clock import SteadyClock
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.storing import Storing
-from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
-from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
+from autopilot.shell.tick_cost import TickCost
+from autopilot.shell.watched_calls import watched_calls
+from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_belief
+from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -103,6 +110,7 @@ class Program:
             mavlink_version=3,
         )
         self._aside = Aside()
+        self.cost = TickCost()
         self._greeting = FrameWriter(SIMULATOR_SYSTEM, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
         if isinstance(ground, GroundStations):  # our clock does not wait for paths
@@ -147,6 +155,7 @@ class Program:
                 if silent or now - heard > 1.0:
                     self._greet()
                 # the clock stands, but questions are answered
+                self.cost.pause()
                 if isinstance(self._ground, GroundStations):
                     self._ground.exchange(self.onboard, self._keep, stop)
                     if lost and now - beaten >= _BEAT_S:
@@ -154,6 +163,7 @@ class Program:
                         self._ground.beat(self.onboard)
                 continue
             onboard = self.onboard
+            self.cost.tick(onboard.tick_us)
             tick_before = onboard.tick
             answer = onboard.receive_sensors(datagram)
             if answer is not None:
@@ -167,9 +177,11 @@ class Program:
                 heard = time.monotonic()
             elif onboard.restarted:
                 self._say("the simulator has started again: so do I")
-                areas = self.onboard.endpoint.areas
+                before = self.onboard
+                areas = before.endpoint.areas
                 self._end_log()
-                self.onboard = self._build(self.onboard.endpoint.mission)
+                self.onboard = self._build(before.endpoint.mission)
+                self.onboard.endpoint.kept_texts.inherit(before.endpoint.kept_texts.texts, before.now_us)
                 self.take_areas(areas)
                 self._ground.join(self.onboard)
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
@@ -334,6 +346,23 @@ def _address_or_none(text: str) -> Address | None:
     help=f"What is believed to fly: {VEHICLES.choice()}.",
 )
 @click.option(
+    "--law",
+    metavar="NAME|FILE:CLASS",
+    help=f"Control law to fly with: {', '.join(LAWS)}, or your own (docs/laws.md).  [default: CTL_LAW]",
+)
+@click.option(
+    "--estimator",
+    default="",
+    metavar="FILE:CLASS",
+    help="Estimator of your own to fly with (docs/estimators.md).",
+)
+@click.option(
+    "--planner",
+    default="",
+    metavar="FILE:CLASS",
+    help="Path planner of your own to fly with (docs/planners.md).",
+)
+@click.option(
     "--set",
     "settings",
     type=setting_option,
@@ -368,6 +397,9 @@ def main(
     tcp: Address | None,
     ground_lockstep: Address | None,
     vehicle: str,
+    law: str | None,
+    estimator: str,
+    planner: str,
     settings: tuple[tuple[str, float], ...],
     home: Home | None,
     storage: Path | None,
@@ -386,13 +418,19 @@ def main(
     place = home or Home()
     in_step = ground_lockstep is not None
     try:
-        table = autopilot_parameters(load_vehicle(vehicle))
+        own = Own(own_law(law or DEFAULT_LAW), estimator, planner)
+        table = parameters_for(load_belief(vehicle), own)
         kept = Storage(storage or user_state_path("plumbline"))
         kept.lock()
         troubles = kept.load_parameters(table)
+        if law:
+            table.set("CTL_LAW", law_number(law))
         apply_settings(table, settings)
         table.freeze()
-        parts = autopilot_parts(LAWS[int(table["CTL_LAW"])])
+        if any(own):
+            with watched_calls():
+                try_all(own, table.values())
+        parts = autopilot_parts((*LAWS, OWN)[int(table["CTL_LAW"])])
         compiled = ready(parts)
         if not compiled:
             gc.enable()  # the compiler leaves much behind
@@ -402,7 +440,9 @@ def main(
         if signing_key is not None:
             _begin_signing(kept, signing_key)
         boot = LOCKSTEP_BOOT_UNIX_US if in_step else SteadyClock().unix_us()
-        options = Options(place, boot, clock_waits=in_step, log=True, setup_signing=allow_setup_signing)
+        options = Options(
+            place, boot, clock_waits=in_step, log=True, own=own, setup_signing=allow_setup_signing
+        )
 
         troubles += kept.load_world()[1]
 
@@ -427,9 +467,9 @@ def main(
             for part in parts:
                 part.done()
         be_punctual(real_time=not in_step)
-        with StopRequest() as stop:
+        with StopRequest() as stop, watched_calls(not in_step) if any(own) else nullcontext():
             program.run(stop)
-    except (AutopilotError, VehicleFileError, ParameterError, StorageError) as error:
+    except (AutopilotError, OwnError, VehicleFileError, ParameterError, StorageError) as error:
         print(f"autopilot: {error}", file=sys.stderr)
         sys.exit(1)
     except Stop:
@@ -438,7 +478,8 @@ def main(
         if program is not None:
             program.close()
     if program is not None:
-        say(f"stopped at t = {program.onboard.now_us / 1e6:.3f} s")
+        cost = "" if in_step else program.cost.summary()
+        say("; ".join(filter(None, (f"stopped at t = {program.onboard.now_us / 1e6:.3f} s", cost))))
 
 
 if __name__ == "__main__":

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable
 from contextlib import suppress
 
 from autopilot.onboard.onboard import Onboard
-from autopilot.services.records import Event, Link
+from autopilot.services.records import Link
 from autopilot.shell.options import Address
 from autopilot.wire.codec import whole_frames
 
-_LARGEST_READ = 2048  # between two ticks, of each client
+_LARGEST_READ = 2048  # of a client, until it is the turn of another
 _LARGEST_BACKLOG = 262_144  # bytes that a client has not taken: it is stuck, and is let go
+MAX_CLIENTS = 16  # the one silent longest makes room, once it is silent for so long:
+SILENCE_US = 5_000_000  # a ground station says its heartbeat every second
 
 
 class _Client:
     """One connection: what came of a frame, and what could not be sent yet."""
 
-    def __init__(self, sock: socket.socket) -> None:
+    def __init__(self, sock: socket.socket, now_us: int) -> None:
         self.socket = sock
+        self.heard_us = now_us
         self.came = b""
         self.waiting = b""
 
@@ -61,15 +63,18 @@ class TcpServer:
         self._clients: dict[Link, _Client] = {}
         self._number = 0
 
-    def exchange(self, onboard: Onboard, handle: Callable[[list[Event]], None]) -> None:
-        """Take who knocks; hand over what came."""
+    def take(self, onboard: Onboard) -> tuple[bytes, Link] | None:
+        """Let in who knocks; the frames that came from one client, from another the next time."""
         self._accept(onboard)
         for link, client in list(self._clients.items()):
             frames = client.take()
             if frames is None:
                 self._let_go(link, onboard)
             elif frames:
-                handle(onboard.receive_ground(frames, link))
+                client.heard_us = onboard.now_us
+                self._clients[link] = self._clients.pop(link)  # behind the others
+                return frames, link
+        return None
 
     def send(self, link: Link, frames: bytes, onboard: Onboard) -> None:
         """Frames for one client; nothing happens where it is gone."""
@@ -95,11 +100,17 @@ class TcpServer:
     def _accept(self, onboard: Onboard) -> None:
         with suppress(OSError):  # nobody knocks
             sock, _ = self._listener.accept()
+            if len(self._clients) >= MAX_CLIENTS:
+                longest = min(self._clients, key=lambda link: self._clients[link].heard_us)
+                if onboard.now_us - self._clients[longest].heard_us < SILENCE_US:
+                    sock.close()
+                    return
+                self._let_go(longest, onboard)
             sock.setblocking(False)
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._number += 1
             link: Link = ("tcp", self._number)
-            self._clients[link] = _Client(sock)
+            self._clients[link] = _Client(sock, onboard.now_us)
             onboard.add_link(link)
 
     def _let_go(self, link: Link, onboard: Onboard) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from autopilot.shell.compiling import name_what_is_compiled
+from autopilot.shell.compiling import OWN, name_what_is_compiled
 
 
 def main(part: str, law: str) -> None:
@@ -14,18 +14,22 @@ def main(part: str, law: str) -> None:
     from autopilot.core.warmup import PARTS
     from autopilot.onboard.onboard import Onboard, build_setup
     from autopilot.onboard.snapshot import Options
+    from autopilot.own.chosen import Own, parameters_for
+    from autopilot.own.law import law_number, own_law
+    from autopilot.own.rehearsal import REFERENCE
     from autopilot.services.identity import identity_of
     from autopilot.vehicle.file import load_vehicle
-    from autopilot.vehicle.parameters import LAWS, autopilot_parameters
     from autopilot.wire.convert import Home
 
-    table = autopilot_parameters(load_vehicle("bebop"))
-    table.set("CTL_LAW", LAWS.index(law))
+    named = REFERENCE if law == OWN else law
+    own = Own(own_law(named))
+    table = parameters_for(load_vehicle("bebop"), own)
+    table.set("CTL_LAW", law_number(named))
     table.freeze()
     if part == "messages":
-        Onboard(table, identity_of(table), Options(Home(), 0), None).rehearse_messages()
+        Onboard(table, identity_of(table), Options(Home(), 0, own=own), None).rehearse_messages()
     else:
-        PARTS[part](build_setup(table, 1))
+        PARTS[part](build_setup(table, 1, own))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,9 @@ from autopilot.supervisor.state import IN_AIR, INFO, Flight, Report, Text, View,
 from autopilot.supervisor.watches.failsafe import watch_blind, watch_failsafe
 from autopilot.supervisor.watches.fence import watch_fence
 from autopilot.supervisor.watches.idle import watch_idle
+from autopilot.supervisor.watches.own import watch_estimator, watch_law
 from autopilot.supervisor.watches.recovery import watch_recovery
+from autopilot.supervisor.watches.rotors import watch_rotors
 from autopilot.supervisor.watches.setpoints import watch_setpoints, watch_takeoff_setpoint
 from autopilot.supervisor.watches.slack import watch_slack
 from autopilot.supervisor.watches.tautening import watch_tautening
@@ -26,7 +28,10 @@ from autopilot.supervisor.watches.watched import Watch
 WATCHES: tuple[Watch, ...] = (
     watch_recovery,
     watch_failsafe,
+    watch_rotors,
     watch_blind,
+    watch_law,
+    watch_estimator,
     watch_idle,
     watch_slack,
     watch_fence,

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isnan, radians
+from math import inf, isnan, pi, radians
 
 from autopilot.geometry.linear import apply
-from autopilot.guidance.heading import Aim, Heading, Spin, Towards, heading_of, nearest, turn
+from autopilot.guidance.heading import Aim, Gaze, Heading, Spin, Towards, heading_of, nearest, turn
 from autopilot.guidance.setpoint_follower import AttitudeSetpoint, PositionSetpoint, Posture, Stream
 from autopilot.supervisor.motion import asked_motion
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import IN_AIR, Flight, Guide, Phase, View
+from missions.model import LookAt, TurnNose
 
 ASKEW = radians(30.0)  # between heading and nose of a vehicle that stands, beyond which the nose is believed
 
@@ -23,6 +24,36 @@ def pointed(flight: Flight, aim: Aim, view: View) -> Flight:
 def heading_kept(flight: Flight, view: View, settings: Settings) -> Flight:
     """The flight whose nose stays where it points, as soon as it can."""
     return replace(flight, heading=flight.heading.stopped(view.now_us, settings.heading))
+
+
+def turned(flight: Flight, asked: TurnNose, view: View) -> Flight:
+    """The flight whose nose turns to a heading, and keeps it."""
+    heading = flight.heading
+    begin = heading.aim.angle if isinstance(heading.aim, Towards) else heading.angle
+    way = asked.angle_rad if asked.relative else turn(asked.angle_rad - begin)
+    if not asked.relative and asked.sense * way < 0.0:
+        way += 2.0 * pi * asked.sense
+    rate = inf if asked.rate_rad_s is None else asked.rate_rad_s
+    return pointed(flight, Towards(begin + way, rate=rate), view)
+
+
+def looking(flight: Flight, asked: LookAt, view: View, settings: Settings) -> Flight:
+    """The flight whose nose stays turned to a place, or as it points now."""
+    if asked.east_m is None or asked.north_m is None:
+        gazes = isinstance(flight.heading.aim, Gaze)
+        return heading_kept(flight, view, settings) if gazes else flight
+    return pointed(flight, Gaze((asked.east_m, asked.north_m, 0.0)), view)
+
+
+def heading_of_step(flight: Flight, view: View, settings: Settings) -> Flight:
+    """The flight with what its present mission step asks of the nose as it begins."""
+    plan, step = flight.mission.plan, flight.mission.step
+    for aim in plan.aims[step] if step < len(plan.aims) else ():
+        if isinstance(aim, TurnNose):
+            flight = turned(flight, aim, view)
+        else:
+            flight = looking(flight, aim, view, settings)
+    return flight
 
 
 def heading_before_flight(flight: Flight, view: View) -> Flight:

@@ -63,6 +63,7 @@ def _rewound(flight: Flight) -> Flight:
         flight,
         selected=Selected.NOTHING,
         heading=flight.heading.at_rest(),
+        rotors_lost=0,  # whether they turn is seen when they turn again
         mission=replace(flight.mission, active=False, waiting=False, step=0, step_anchor=None),
         cable=replace(flight.cable, reel_to_m=None),
     )

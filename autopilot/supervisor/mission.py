@@ -7,6 +7,7 @@ from dataclasses import replace
 from autopilot.geometry.linear import norm
 from autopilot.guidance.legs import Calm, Hold, Leg, Pass, Swing
 from autopilot.supervisor.guide import lost
+from autopilot.supervisor.heading import heading_of_step
 from autopilot.supervisor.machine import begin_legs, happen, must_happen
 from autopilot.supervisor.motion import AT_REST, as_flown, calm, length_at, stop, swings
 from autopilot.supervisor.settings import Settings
@@ -94,6 +95,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
     plan, number = flight.mission.plan, flight.mission.step
     step = plan.steps[number]
     if flight.phase == Phase.LIFT and not isinstance(step, Takeoff):  # lifted unasked
+        flight = heading_of_step(flight, view, settings)
         return begin_step(flight, step_event(flight), view, settings), Report()
     after = plan.after(number)
     following = None if after is None else plan.steps[after]
@@ -111,6 +113,7 @@ def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, 
             event, text = Event.LAND, "Mission complete, landing"
         rewound = replace(flight, mission=replace(flight.mission, active=False, done=True, step=0))
         return must_happen(rewound, event, view, settings), Report(((INFO, text),), reached)
+    flight = heading_of_step(flight, view, settings)
     return _next_step(flight, leg, following, view, settings), Report((), reached)
 
 

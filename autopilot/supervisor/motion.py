@@ -12,6 +12,7 @@ from autopilot.guidance.legs import (
     QUAD_POSITION,
     Calm,
     Leg,
+    Steady,
     Swing,
     brake_leg,
     carry_leg,
@@ -25,6 +26,8 @@ from autopilot.supervisor.state import CARRYING, Flight, View, leg_time_s
 AT_REST = 1e-9  # m/s and m/s^2, of a setpoint
 FALLING = 1.0  # m/s, of a load that was caught and nobody lowers
 RESCUE_SHARE = 0.5  # of gravity: deceleration of a load that was caught
+STOPPING_S = 0.3  # of climbing or sinking: so far ahead is a height that stops it with no more than 2/s of it
+DESCENT_SHARE = 0.5  # of its height, which a sinking load is left at least
 STEEPEST = 0.5  # cosine of the cable's lean up to which it says how the load accelerates
 
 
@@ -71,9 +74,18 @@ def calm(leg: Leg, view: View, settings: Settings, ends_step: bool) -> Calm:
     length = norm(cable)
     lean = scale(1.0 / length, cable)
     rate = scale(1.0 / length, tangent(lean, sub(view.v_quad, view.v_load)))
-    anchor = view.x_load if isinstance(leg, Posture) else leg.jet(0.0)[0]
+    if isinstance(leg, Steady):
+        anchor = _stopping_place(view)
+    else:
+        anchor = view.x_load if isinstance(leg, Posture) else leg.jet(0.0)[0]
     duration = CALM_SHARE * settings.least_move_s
     return Calm(anchor, (lean[0], lean[1], 0.0), (rate[0], rate[1], 0.0), ends_step, duration)
+
+
+def _stopping_place(view: View) -> Vec3:
+    """Where a load that climbs or sinks is held so that it comes to rest without a jerk."""
+    x, climb = view.x_load, view.v_load[2]
+    return (x[0], x[1], max(x[2] + STOPPING_S * climb, min(x[2], DESCENT_SHARE * x[2])))
 
 
 def stop(flight: Flight, view: View, settings: Settings) -> tuple[tuple[Leg, ...], Vec3]:

@@ -74,6 +74,7 @@ class Stretch(NamedTuple):
     upward: Vec3  # attitude modes: where the thrust, or the cable seen from the load, is to point
     thrust: float  # N, asked for with an attitude; NaN: what holds the height
     nose: Nose  # where the nose is to point
+    rotors_lost: int = 0  # bit i: rotor i+1 is known to be lost
 
 
 def at_rest(until_us: int, now_us: int, idle: bool) -> Stretch:
@@ -143,6 +144,7 @@ def next_stretch(
         upward=upward,
         thrust=thrust,
         nose=_nose(flight, leg, preview_s),
+        rotors_lost=flight.rotors_lost,
     )
 
 

@@ -1,7 +1,8 @@
 """A flight that is found under way: the autopilot has started anew while the rotors obey what it asked for.
 
 The rotors keep the thrust that was asked for last while the gyroscope keeps the vehicle level, until
-`watches.recovery` finds that the sensors have told where vehicle and load are.
+`watches.recovery` finds that the sensors have told where vehicle and load are. Then the swing that the load
+has taken up beneath the level vehicle is calmed, and the load held.
 """
 
 from __future__ import annotations

@@ -10,10 +10,12 @@ from autopilot.guidance.legs import least_move_s
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import Limits
 from autopilot.trajectory.rotor_demand import Bounds
-from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE
-from autopilot.wire.parameter_table import ParameterTable
+from autopilot.vehicle.layout import GREATEST_FORCE_N, Layout
+from autopilot.vehicle.parameters import SHAPE_ALWAYS, SHAPE_WITH_PLUMBLINE, AutopilotParameters
+from autopilot.vehicle.rotors import authority, columns
 
 ARDUPILOT_IDENTITY = 1  # MAV_IDENTITY
+LEAST_AUTHORITY = 0.1  # over moments, of that of all rotors, with which a vehicle is flown
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,30 @@ class WinchSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class RotorSettings:
+    """The rotors, and what they carry."""
+
+    layout: Layout
+    low_n: float  # least effort
+    high_n: float  # greatest
+    thrust_n: float  # that carries vehicle and load
+
+    def can_fly_without(self, lost: int) -> bool:
+        """Whether the rotors that are left keep vehicle and load in the air and level."""
+        return self._left(lost, yaw=False)
+
+    def can_hold_heading_without(self, lost: int) -> bool:
+        """Whether they can turn it to where its nose is to point as well."""
+        return self._left(lost, yaw=True)
+
+    def _left(self, lost: int, yaw: bool) -> bool:
+        whole, left = (
+            authority(self.layout, gone, self.thrust_n, self.low_n, self.high_n, yaw) for gone in (0, lost)
+        )
+        return left >= LEAST_AUTHORITY * whole
+
+
+@dataclass(frozen=True, slots=True)
 class Settings:
     """The supervisor's parameters: of the believed vehicle, and by subject."""
 
@@ -89,9 +115,12 @@ class Settings:
     setpoints: SetpointSettings
     fence: FenceSettings
     winch: WinchSettings
+    rotors: RotorSettings
 
 
-def settings_from(table: ParameterTable, ramp_lag_s: float, reels: bool, follows_shaped: bool) -> Settings:
+def settings_from(
+    table: AutopilotParameters, ramp_lag_s: float, reels: bool, follows_shaped: bool
+) -> Settings:
     """The supervisor's settings from the parameter table, and what the law says of itself.
 
     `ramp_lag_s`: by how much time the load keeps behind on a ramp. `reels`: it flies other lengths of the
@@ -147,10 +176,18 @@ def settings_from(table: ParameterTable, ramp_lag_s: float, reels: bool, follows
             accel_m_s2=table["WNC_ACCEL"],
             usable=reels,
         ),
+        rotors=_rotors(table, (table["VEH_QUAD_MASS"] + load_mass) * gravity),
     )
 
 
-def limits_from(table: ParameterTable, follows_shaped: bool) -> Limits:
+def _rotors(table: AutopilotParameters, weight_n: float) -> RotorSettings:
+    low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
+    if table["VEH_ROTOR_LIM"] == 0.0:
+        low, high = -GREATEST_FORCE_N, GREATEST_FORCE_N
+    return RotorSettings(table.layout, low, high, weight_n)
+
+
+def limits_from(table: AutopilotParameters, follows_shaped: bool) -> Limits:
     """What paths are shaped to: the believed vehicle, and the MIS_ parameters."""
     low, high = table["VEH_ROTOR_MIN"], table["VEH_ROTOR_MAX"]
     margin = 0.01 * table["MIS_ROTOR_MARG"] * (high - low)
@@ -166,6 +203,7 @@ def limits_from(table: ParameterTable, follows_shaped: bool) -> Limits:
         table["VEH_TORQUE"],
         table["PLB_DRAG"],
         table["PLB_DRAG_2"],
+        columns(table.layout),
     )
     bounds = Bounds(
         low + margin if limited else -inf,

@@ -17,7 +17,7 @@ from autopilot.supervisor.settings import Settings
 from autopilot.trajectory.prepare import UNPREPARED, Prepared
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import NO_FENCE, Fence
-from missions.model import Step
+from missions.model import NoseAim, Step
 
 
 class Phase(IntEnum):
@@ -98,6 +98,7 @@ class MissionPlan:
     sequence: tuple[int, ...] = ()
     items: int = 0
     prepared: Prepared = UNPREPARED
+    aims: tuple[tuple[NoseAim, ...], ...] = ()  # of each step: what the nose is asked as it begins
     again_from: int | None = None  # the step that follows the last one, if the mission has no end
 
     def after(self, step: int) -> int | None:
@@ -173,6 +174,7 @@ class Flight:
     cable: CableState = CableState()
     setpoints: Setpoints = Setpoints()
     area: Area = Area()
+    rotors_lost: int = 0  # bit i: rotor i+1 does not do what it is asked for
     heading: Heading = EASTWARD
     returning: bool = False  # home, or landing there
     # reasons not to arm that lie beside the flight, by their source: the storage, the clock
@@ -194,6 +196,10 @@ class View(NamedTuple):
     height_std: float = 0.0  # m, of heights over home, where a receiver tells them
     attitude: Mat3 = IDENTITY
     lost: str = ""  # why not even a landing is possible by these estimates
+    law_fault: str = ""  # why the law that somebody has brought does not fly any more
+    rotors_lost: int = 0  # bit i: rotor i+1 does not do what it is asked for
+    estimator_fault: str = ""  # why the estimator that somebody has brought does not fly any more
+    unseen: bool = False  # no sensor has ever seen the load
 
 
 class Report(NamedTuple):

@@ -22,7 +22,15 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from autopilot.trajectory.peaks import Body
-from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand, slopes
+from autopilot.trajectory.rotor_demand import (
+    COS_TILT,
+    FIRST_ROTOR,
+    TENSION,
+    Bounds,
+    commanded,
+    demand,
+    slopes,
+)
 from autopilot.trajectory.splines import DEGREE, Array, Basis
 
 SAMPLES = 4  # to an interval
@@ -280,7 +288,7 @@ class Problem:
         """Bounds on the demand along `jets`, as rows over (coefficients, excesses)."""
         n, size, bounds = len(self.times), self.size, self.bounds
         found, slope = demand(jets, self.body), slopes(jets, self.body)
-        # (n, 6, 3, 10): by the coefficients of the band
+        # (n, outputs, 3, 10): by the coefficients of the band
         by_band = np.einsum("irod,oik->irdk", slope, self.values[:7])
 
         def matrix(output: int) -> sparse.csr_matrix:
@@ -306,7 +314,7 @@ class Problem:
                     blocks.append(sparse.hstack([sign * rows[keep], scale * excess_of[keep]], format="csr"))
                     limits.append(room[keep])
 
-        for rotor in range(4):
+        for rotor in range(FIRST_ROTOR, found.shape[1]):
             bound(lag @ matrix(rotor), lag @ found[:, rotor], bounds.rotor_low, bounds.rotor_high, 1.0)
         bound(matrix(TENSION), found[:, TENSION], bounds.tension_low, np.inf, 1.0 / _TENSION_SCALE)
         bound(matrix(COS_TILT), found[:, COS_TILT], bounds.cos_tilt, np.inf, 1.0 / _COS_SCALE)
@@ -327,7 +335,8 @@ def band_jets(values: Array, first: NDArray[np.int64], coefficients: Array) -> A
 
 
 def excess(found: Array, spacing: float, bounds: Bounds) -> Array:
-    """(n,) by how much the demand (n, 6) of equally spaced samples exceeds the bounds, N of a rotor; >= 0."""
+    """(n,) by how much the demand (n, outputs) of equally spaced samples exceeds the bounds, N of a rotor;
+    >= 0."""
     asked = commanded(found, spacing, bounds.rotor_tau)
     over = np.maximum(asked.max(axis=1) - bounds.rotor_high, bounds.rotor_low - asked.min(axis=1))
     over = np.maximum(over, _TENSION_SCALE * (bounds.tension_low - found[:, TENSION]))

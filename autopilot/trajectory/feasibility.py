@@ -29,11 +29,13 @@ from autopilot.trajectory.peaks import (
 )
 from autopilot.trajectory.prepare import REFUSE, Limits, prepare, trouble_of
 from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.shaping import Shaped, path_jets, shape
 from autopilot.trajectory.signals import evaluate, joints, signal_table
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import Passage, passage_jets
 from autopilot.vehicle.model import Vehicle
+from autopilot.vehicle.rotors import columns
 from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint, Winch
 
 __all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
@@ -48,6 +50,7 @@ _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
 # How far below the ground (m) a path may dip by rounding.
 _GROUND_M = 1e-6
+_NUMBERS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +81,7 @@ class VehicleLimits:
             vehicle.torque_ratio_m,
             vehicle.quad_drag_n_s_m,
             vehicle.quad_drag_quadratic_n_s2_m2,
+            columns(vehicle.layout),
         )
 
     @property
@@ -174,10 +178,15 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
     return found
 
 
-def paths(mission: Mission, limits: VehicleLimits) -> list[PathReport]:
-    """How each step is flown that signals describe, or that waypoints without a hold are passed in."""
+def paths(mission: Mission, limits: VehicleLimits, planner: Planner | None = None) -> list[PathReport]:
+    """How each step is flown that signals describe, or that waypoints without a hold are passed in.
+
+    `planner` is somebody's own, of paths through waypoints; PlanError, if what it gives is refused.
+    """
     shaping = limits.shaping
-    prepared = prepare(mission.steps, range(len(mission.steps)), shaping)
+    prepared = prepare(mission.steps, range(len(mission.steps)), shaping, planner=planner)
+    if planner is not None and prepared.refusal:
+        raise PlanError(prepared.refusal)
     found = []
     for item, made in enumerate(prepared.made):
         if isinstance(made, Shaped):
@@ -235,7 +244,9 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
 
     fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
     vehicle = limits.vehicle
-    gravity, full = vehicle.gravity_m_s2, vehicle.rotors * vehicle.rotor_max_n
+    gravity, full = vehicle.gravity_m_s2, vehicle.greatest_thrust_n
+    rotors = len(vehicle.layout)
+    count = _NUMBERS.get(rotors, str(rotors))
     usable = full * (1.0 - limits.thrust_reserve)
     # a step that begins under the ground has been told of at the one that led there
     if along.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
@@ -253,7 +264,7 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
     if thrust.value > usable:
         reserve = f", {usable:.2f} N with the reserve of {100.0 * limits.thrust_reserve:.0f} %"
         says = (
-            f"the flight needs {thrust.value:.2f} N of thrust; four rotors give {full:.2f} N"
+            f"the flight needs {thrust.value:.2f} N of thrust; {count} rotors give {full:.2f} N"
             f"{reserve if usable < full else ''} ({_excess(thrust.value, usable)})"
         )
         yield violation("thrust", thrust, usable, says)

@@ -27,6 +27,17 @@ SPEED, ACCEL, FALL, TENSION, THRUST, ROTOR_LOW, ROTOR_HIGH, TILT, HEIGHT = range
 _COLUMNS = 9
 
 
+# By how much each rotor's force grows with thrust, with roll and pitch moment by the arm, and with yaw moment
+# by the torque ratio; of a rotor that differs from others its effort, the force by its strength
+Efforts = tuple[tuple[float, float, float, float], ...]
+PLUS_EFFORTS: Efforts = (
+    (0.25, 0.0, 0.5, -0.25),
+    (0.25, -0.5, 0.0, 0.25),
+    (0.25, 0.0, -0.5, -0.25),
+    (0.25, 0.5, 0.0, 0.25),
+)
+
+
 class Body(NamedTuple):
     """The vehicle's numbers that the survey needs: kg, m, kg m^2, m/s^2; `torque_ratio` in m, see (2-13).
 
@@ -42,6 +53,26 @@ class Body(NamedTuple):
     torque_ratio: float
     drag_linear: float = 0.0
     drag_quadratic: float = 0.0
+    efforts: Efforts = PLUS_EFFORTS
+
+
+class Solid(NamedTuple):
+    """A `Body` without its rotors, as kernels take it: their machine code is the same for any number."""
+
+    quad_mass: float
+    load_mass: float
+    cable_length: float
+    inertia: Vec3
+    gravity: float
+    arm: float
+    torque_ratio: float
+    drag_linear: float
+    drag_quadratic: float
+
+
+def for_kernels(body: Body) -> tuple[Solid, Samples]:
+    """The body as kernels take it, and the efforts of its rotors (rotors, 4)."""
+    return Solid(*body[:-1]), np.array(body.efforts)
 
 
 class Extreme(NamedTuple):
@@ -67,18 +98,25 @@ class Peaks:
 
 
 @kernel
-def _rotor_range(thrust: float, moment: Vec3, arm: float, torque_ratio: float) -> tuple[float, float]:
-    """Least and greatest rotor force: (2-13) solved for F1 ... F4."""
-    roll = 0.5 * moment[0] / arm
-    pitch = 0.5 * moment[1] / arm
-    yaw = 0.25 * moment[2] / torque_ratio
-    # F1, F3 = mean +- pitch - yaw; F2, F4 = mean -+ roll + yaw
-    mean = 0.25 * thrust
-    return mean - max(abs(pitch) + yaw, abs(roll) - yaw), mean + max(abs(pitch) - yaw, abs(roll) + yaw)
+def effort(efforts: Samples, i: int, thrust: float, moment: Vec3, body: Solid) -> float:
+    """What is asked of rotor i: (2-13) solved for it."""
+    roll, pitch, yaw = moment[0] / body.arm, moment[1] / body.arm, moment[2] / body.torque_ratio
+    asked: float = thrust * efforts[i, 0] + roll * efforts[i, 1] + pitch * efforts[i, 2] + yaw * efforts[i, 3]
+    return asked
 
 
 @kernel
-def _fill(row: Samples, jet: Jet, body: Body) -> None:
+def _rotor_range(thrust: float, moment: Vec3, efforts: Samples, body: Solid) -> tuple[float, float]:
+    """The least and the greatest that is asked of a rotor."""
+    least = greatest = effort(efforts, 0, thrust, moment, body)
+    for i in range(1, efforts.shape[0]):
+        asked = effort(efforts, i, thrust, moment, body)
+        least, greatest = min(least, asked), max(greatest, asked)
+    return least, greatest
+
+
+@kernel
+def _fill(row: Samples, jet: Jet, body: Solid, efforts: Samples) -> None:
     """One sample: the columns named above, for a heading of 0; TILT as the cosine of the angle."""
     flat = flat_outputs(
         jet,
@@ -91,7 +129,7 @@ def _fill(row: Samples, jet: Jet, body: Body) -> None:
         body.drag_linear,
         body.drag_quadratic,
     )
-    low, high = _rotor_range(flat.thrust, flat.moment, body.arm, body.torque_ratio)
+    low, high = _rotor_range(flat.thrust, flat.moment, efforts, body)
     row[0] = norm(jet[1])
     row[1] = norm(jet[2])
     row[2] = -jet[2][2]
@@ -104,19 +142,21 @@ def _fill(row: Samples, jet: Jet, body: Body) -> None:
 
 
 @kernel
-def _fill_signals(table: SignalTable, times: Samples, body: Body, rows: Samples) -> None:
+def _fill_signals(table: SignalTable, times: Samples, body: Solid, efforts: Samples, rows: Samples) -> None:
     for i in range(times.shape[0]):
-        _fill(rows[i], evaluate(table, times[i]), body)
+        _fill(rows[i], evaluate(table, times[i]), body, efforts)
 
 
 @kernel
-def _fill_transfer(p0: Vec3, p1: Vec3, duration: float, times: Samples, body: Body, rows: Samples) -> None:
+def _fill_transfer(
+    p0: Vec3, p1: Vec3, duration: float, times: Samples, body: Solid, efforts: Samples, rows: Samples
+) -> None:
     for i in range(times.shape[0]):
-        _fill(rows[i], transfer(p0, p1, duration, times[i]), body)
+        _fill(rows[i], transfer(p0, p1, duration, times[i]), body, efforts)
 
 
 @kernel
-def _fill_jets(jets: Samples, body: Body, rows: Samples) -> None:
+def _fill_jets(jets: Samples, body: Solid, efforts: Samples, rows: Samples) -> None:
     for i in range(jets.shape[1]):
         _fill(
             rows[i],
@@ -130,6 +170,7 @@ def _fill_jets(jets: Samples, body: Body, rows: Samples) -> None:
                 (jets[6, i, 0], jets[6, i, 1], jets[6, i, 2]),
             ),
             body,
+            efforts,
         )
 
 
@@ -168,7 +209,7 @@ def survey_signals(step: Signals, anchor: Vec3, body: Body) -> Peaks:
     """Extremes along load signals that begin at `anchor`; the jumps at joints are not part of it."""
     times = signal_times(step)
     rows = np.empty((times.size, _COLUMNS))
-    _fill_signals(signal_table(step.terms), times, body, rows)
+    _fill_signals(signal_table(step.terms), times, *for_kernels(body), rows)
     rows[:, HEIGHT] += anchor[2]
     return _peaks(times, rows)
 
@@ -177,14 +218,14 @@ def survey_transfer(p0: Vec3, p1: Vec3, duration: float, body: Body) -> Peaks:
     """Extremes along a rest-to-rest transfer."""
     times = np.linspace(0.0, duration, _STILL_SAMPLES)
     rows = np.empty((times.size, _COLUMNS))
-    _fill_transfer(p0, p1, duration, times, body, rows)
+    _fill_transfer(p0, p1, duration, times, *for_kernels(body), rows)
     return _peaks(times, rows)
 
 
 def survey_path(times: Samples, jets: Samples, height: float, body: Body) -> Peaks:
     """Extremes along a path given by samples (7, n, 3), `height` m above home."""
     rows = np.empty((times.size, _COLUMNS))
-    _fill_jets(jets, body, rows)
+    _fill_jets(jets, *for_kernels(body), rows)
     rows[:, HEIGHT] += height
     return _peaks(times, rows)
 
@@ -194,7 +235,8 @@ def survey_attitude(run: AttitudeRun, height: float, body: Body) -> Peaks:
 
     A run of the vehicle: thrust along u carries the whole weight. A run of the load: the cable along -u
     carries the load and the vehicle moves with its upper end, F = (m_Q + m_L) g u / u_z + m_Q L u''. In both
-    the vehicle turns with F, and all of its angular acceleration is charged to the two rotors of an arm.
+    the vehicle turns with F, and all of its angular acceleration is charged to the rotor that does most for
+    it.
     """
     # the ends are left out: there u'' jumps, as it does at the joints of signals
     times = np.linspace(0.0, run.duration_s, _STILL_SAMPLES)[1:-1]
@@ -210,15 +252,17 @@ def survey_attitude(run: AttitudeRun, height: float, body: Body) -> Peaks:
     along = along / max(float(np.linalg.norm(along)), 1e-12)
     angle = np.arctan2(force[:, :2] @ along, force[:, 2])
     turn = np.abs(np.gradient(np.gradient(angle, spacing), spacing))
-    differential = 0.5 * max(body.inertia[0], body.inertia[1]) * turn / body.arm
+    efforts = np.array(body.efforts)
+    each = np.abs(efforts[:, 1:3]).max()
+    differential = each * max(body.inertia[0], body.inertia[1]) * turn / body.arm
     sideways = body.gravity * np.linalg.norm(u[:, :2], axis=1) / u[:, 2]
     rows = np.zeros((times.size, _COLUMNS))
     rows[:, SPEED] = np.cumsum(sideways) * spacing
     rows[:, ACCEL] = sideways
     rows[:, TENSION] = body.load_mass * body.gravity / u[:, 2]
     rows[:, THRUST] = thrust
-    rows[:, ROTOR_LOW] = 0.25 * thrust - differential
-    rows[:, ROTOR_HIGH] = 0.25 * thrust + differential
+    rows[:, ROTOR_LOW] = efforts[:, 0].min() * thrust - differential
+    rows[:, ROTOR_HIGH] = efforts[:, 0].max() * thrust + differential
     rows[:, TILT] = np.minimum(u[:, 2], force[:, 2] / thrust)
     rows[:, HEIGHT] = height
     return _peaks(times, rows)

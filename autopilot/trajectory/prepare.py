@@ -15,6 +15,9 @@ from typing import NamedTuple
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.trajectory.peaks import Body, Peaks, survey_transfer
 from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.route import PlanError, Planner, Route, passages
+from autopilot.trajectory.route import slower as slower_path
+from autopilot.trajectory.route import trouble_of as route_trouble
 from autopilot.trajectory.shaping import Shaped, shape, unshaped
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import MOST_POINTS, NEAREST_M, Passage, passage
@@ -55,15 +58,26 @@ UNPREPARED = Prepared()
 PENDING = Prepared(pending=True)
 
 
-def prepare(steps: Sequence[Step], sequence: Sequence[int], limits: Limits, home: Vec3 = ZERO) -> Prepared:
+def prepare(
+    steps: Sequence[Step],
+    sequence: Sequence[int],
+    limits: Limits,
+    home: Vec3 = ZERO,
+    planner: Planner | None = None,
+) -> Prepared:
     """The steps made ready; `sequence` has the mission item of each, by which the notes name it, and `home`
-    is where a return leads."""
+    is where a return leads. `planner` is somebody's own, of paths through waypoints: what it gives is a
+    path along the route, or it raises PlanError."""
     made: list[Shaped | Passage | None] = []
     notes: list[str] = []
     refusal = ""
     start = MissionState(cable_m=limits.body.cable_length, speed_m_s=limits.speed_m_s)
     entries = tuple(timeline(steps, start, home, limits.accel_m_s2))
-    chains = _passages(entries, limits)
+    if planner is None:
+        chains = _passages(entries, limits)
+    else:
+        chains, own_notes, refusal = _planned(entries, sequence, limits, planner)
+        notes += own_notes
     for index, (step, item) in enumerate(zip(steps, sequence, strict=True)):
         if not isinstance(step, Signals):
             made.append(chains.get(index))
@@ -112,43 +126,77 @@ def _transfer_fits(along: Peaks, bounds: Bounds) -> bool:
 
 
 def _passages(entries: Sequence[TimelineEntry], limits: Limits) -> dict[int, Passage]:
-    """The stretch of a passage for each step that is a waypoint of one, by its index.
-
-    A passage is of waypoints in a row, all but the last without a hold. It begins where the setpoint is known
-    to be at rest.
-    """
+    """The stretch of a passage for each step that is a waypoint of one, by its index."""
     found: dict[int, Passage] = {}
-    speed = limits.speed_m_s
+    for first, points, speed in _chains(entries, limits.speed_m_s):
+        if len(points) == 2:  # a transfer
+            continue
+        path, times = passage(
+            points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
+        )
+        table = path.table()
+        if float(path.jets()[1][0, :, 2].min()) + points[0][2] > 0.0:
+            for i in range(len(points) - 1):
+                found[first + i] = Passage(table, float(times[i]), float(times[i + 1]), points[0])
+    return found
+
+
+def _planned(
+    entries: Sequence[TimelineEntry], sequence: Sequence[int], limits: Limits, planner: Planner
+) -> tuple[dict[int, Passage], list[str], str]:
+    """The same by somebody's own planner, with what is to be noted, and why it is refused."""
+    found: dict[int, Passage] = {}
+    notes: list[str] = []
+    for first, points, speed in _chains(entries, limits.speed_m_s):
+        route = Route(
+            tuple(points), speed, limits.accel_m_s2, limits.time_optimal, limits.body, limits.bounds
+        )
+        item = sequence[first]
+        try:
+            path = planner(route)
+        except PlanError as error:
+            return {}, [*notes, f"Item {item}: {error}"], f"item {item}: {error}"
+        trouble = route_trouble(path, route)
+        if trouble and limits.when_infeasible == SLOW_DOWN:
+            slowed = [(factor, slower_path(path, factor)) for factor in _SLOWER]
+            fitting = [(factor, one) for factor, one in slowed if not route_trouble(one, route)]
+            if fitting:
+                factor, path = fitting[0]
+                notes.append(f"Item {item} flown {factor:.2f} times as long: {trouble}")
+                trouble = ""
+        if trouble:
+            notes.append(f"Item {item}: {trouble}")
+            if limits.when_infeasible != AS_ASKED:
+                return {}, notes, f"item {item}: {trouble}"
+        found |= {first + i: one for i, one in enumerate(passages(path, route))}
+    return found, notes, ""
+
+
+def _chains(entries: Sequence[TimelineEntry], speed: float) -> Iterator[tuple[int, list[Vec3], float]]:
+    """Stretches of waypoints in a row, all but the last without a hold: the index of the first, the points
+    from where the setpoint is known to be at rest, and the speed."""
     points: list[Vec3] = []
     first = 0
-
-    def close() -> None:
-        if len(points) > 2:
-            path, times = passage(
-                points, speed, limits.accel_m_s2, limits.body, limits.bounds, limits.time_optimal
-            )
-            table = path.table()
-            if float(path.jets()[1][0, :, 2].min()) + points[0][2] > 0.0:
-                for i in range(len(points) - 1):
-                    found[first + i] = Passage(table, float(times[i]), float(times[i + 1]), points[0])
-        points.clear()
-
     for index, entry in enumerate(entries):
         here, there = entry.before.position, entry.end
         if not isinstance(entry.step, Waypoint) or here is None:
-            close()
+            if points:
+                yield first, points, speed
+            points = []
             continue
         speed = entry.before.speed_m_s
         if points and (dist(points[-1], there) < NEAREST_M or len(points) > MOST_POINTS):
-            close()
+            yield first, points, speed
+            points = []
         if not points and dist(here, there) >= NEAREST_M:
             points, first = [here], index
         if points:
             points.append(there)
-        if entry.step.hold_s > 0.0:
-            close()
-    close()
-    return found
+        if points and entry.step.hold_s > 0.0:
+            yield first, points, speed
+            points = []
+    if points:
+        yield first, points, speed
 
 
 def trouble_of(found: Shaped, limits: Limits) -> str:

@@ -1,7 +1,7 @@
 """What a path asks of rotors, cable and attitude, with its derivatives: the constraints of an optimisation.
 
-For each sample of a path six numbers: the forces F1 ... F4 of the rotors (N), the tension (N) and the cosine
-of the vehicle's tilt, with a heading of 0.
+For each sample of a path two numbers and one more a rotor: the tension (N), the cosine of the vehicle's tilt,
+and what is asked of each rotor (N), with a heading of 0.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
 from autopilot.trajectory.flatness import flat_outputs
-from autopilot.trajectory.peaks import Body
+from autopilot.trajectory.peaks import Body, Solid, effort, for_kernels
 from autopilot.trajectory.signals import Jet
 
 Array = NDArray[np.float64]
 
-OUTPUTS = 6
-TENSION, COS_TILT = 4, 5
+TENSION, COS_TILT, FIRST_ROTOR = 0, 1, 2  # outputs
 # of the central differences: m/s ... m/s^6, each about as much of a rotor force
 _NUDGE = (0.0, 1e-3, 1e-3, 4e-3, 1.5e-2, 6e-2, 2e-1)
 
@@ -39,7 +38,7 @@ class Bounds(NamedTuple):
 
 
 @kernel
-def _asked(jet: Jet, body: Body) -> tuple[float, float, float, float, float, float]:
+def _asked(jet: Jet, body: Solid, efforts: Array, out: Array) -> None:
     flat = flat_outputs(
         jet,
         0.0,
@@ -51,19 +50,10 @@ def _asked(jet: Jet, body: Body) -> tuple[float, float, float, float, float, flo
         body.drag_linear,
         body.drag_quadratic,
     )
-    # (2-13) solved for F1 ... F4
-    mean = 0.25 * flat.thrust
-    roll = 0.5 * flat.moment[0] / body.arm
-    pitch = 0.5 * flat.moment[1] / body.arm
-    yaw = 0.25 * flat.moment[2] / body.torque_ratio
-    return (
-        mean + pitch - yaw,
-        mean - roll + yaw,
-        mean - pitch - yaw,
-        mean + roll + yaw,
-        flat.tension,
-        flat.R[2][2],
-    )
+    out[TENSION] = flat.tension
+    out[COS_TILT] = flat.R[2][2]
+    for i in range(efforts.shape[0]):
+        out[FIRST_ROTOR + i] = effort(efforts, i, flat.thrust, flat.moment, body)
 
 
 @kernel
@@ -80,51 +70,51 @@ def _jet_of(jets: Array, i: int) -> Jet:
 
 
 @kernel
-def fill_demand(jets: Array, body: Body, out: Array) -> None:
-    """`out` (n, 6) from `jets` (7 or more, n, 3)."""
+def fill_demand(jets: Array, body: Solid, efforts: Array, out: Array) -> None:
+    """`out` (n, 2 + rotors) from `jets` (7 or more, n, 3)."""
     for i in range(jets.shape[1]):
-        row = _asked(_jet_of(jets, i), body)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4], out[i, 5] = row
+        _asked(_jet_of(jets, i), body, efforts, out[i])
 
 
 @kernel
-def fill_slopes(jets: Array, body: Body, nudge: Array, out: Array) -> None:
-    """`out` (n, 6, 7, 3): the derivative of each output by each entry of the jet; `jets` stays as it was."""
+def fill_slopes(jets: Array, body: Solid, efforts: Array, nudge: Array, scratch: Array, out: Array) -> None:
+    """`out` (n, 2 + rotors, 7, 3): the derivative of each output by each entry of the jet; `jets` stays as it
+    was. `scratch` is (2, 2 + rotors)."""
+    high, low = scratch[0], scratch[1]
     for i in range(jets.shape[1]):
         for order in range(1, 7):
             for axis in range(3):
                 kept = jets[order, i, axis]
                 jets[order, i, axis] = kept + nudge[order]
-                high = _asked(_jet_of(jets, i), body)
+                _asked(_jet_of(jets, i), body, efforts, high)
                 jets[order, i, axis] = kept - nudge[order]
-                low = _asked(_jet_of(jets, i), body)
+                _asked(_jet_of(jets, i), body, efforts, low)
                 jets[order, i, axis] = kept
                 r = 0.5 / nudge[order]
-                out[i, 0, order, axis] = r * (high[0] - low[0])
-                out[i, 1, order, axis] = r * (high[1] - low[1])
-                out[i, 2, order, axis] = r * (high[2] - low[2])
-                out[i, 3, order, axis] = r * (high[3] - low[3])
-                out[i, 4, order, axis] = r * (high[4] - low[4])
-                out[i, 5, order, axis] = r * (high[5] - low[5])
+                for output in range(out.shape[1]):
+                    out[i, output, order, axis] = r * (high[output] - low[output])
 
 
 def demand(jets: Array, body: Body) -> Array:
-    """(n, 6) what the path with `jets` (7, n, 3) asks for."""
-    out = np.empty((jets.shape[1], OUTPUTS))
-    fill_demand(jets, body, out)
+    """(n, 2 + rotors) what the path with `jets` (7, n, 3) asks for."""
+    solid, efforts = for_kernels(body)
+    out = np.empty((jets.shape[1], FIRST_ROTOR + len(efforts)))
+    fill_demand(jets, solid, efforts, out)
     return out
 
 
 def slopes(jets: Array, body: Body) -> Array:
-    """(n, 6, 7, 3) by how much the demand changes with the jets (7, n, 3)."""
-    out = np.zeros((jets.shape[1], OUTPUTS, 7, 3))
-    fill_slopes(jets.copy(), body, np.array(_NUDGE), out)
+    """(n, 2 + rotors, 7, 3) by how much the demand changes with the jets (7, n, 3)."""
+    solid, efforts = for_kernels(body)
+    outputs = FIRST_ROTOR + len(efforts)
+    out = np.zeros((jets.shape[1], outputs, 7, 3))
+    fill_slopes(jets.copy(), solid, efforts, np.array(_NUDGE), np.empty((2, outputs)), out)
     return out
 
 
 def commanded(found: Array, spacing: float, tau: float) -> Array:
-    """(n, 4) what rotors with the lag `tau` are asked for, F + tau F', of samples `spacing` s apart."""
-    forces = found[:, :4]
+    """(n, rotors) what rotors with the lag `tau` are asked for, F + tau F', of samples `spacing` s apart."""
+    forces = found[:, FIRST_ROTOR:]
     if tau == 0.0 or len(forces) < 3:
         return forces
     return np.asarray(forces + tau * np.gradient(forces, spacing, axis=0))

@@ -134,11 +134,13 @@ def asked_jets(table: SignalTable, duration: float, times: Array) -> Array:
 def full_crackle(body: Body, rotor_range: float) -> float:
     """The sixth derivative of a sideways path (m/s^6) that takes half the range of a rotor (N), at hover.
 
-    Linearised about hover: pitch = m_Q L x'''' / (m g^2), and its second derivative times J is 2 l F.
+    Linearised about hover: pitch = m_Q L x'''' / (m g^2), and its second derivative times J is 2 l F for a
+    plus quadrotor.
     """
     reach = body.quad_mass * body.cable_length
     weight = (body.quad_mass + body.load_mass) * body.gravity
-    return body.arm * rotor_range * weight * body.gravity / (max(body.inertia[:2]) * reach)
+    each = max(max(abs(roll), abs(pitch)) for _, roll, pitch, _ in body.efforts)
+    return 0.5 / each * body.arm * rotor_range * weight * body.gravity / (max(body.inertia[:2]) * reach)
 
 
 def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:

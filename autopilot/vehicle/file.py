@@ -1,8 +1,14 @@
-"""Vehicle files: TOML in, `Vehicle` out. The shipped ones are the files in `vehicles`, named nowhere else."""
+"""Vehicle files: TOML in, `Vehicle` out. The shipped ones are the files in `vehicles`, named nowhere else.
+
+A file whose `believed` names another vehicle is the truth beside a belief: what it leaves out is as there,
+the simulator flies it, and the autopilot, and whoever checks missions, goes by the other.
+"""
 
 from __future__ import annotations
 
 from os import PathLike
+from pathlib import Path
+from typing import Any
 
 from autopilot.vehicle.model import Vehicle
 from missions.toml_files import FileError, TomlFiles
@@ -16,7 +22,45 @@ VEHICLES = TomlFiles("vehicle", "autopilot.vehicle", "vehicles", VehicleFileErro
 
 
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
-    """The vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is wrong."""
+    """What flies: the vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is
+    wrong."""
+    keys, where = vehicle_keys(name_or_path)
+    return VEHICLES.record(Vehicle, keys, where)
+
+
+def load_belief(name_or_path: str | PathLike[str]) -> Vehicle:
+    """What the autopilot takes it for; a VehicleFileError says what is wrong with either."""
+    return load_vehicle(belief_of(name_or_path))
+
+
+def belief_of(name_or_path: str | PathLike[str]) -> str | PathLike[str]:
+    """Name or path of the vehicle that is believed: that which is named, or its own."""
+    table, _ = _table(name_or_path)
+    return _believed(table, name_or_path) or name_or_path
+
+
+def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:
+    """The keys of a file, with those that it leaves out of the vehicle that is believed, if there is one; and
+    where messages about it begin."""
+    table, where = _table(name_or_path)
+    believed = _believed(table, name_or_path)
+    if not believed:
+        return table, where
+    keys, other = _table(believed)
+    if keys.get("believed"):
+        raise VehicleFileError([f"{where}: believed: {other} has a `believed` of its own; name that one"])
+    return {**keys, **table}, where
+
+
+def _table(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:
     found = VEHICLES.read(name_or_path)
-    table = VEHICLES.table(found.text, found.where)
-    return VEHICLES.record(Vehicle, {"name": found.name, **table}, found.where)
+    return {"name": found.name, **VEHICLES.table(found.text, found.where)}, found.where
+
+
+def _believed(table: dict[str, Any], name_or_path: str | PathLike[str]) -> str:
+    """Name or path of what is believed beside this table; empty: itself."""
+    named = table.get("believed")
+    if not isinstance(named, str) or not named or named in VEHICLES.names():
+        return named if isinstance(named, str) else ""
+    beside = Path(name_or_path).parent / named
+    return str(beside) if beside.suffix or beside.is_file() else named

@@ -12,11 +12,19 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from autopilot.vehicle.layout import FEWEST, GREATEST_FORCE_N, MOST, Layout, Rotor, regular
+from autopilot.vehicle.rotors import allocate, flies, sizes
+
 LEAST_ROTOR_MAX_N = 0.01
-GREATEST_FORCE_N = 1000.0
 
 # sizes that a file may leave out, as shares of arm_m; `bebop` and `heavy` state theirs, which are near
-SHARE_OF_ARM = {"gear_height_m": 0.5, "gear_spread_m": 0.65, "rotor_reach_m": 1.6, "rotor_height_m": 0.25}
+SHARE_OF_ARM = {
+    "gear_height_m": 0.5,
+    "gear_spread_m": 0.65,
+    "rotor_reach_m": 1.6,
+    "rotor_height_m": 0.25,
+    "rotor_radius_m": 0.6,
+}
 
 
 def _quantity(unit: str, low: float, high: float, text: str, default: Any = ...) -> Any:
@@ -36,27 +44,70 @@ def _force(unlimited: float, low: float, high: float) -> Any:
 
 
 Moment = Annotated[float, Field(ge=1e-6, le=100.0)]
+Offset = Annotated[float, Field(ge=-1.0, le=1.0)]
 RotorMin = Annotated[float, _force(-inf, -GREATEST_FORCE_N, GREATEST_FORCE_N)]
 RotorMax = Annotated[float, _force(inf, LEAST_ROTOR_MAX_N, GREATEST_FORCE_N)]
+
+
+class OneRotor(BaseModel):
+    """A rotor at a place of its own. Its axis stands upright."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    x_m: float = _quantity("m", -5.0, 5.0, "place forward of the centre of mass")
+    y_m: float = _quantity("m", -5.0, 5.0, "place to the left of the centre of mass")
+    spin: Literal["+", "-"] = Field(description="as in `spin` of the vehicle")
+    thrust_factor: float = _quantity(
+        "", 0.1, 10.0, "share of `rotor_min_n` and `rotor_max_n` that are its limits", 1.0
+    )
+    torque_factor: float = _quantity("", 0.1, 10.0, "share of `torque_ratio_m` that is its own", 1.0)
+    lag_factor: float = _quantity("", 0.0, 10.0, "share of `rotor_tau_s` that is its lag", 1.0)
 
 
 class Vehicle(BaseModel):
     """A vehicle, its cable and its load, SI. A Vehicle is within its ranges and consistent, or there is none.
 
-    Assumptions: principal axes are the body axes; the cable is massless, inextensible and attached at the
-    centre of mass; drag is -(linear + quadratic |v|) v on the velocity v relative to the air.
+    Assumptions: principal axes are the body axes; the cable is massless and inextensible; the rotors' axes
+    are upright; drag is -(linear + quadratic |v|) v on the velocity v relative to the air.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
     name: str = Field("", description="what it is called; the programs go by the name of the file")
-    rotors: Literal[4] = Field(4, description="number of rotors; only quadrotors can be flown")
+    believed: str = Field(
+        "",
+        description="the vehicle that autopilot and `gcs check` take it for, a shipped name or a file beside "
+        "this one; keys that are left out are as there",
+    )
+    rotors: int = Field(4, ge=FEWEST, le=MOST, description="number of rotors")
+    frame: Literal["plus", "x"] = Field(
+        "plus",
+        description="rotors at equal angles, counterclockwise from the rear; `plus`: an arm points backward, "
+        "`x`: the gap between two",
+    )
+    spin: str = Field(
+        "",
+        description="a sign a rotor: `+` turns the vehicle counterclockwise, seen from above, and itself "
+        "clockwise, `-` the other way; if left out `-+-+` and so on",
+    )
+    rotor: tuple[OneRotor, ...] = Field(
+        (),
+        strict=False,
+        max_length=MOST,
+        description="rotors at any places, each a table [[rotor]], in place of `rotors`, `frame` and `spin`",
+    )
 
     # the gains that grow with the mass (QP_) end at 62 kg
     quad_mass_kg: float = _quantity("kg", 0.01, 60.0, "mass of the vehicle without its load")
     load_mass_kg: float = _quantity("kg", 0.001, 100.0, "mass of the load")
     cable_length_m: float = _quantity("m", 0.05, 100.0, "length of the cable")
     arm_m: float = _quantity("m", 0.01, 5.0, "from the centre of mass to a rotor's axis")
+    attachment_m: tuple[Offset, Offset, Offset] = Field(
+        (0.0, 0.0, 0.0),
+        strict=False,
+        description="where the cable is attached: forward, left and upward of the centre of mass",
+        json_schema_extra={"unit": "m"},
+    )
     inertia_kg_m2: tuple[Moment, Moment, Moment] = Field(
         strict=False,  # TOML has lists, not tuples
         description="moments of inertia about the forward, left and upward axis",
@@ -93,6 +144,39 @@ class Vehicle(BaseModel):
         "m", 1e-3, 10.0, "height of the load's centre as it rests on the ground", 0.02
     )
 
+    # a cable of links and a load that turns, of the simulated world alone: docs/realism-cable.md
+    cable_links: int = Field(
+        0,
+        ge=0,
+        le=64,
+        description="links of the simulated cable; 0: it is massless, its length fixed, and the load a point",
+    )
+    cable_mass_kg_m: float = _quantity("kg/m", 1e-4, 2.0, "mass of a metre of cable, if it has links", 0.0024)
+    cable_drag_coefficient: float = _quantity("", 0.0, 5.0, "drag coefficient of a cable of links", 1.2)
+    cable_stiffness_n: float = _quantity("N", 100.0, 1e7, "tension per strain of a cable of links", 2e4)
+    cable_damping_n_s: float = _quantity(
+        "N s", 0.0, 1e4, "tension per rate of strain of a cable of links", 10.0
+    )
+    load_hook_m: float = _quantity(
+        "m", 0.0, 5.0, "height above the centre of the load at which a cable of links is attached", 0.0
+    )
+    load_gyration_m: float = _quantity(
+        "m", 0.0, 5.0, "radius of gyration across its upright axis of a load that turns; 0: a point", 0.0
+    )
+    load_gyration_upright_m: float = _quantity(
+        "m", 1e-4, 5.0, "radius of gyration of the load about its upright axis", 0.02
+    )
+    load_pressure_m: float = _quantity(
+        "m", -5.0, 5.0, "how far forward of its centre the drag of a load that turns acts", 0.0
+    )
+    load_spin_drag_n_m_s2: float = _quantity(
+        "N m s^2/rad^2",
+        0.0,
+        100.0,
+        "moment against a rotation of the load, for each square of its rate",
+        0.0,
+    )
+
     # the sub-step near the ground resolves contacts up to this frequency: docs/plant.md
     contact_frequency_rad_s: float = _quantity(
         "rad/s", 20.0, 200.0, "natural frequency of a body on the ground", 150.0
@@ -102,6 +186,68 @@ class Vehicle(BaseModel):
     slip_rate_1_s: float = _quantity(
         "1/s", 1e-3, 600.0, "rate at which friction below the Coulomb limit brakes a slide", 500.0
     )
+
+    # docs/realism-plant.md: what each stands for, and whose numbers they are
+    rotor_radius_m: float = _quantity("m", 1e-3, 5.0, "radius of a rotor")
+    air_density_kg_m3: float = _quantity("kg/m^3", 0.01, 10.0, "density of the air", 1.225)
+    rotor_drag_1_s: float = _quantity(
+        "1/s", 0.0, 10.0, "induced drag of the rotors, for each kilogram that they carry; 0: none", 0.0
+    )
+    rotor_flap_rad_s_m: float = _quantity(
+        "rad s/m", 0.0, 0.5, "tilt of a rotor's disc for each m/s of air across it; 0: none", 0.0
+    )
+    blade_stiffness_n_m_rad: float = _quantity(
+        "N m/rad", 0.0, 1000.0, "moment at the hub of a rotor whose disc is tilted", 0.0
+    )
+    ground_effect: float = _quantity(
+        "", 0.0, 5.0, "thrust gained near the ground, of what the formula says; 0: none", 0.0
+    )
+    downwash: float = _quantity(
+        "", 0.0, 5.0, "speed of the rotors' wake at load and cable, of what the formula says; 0: none", 0.0
+    )
+    cable_diameter_m: float = _quantity("m", 0.0, 0.1, "diameter of the cable, for its drag; 0: no drag", 0.0)
+    thrust_curve: float = _quantity(
+        "", 0.0, 1.0, "quadratic share of a rotor's force in its throttle, the rest is linear", 0.0
+    )
+    thrust_curve_known: float = _quantity(
+        "", 0.0, 1.0, "the share by which the forces asked for are made throttle", 0.0
+    )
+    esc_steps: float = _quantity(
+        "", 0.0, 65535.0, "values of the throttle that a speed controller knows; 0: any", 0.0
+    )
+    esc_speed_controlled: bool = Field(
+        False,
+        description="whether a speed controller holds the speed as the voltage falls, as far as it allows",
+    )
+    battery: bool = Field(False, description="whether voltage and charge of the battery limit the rotors")
+    battery_cells: int = Field(3, ge=1, le=24, description="lithium cells in series")
+    battery_capacity_mah: float = _quantity("mAh", 10.0, 1e6, "charge of the full battery", 1200.0)
+    battery_resistance_ohm: float = _quantity("ohm", 0.0, 10.0, "internal resistance of the battery", 0.06)
+    battery_hover_w: float = _quantity("W", 0.1, 1e5, "electrical power in hover without the load", 65.0)
+    battery_charge: float = _quantity("", 0.0, 1.0, "share of the charge at the beginning", 1.0)
+
+    @property
+    def layout(self) -> Layout:
+        """Where its rotors are and how they differ."""
+        if not self.rotor:
+            signs = self.spin or ("-+" * MOST)[: self.rotors]
+            spins = tuple(1.0 if sign == "+" else -1.0 for sign in signs)
+            return regular(self.rotors, self.frame == "plus", spins)
+        return tuple(
+            Rotor(
+                r.x_m / self.arm_m,
+                r.y_m / self.arm_m,
+                r.torque_factor * (1.0 if r.spin == "+" else -1.0),
+                r.thrust_factor,
+                r.lag_factor,
+            )
+            for r in self.rotor
+        )
+
+    @property
+    def greatest_thrust_n(self) -> float:
+        """Thrust at which the first rotor is at its limit."""
+        return sizes(allocate(self.layout))[0] * self.rotor_max_n
 
     @property
     def limited(self) -> bool:
@@ -130,9 +276,41 @@ class Vehicle(BaseModel):
                 f"rotor_min_n = {self.rotor_min_n:g}; must be finite because rotor_max_n = "
                 f"{self.rotor_max_n:g} is; write rotor_max_n = inf for rotors without limits"
             )
+        if not self.load_hook_m <= 0.5 * self.cable_length_m:
+            raise ValueError(
+                f"load_hook_m = {self.load_hook_m:g}; must be <= half of cable_length_m = "
+                f"{self.cable_length_m:g}, which reaches to the load's centre"
+            )
         x, y, z = self.inertia_kg_m2
         if not (x <= y + z and y <= x + z and z <= x + y):
             raise ValueError(
                 f"inertia_kg_m2 = {[x, y, z]}; each must be <= the sum of the other two, or no body has it"
             )
+        curved = self.thrust_curve != self.thrust_curve_known
+        if not self.limited and (self.battery or self.esc_steps or curved):
+            raise ValueError(
+                f"rotor_max_n = {self.rotor_max_n:g}; must be finite, because battery, esc_steps or "
+                "thrust_curve say what becomes of a share of it"
+            )
+        self._rotors_fit()
         return self
+
+    @classmethod
+    def _default(cls, key: str) -> Any:
+        return cls.model_fields[key].default
+
+    def _rotors_fit(self) -> None:
+        said = [key for key in ("rotors", "frame", "spin") if getattr(self, key) != self._default(key)]
+        if self.rotor and said:
+            raise ValueError(f"{said[0]}: leave it out, because [[rotor]] says where each rotor is")
+        if self.rotor and len(self.rotor) < FEWEST:
+            raise ValueError(
+                f"rotor: there must be {FEWEST} ... {MOST} tables [[rotor]], not {len(self.rotor)}"
+            )
+        if set(self.spin) - {"+", "-"} or (self.spin and len(self.spin) != self.rotors):
+            raise ValueError(f'spin = "{self.spin}"; must be {self.rotors} signs + or -, one a rotor')
+        if not flies(self.layout):
+            raise ValueError(
+                "rotor places and spins: the vehicle cannot be held level with these; put rotors on all "
+                "sides, and let them turn both ways"
+            )

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from autopilot.vehicle.law_files import law_files
-from autopilot.wire.parameter_table import ParameterTable
+from autopilot.vehicle.layout import PLUS, Layout
+from autopilot.wire.parameter_table import Parameter, ParameterTable
 
 if TYPE_CHECKING:
     from autopilot.vehicle.model import Vehicle
@@ -35,6 +37,7 @@ def _document() -> dict[str, Any]:
 
 _DOCUMENT = _document()
 LAWS = tuple(law.name for law in law_files())  # CTL_LAW is an index into this
+OWN_LAW = len(LAWS)  # CTL_LAW of a law that somebody has brought
 DEFAULT_LAW = LAWS[_DOCUMENT["CTL_LAW"]["default"]]
 SHAPE_NEVER, SHAPE_WITH_PLUMBLINE, SHAPE_ALWAYS = 0, 1, 2  # MIS_SHAPE
 
@@ -71,9 +74,33 @@ def definitions() -> ParameterFile:
     return parameter_file(_DOCUMENT, FILE)
 
 
-def autopilot_parameters(belief: Vehicle) -> ParameterTable:
-    """The table, with the vehicle's numbers taken from `belief`."""
-    return ParameterTable(definitions().definitions(vehicle_values(belief)))
+class AutopilotParameters(ParameterTable):
+    """The autopilot's table, and what of the believed vehicle no parameter says: where its rotors are."""
+
+    def __init__(self, definitions: Iterable[Parameter], layout: Layout = PLUS) -> None:
+        super().__init__(definitions)
+        self.layout = layout
+
+
+def autopilot_parameters(
+    belief: Vehicle, law: str = "", brought: Iterable[Parameter] = ()
+) -> AutopilotParameters:
+    """The table, with the vehicle's numbers taken from `belief`.
+
+    `law`: the name of a law that somebody has brought, to which CTL_LAW is set. What somebody has brought has
+    `brought` these parameters along; ParameterError if one of them is there already.
+    """
+    found = definitions().definitions(vehicle_values(belief))
+    if law:
+        found = [_with_law(one, law) if one.name == "CTL_LAW" else one for one in found]
+    return AutopilotParameters([*found, *brought], belief.layout)
+
+
+def _with_law(parameter: Parameter, law: str) -> Parameter:
+    """CTL_LAW, which can be one more, and is."""
+    number = float(OWN_LAW)
+    text = f"{parameter.text}, {OWN_LAW} {law}"
+    return replace(parameter, default=number, high=number, text=text)
 
 
 def vehicle_values(belief: Vehicle) -> dict[str, float]:
@@ -83,6 +110,7 @@ def vehicle_values(belief: Vehicle) -> dict[str, float]:
     # where there is no limit the parameters keep the forces of Table 4-1 and the mixer ignores them
     rotor_min, rotor_max = (belief.rotor_min_n, belief.rotor_max_n) if belief.limited else (0.0, ROTOR_FMAX)
     j_xx, j_yy, j_zz = belief.inertia_kg_m2
+    attached_x, attached_y, attached_z = belief.attachment_m
     return {
         "quad_mass_kg": belief.quad_mass_kg,
         "load_mass_kg": belief.load_mass_kg,
@@ -97,6 +125,13 @@ def vehicle_values(belief: Vehicle) -> dict[str, float]:
         "torque_ratio_m": belief.torque_ratio_m,
         "rotor_tau_ms": 1e3 * belief.rotor_tau_s,
         "gravity_m_s2": belief.gravity_m_s2,
+        "attachment_x_m": attached_x,
+        "attachment_y_m": attached_y,
+        "attachment_z_m": attached_z,
+        "battery_cells": float(belief.battery_cells),
+        "battery_capacity_mah": belief.battery_capacity_mah,
+        "battery_resistance_ohm": belief.battery_resistance_ohm,
+        "battery_hover_w": belief.battery_hover_w,
         "quad_drag_n_s_m": belief.quad_drag_n_s_m,
         "quad_drag_quadratic_n_s2_m2": belief.quad_drag_quadratic_n_s2_m2,
     }

@@ -14,7 +14,9 @@ from autopilot.wire.compiled import (
     wire_record,
 )
 from autopilot.wire.convert.simulator import (
+    NO_FORCES,
     Forces,
+    forces_in,
     hil_actuator_controls_values,
     read_hil_actuator_controls,
 )
@@ -28,6 +30,7 @@ HIL_ACTUATOR_CONTROLS = wire_record(mavlink.MAVLink_hil_actuator_controls_messag
 HIL_STATE_QUATERNION = wire_record(mavlink.MAVLink_hil_state_quaternion_message, __name__)
 LOAD_STATE = wire_record(mavlink.MAVLink_load_state_message, __name__)
 ROTOR_STATE = wire_record(mavlink.MAVLink_rotor_state_message, __name__)
+ESC_STATUS = wire_record(mavlink.MAVLink_esc_status_message, __name__)
 
 _SYSTEM = 5  # where a frame names its sender
 
@@ -48,10 +51,11 @@ def put_answer(
     gripper_open: bool,
     reel_rate: float,
 ) -> int:
-    """Write HIL_ACTUATOR_CONTROLS at the begin of a buffer; how many bytes it has. `forces`: 4, in N;
-    `payload` has PAYLOAD_ROOM bytes to work with."""
-    each = (forces[0], forces[1], forces[2], forces[3])
-    values = hil_actuator_controls_values(time_us, each, armed, lockstep, gripper_open, reel_rate)
+    """Write HIL_ACTUATOR_CONTROLS at the begin of a buffer; how many bytes it has. `forces`: 14, in
+    N; `payload` has PAYLOAD_ROOM bytes to work with."""
+    values = hil_actuator_controls_values(
+        time_us, forces_in(forces, 0), armed, lockstep, gripper_open, reel_rate
+    )
     return put_frame(HIL_ACTUATOR_CONTROLS, values, payload, buffer, 0, Origin(sequence, system, component))
 
 
@@ -61,6 +65,6 @@ def answer_in(datagram: bytes, system: int, payload: Bytes) -> Answer:
     `forces` (N), `armed`, `gripper_open` and `reel_rate` of it."""
     plain = len(datagram) > 0 and frame_end(datagram, 0) == len(datagram)
     if not (plain and datagram[_SYSTEM] == system and holds(HIL_ACTUATOR_CONTROLS, datagram, 0, payload)):
-        return (False, 0, (0.0, 0.0, 0.0, 0.0), False, False, 0.0)
+        return (False, 0, NO_FORCES, False, False, 0.0)
     said = read_hil_actuator_controls(taken(HIL_ACTUATOR_CONTROLS, payload))
     return (True, said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)

@@ -43,9 +43,10 @@ class Metric(_Strict):
 
 
 class Group(_Strict):
-    """Figures that are shown together; `note` is for the documentation."""
+    """Figures that are shown together, and over which part of a flight; `note` is for the documentation."""
 
     title: str
+    window: str = ""
     note: str = ""
 
 

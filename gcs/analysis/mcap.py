@@ -13,8 +13,8 @@ World ENU, body FLU, SI. Times count from boot.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
+from math import atan2, cos, hypot, inf, sin
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -43,7 +43,7 @@ _LEVELS = (5, 5, 5, 4, 3, 2, 2, 1)  # of foxglove.Log by MAV_SEVERITY: fatal, er
 class Layout(NamedTuple):
     """Sizes of what is drawn, m."""
 
-    arm_m: float
+    rotors_m: tuple[tuple[float, float], ...]  # forward and to the left of the centre of mass
     load_radius_m: float
 
 
@@ -151,16 +151,18 @@ def _bodies(layout: Layout, begin_s: float, samples: Samples, known: Any) -> Any
 
     update = SceneUpdate()
     vehicle = _entity(update, begin_s, _VEHICLE, _VEHICLE)
-    for size in ((2.0 * layout.arm_m, 0.02, 0.02), (0.02, 2.0 * layout.arm_m, 0.02)):
-        cube = vehicle.cubes.add()
-        cube.pose.orientation.w = 1.0
-        _put(cube.size, size)
-        _paint(cube.color, _DARK)
-    for x, y in ((-1.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0)):  # rotors 1 ... 4
+    radius = 0.6 * max(hypot(x, y) for x, y in layout.rotors_m)
+    for x, y in layout.rotors_m:
+        arm = vehicle.cubes.add()
+        turn = 0.5 * atan2(y, x)
+        arm.pose.orientation.w, arm.pose.orientation.z = cos(turn), sin(turn)
+        _put(arm.pose.position, (0.5 * x, 0.5 * y, 0.0))
+        _put(arm.size, (hypot(x, y), 0.02, 0.02))
+        _paint(arm.color, _DARK)
         disc = vehicle.cylinders.add(bottom_scale=1.0, top_scale=1.0)
-        _put(disc.pose.position, (x * layout.arm_m, y * layout.arm_m, 0.03))
+        _put(disc.pose.position, (x, y, 0.03))
         disc.pose.orientation.w = 1.0
-        _put(disc.size, (1.2 * layout.arm_m, 1.2 * layout.arm_m, 0.005))
+        _put(disc.size, (2.0 * radius, 2.0 * radius, 0.005))
         _paint(disc.color, (*_BLUE[:3], 0.4))
     ball = _entity(update, begin_s, _LOAD, _LOAD).spheres.add()
     ball.pose.orientation.w = 1.0
@@ -183,7 +185,7 @@ def _cable(samples: Samples, known: Any) -> Iterator[tuple[float, str, Any]]:
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-    last_s, drawn = -math.inf, False
+    last_s, drawn = -inf, False
     for i in np.flatnonzero(known).tolist():
         time_s = float(samples.time_s[i])
         update = SceneUpdate()

@@ -15,7 +15,7 @@ import numpy as np
 from gcs.analysis.align import as_of, linear
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
 from gcs.analysis.samples import PHASE_NAMES, Samples
-from gcs.analysis.tracks import Telemetry
+from gcs.analysis.tracks import Telemetry, numbers
 
 if TYPE_CHECKING:
     import pyarrow
@@ -44,7 +44,7 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
     def held(values: Any) -> Floats:
         return as_of(commanded.time_s, values.astype(np.float64), t)
 
-    cable, rotors = ("phi", "theta"), ("1", "2", "3", "4")
+    cable = ("phi", "theta")
     return {
         "time_s": t,
         "mission_item": samples.item,
@@ -68,8 +68,10 @@ def flight_columns(telemetry: Telemetry, samples: Samples) -> dict[str, Any]:
         **_spread("vehicle_quaternion", "", samples.quat_wxyz, ("w", "x", "y", "z")),
         **_spread("vehicle_angle", "rad", roll_pitch_yaw(samples.quat_wxyz), ("roll", "pitch", "yaw")),
         **_spread("vehicle_rate", "rad_s", linear(attitude.time_s, attitude.omega_body, t)),
-        **_spread("rotor_force", "n", as_of(true_rotors.time_s, true_rotors.force_n, t), rotors),
-        **_spread("rotor_command", "n", held(commanded.force_n), rotors),
+        **_spread(
+            "rotor_force", "n", as_of(true_rotors.time_s, true_rotors.force_n, t), numbers(true_rotors)
+        ),
+        **_spread("rotor_command", "n", held(commanded.force_n), numbers(commanded)),
         "rotor_saturated": held(commanded.saturated),
         "thrust_asked_n": error(cascade.thrust_n),
         **_spread("moment_asked", "n_m", error(cascade.moment_n_m)),
@@ -88,7 +90,7 @@ _WHOLE = {
     "mission_item": "int32",
     "control_mode": "int8",
     "cable_slack_events": "int32",
-    "rotor_saturated": "int8",
+    "rotor_saturated": "int16",
 }
 
 

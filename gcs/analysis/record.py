@@ -23,11 +23,14 @@ class FlightMeta:
     mission: str | None = None
     title: str | None = None  # of the mission, for people
     law: str | None = None
+    estimator: str | None = None  # that somebody has brought
+    planner: str | None = None
     sensors: str | None = None
     vehicle: str | None = None
     seed: int | None = None
     outcome: str | None = None  # of the client that flew it; else it is judged from telemetry
     reason: str | None = None  # for that outcome, one line
+    truth_missing: str | None = None  # why the log has no truth of the simulator, one line
     wall_s: float | None = None  # wall time over which the log was recorded
     command: str | None = None  # command line that flies it again
     version: str | None = None  # of Plumbline
@@ -50,6 +53,8 @@ def flight_record(telemetry: Telemetry, meta: FlightMeta, samples: Samples | Non
     found: Record = {
         "mission": meta.mission,
         "law": meta.law,
+        "estimator": meta.estimator,
+        "planner": meta.planner,
         "sensors": meta.sensors,
         "vehicle": meta.vehicle,
         "seed": meta.seed,

@@ -56,6 +56,7 @@ class Samples:
     asked_m: Floats  # (n, 3) what the mission asks for; desired is as near to it as can be flown
     asked_m_s: Floats  # (n, 3)
     estimated_m: Floats  # (n, 3) load position as the autopilot believes it
+    filtered_m: Floats  # (n, 3) the same by the built-in filter, where an estimator of somebody's own flies
     vehicle_m: Floats  # (n, 3) true vehicle position: load - distance * q_cable
     quat_wxyz: Floats  # (n, 4) true attitude, FLU -> ENU
 
@@ -102,6 +103,7 @@ def _whole_as_of(telemetry: Telemetry, values: Ints, at_s: Floats) -> Ints:
 def samples_of(telemetry: Telemetry) -> Samples:
     """Setpoint and estimate are sent on the ticks of the truth: then nothing is interpolated."""
     truth, setpoint, estimate = telemetry.load_truth, telemetry.setpoint, telemetry.load_estimated
+    filtered = telemetry.load_filtered
     time_s = truth.time_s
     # a setpoint without a law that follows it is the estimate, sent so that the message is whole
     tracked = np.isin(_whole_as_of(telemetry, setpoint.control_mode, time_s), _TRACKED_MODES)[:, None]
@@ -128,6 +130,7 @@ def samples_of(telemetry: Telemetry) -> Samples:
         ),
         asked_m_s=np.where(tracked, linear(setpoint.time_s, setpoint.asked_m_s, time_s), np.nan),
         estimated_m=hermite(estimate.time_s, estimate.position_m, estimate.velocity_m_s, time_s),
+        filtered_m=hermite(filtered.time_s, filtered.position_m, filtered.velocity_m_s, time_s),
         vehicle_m=truth.position_m - truth.distance_m[:, None] * truth.q_cable,
         quat_wxyz=linear(telemetry.attitude_truth.time_s, telemetry.attitude_truth.quat_wxyz, time_s),
     )

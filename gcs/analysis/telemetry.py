@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,13 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.wire.codec import Received
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.asked import ASKED, VEHICLE_SYSTEM, Asked
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd
 from gcs.analysis.columns import Columns
+from gcs.analysis.observed import observed_setpoint
 from gcs.analysis.tracks import (
     AttitudeTrack,
     CascadeTrack,
+    FilterTrack,
     HeartbeatTrack,
     ItemTrack,
     LoadTrack,
@@ -52,6 +56,7 @@ _READ = (
     mavlink.MAVLINK_MSG_ID_SIM_STATUS,
     mavlink.MAVLINK_MSG_ID_WIND_STATE,
     mavlink.MAVLINK_MSG_ID_CABLE_SNAP,
+    mavlink.MAVLINK_MSG_ID_FILTER_STATE,
 )
 # without a time stamp of their own, and sent by more components than the autopilot
 _HEARD = (
@@ -59,6 +64,7 @@ _HEARD = (
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
 )
 
 
@@ -85,13 +91,45 @@ def telemetry_of(records: Iterable[Record]) -> Telemetry:
         # the record that waited least tells best when the vehicle's clock was zero
         sent_us = columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT].raw("time_usec").tolist()
         boot_us = min(heard - sent for heard, sent in zip(waited_us, sent_us, strict=True))
+    elif stamps[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME]:
+        clock = columns[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME].raw("time_boot_ms").tolist()
+        told = zip(stamps[mavlink.MAVLINK_MSG_ID_SYSTEM_TIME], clock, strict=True)
+        boot_us = min(heard - 1000 * sent for heard, sent in told)
     else:
         boot_us = min((stamps[message_id][0] for message_id in _HEARD if stamps[message_id]), default=0)
     heard = {
         message_id: (np.array(stamps[message_id], dtype=np.float64) - boot_us) * _MICRO
         for message_id in _HEARD
     }
-    return _assemble(columns, heard, _texts(texts, boot_us), asked)
+    telemetry = _assemble(columns, heard, _texts(texts, boot_us), asked)
+    if len(telemetry.setpoint.time_s) or not (len(telemetry.load_truth.time_s) and telemetry.mission):
+        return telemetry
+    # an autopilot that knows of no load; what it calls home is where it stood
+    home = _origin(columns[mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION], telemetry.load_truth) or asked.home
+    setpoint = observed_setpoint(
+        telemetry.load_truth, telemetry.rotors_truth, telemetry.mission_current, telemetry.mission, home
+    )
+    return replace(telemetry, setpoint=setpoint, home=home)
+
+
+def _origin(hil: Columns, load: LoadTrack) -> Home | None:
+    """The origin of the world: where the true vehicle is in degrees, less where it is in metres."""
+    hil_us = hil.raw("time_usec")
+    load_us = np.round(load.time_s / _MICRO).astype(hil_us.dtype)
+    _, ours, theirs = np.intersect1d(load_us, hil_us, return_indices=True)
+    if not len(ours):
+        return None
+    vehicle = load.position_m[ours] - load.distance_m[ours, None] * load.q_cable[ours]
+    degE7, mm = hil["lat lon"][theirs], hil["alt"][theirs]
+    first = Home(1e-7 * float(degE7[0, 0]), 1e-7 * float(degE7[0, 1]), 1e-3 * float(mm[0]))
+    # the first vehicle place as origin, moved by what is left
+    moved = [
+        np.subtract(enu_from_geodetic(int(lat), int(lon), int(alt), first), place)
+        for (lat, lon), alt, place in zip(degE7, mm, vehicle, strict=True)
+    ]
+    east, north, up = (float(v) for v in np.mean(moved, axis=0))
+    latitude, longitude, altitude = geodetic_from_enu((east, north, up), first)
+    return Home(1e-7 * latitude, 1e-7 * longitude, 1e-3 * altitude)
 
 
 TrackT = TypeVar("TrackT")
@@ -121,6 +159,11 @@ def _load(c: Columns, source: int) -> LoadTrack:
         taut=c.whole("taut"),
     )
     return _in_order(track, c["source"] == source)
+
+
+def _filtered(c: Columns) -> FilterTrack:
+    times_s, velocity_m_s = c["time_usec"] * _MICRO, enu_from_ned(c["vx vy vz"])
+    return _in_order(FilterTrack(times_s, enu_from_ned(c["x y z"]), velocity_m_s))
 
 
 def _setpoint(c: Columns) -> SetpointTrack:
@@ -165,14 +208,17 @@ def _cascade(c: Columns) -> CascadeTrack:
 
 
 def _rotors(c: Columns, source: int) -> RotorTrack:
+    of_source = c["source"] == source
+    told = c.whole("rotors")[of_source]
+    count = int(told.max()) if len(told) and told.max() > 0 else 4
     track = RotorTrack(
         time_s=c["time_usec"] * _MICRO,
-        force_n=c["force"],
+        force_n=np.hstack([c["force"], c["more_force"]])[:, :count],
         force_min_n=c["force_min"],
         force_max_n=c["force_max"],
-        saturated=c.whole("saturated"),
+        saturated=c.whole("saturated") | c.whole("more_saturated") << 8,
     )
-    return _in_order(track, c["source"] == source)
+    return _in_order(track, of_source)
 
 
 def _attitude(time_s: Floats, quat_ned_frd: Floats, rates_frd: Floats) -> AttitudeTrack:
@@ -232,6 +278,7 @@ def _assemble(
     return Telemetry(
         load_truth=_load(load, mavlink.PLUMBLINE_SOURCE_TRUTH),
         load_estimated=_load(load, mavlink.PLUMBLINE_SOURCE_ESTIMATED),
+        load_filtered=_filtered(columns[mavlink.MAVLINK_MSG_ID_FILTER_STATE]),
         setpoint=_setpoint(columns[mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT]),
         cascade=_cascade(columns[mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS]),
         rotors_truth=_rotors(rotors, mavlink.PLUMBLINE_SOURCE_TRUTH),

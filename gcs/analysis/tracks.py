@@ -36,6 +36,15 @@ class LoadTrack:
 
 
 @dataclass(frozen=True)
+class FilterTrack:
+    """FILTER_STATE: the built-in filter beside an estimator of somebody's own; n samples."""
+
+    time_s: Floats  # (n,)
+    position_m: Floats  # (n, 3) ENU, of the load
+    velocity_m_s: Floats  # (n, 3) ENU, of the load
+
+
+@dataclass(frozen=True)
 class SetpointTrack:
     """LOAD_SETPOINT."""
 
@@ -76,10 +85,15 @@ class RotorTrack:
     """ROTOR_STATE of one source: commanded forces (autopilot) or true forces (simulator)."""
 
     time_s: Floats  # (n,)
-    force_n: Floats  # (n, 4)
+    force_n: Floats  # (n, rotors)
     force_min_n: Floats  # (n,)
     force_max_n: Floats  # (n,) infinite if unlimited
     saturated: Ints  # (n,) bit i: the demand on rotor i was cut at a limit
+
+
+def numbers(rotors: RotorTrack) -> tuple[str, ...]:
+    """What the rotors are called: 1, 2, ..."""
+    return tuple(str(i + 1) for i in range(rotors.force_n.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -156,6 +170,7 @@ class Telemetry:
 
     load_truth: LoadTrack
     load_estimated: LoadTrack
+    load_filtered: FilterTrack
     setpoint: SetpointTrack
     cascade: CascadeTrack
     rotors_truth: RotorTrack

@@ -2,7 +2,8 @@
 
 Within a sync window (what lies between two `flush`es) the truth comes first, then the vehicle, then what the
 ground sent; all records of a window carry its time. So a flight captured from byte queues in one process and
-one captured over UDP in lockstep are the same file. TIMESYNC, which only one of them has, is left out.
+one captured over UDP in lockstep are the same file. TIMESYNC, which only one of them has, is left
+out, and SIM_BOOT, which is another one in every run.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.datagrams import messages
 
 LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: lockstep has no wall clock of its own
+
+_LEFT_OUT = {mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_SIM_BOOT}
 
 
 class FrameLog(Protocol):
@@ -52,7 +55,7 @@ class Capture:
             one.frame
             for datagram in (*self._truth, *self._vehicle, *self._sent)
             for one in messages(datagram)[0]
-            if one.id != mavlink.MAVLINK_MSG_ID_TIMESYNC
+            if one.id not in _LEFT_OUT
         ]
         if frames:
             self._log.write(unix_us, *frames)

@@ -76,21 +76,29 @@ class CommandOperation:
 class RepositionOperation(CommandOperation):
     """Take the load to a place: COMMAND_INT, because a float32 knows degrees to a metre only."""
 
-    def __init__(self, target: Target, latitude_degE7: int, longitude_degE7: int, height_m: float) -> None:
+    def __init__(
+        self,
+        target: Target,
+        latitude_degE7: int,
+        longitude_degE7: int,
+        height_m: float,
+        speed_m_s: float | None = None,
+    ) -> None:
         super().__init__(target, "reposition", mavlink.MAV_CMD_DO_REPOSITION)
         self._latitude_degE7 = latitude_degE7
         self._longitude_degE7 = longitude_degE7
         self._height_m = height_m
+        self._speed_m_s = -1.0 if speed_m_s is None else speed_m_s  # -1: the vehicle's own
 
     def _message(self, confirmation: int) -> Any:
-        speed, change_mode, radius = -1.0, 1.0, 0.0
+        change_mode, radius = 1.0, 0.0
         return mavlink.MAVLink_command_int_message(
             *self._target,
             mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
             self._command,
             0,
             0,
-            *(speed, change_mode, radius, UNUSED),
+            *(self._speed_m_s, change_mode, radius, UNUSED),
             self._latitude_degE7,
             self._longitude_degE7,
             self._height_m,
@@ -107,6 +115,11 @@ def disarm(target: Target, force: bool = False) -> CommandOperation:
     """Stop the rotors; in the air only by force."""
     parameters = (0.0, FORCE if force else 0.0)
     return CommandOperation(target, "disarm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, parameters)
+
+
+def run_prearm_checks(target: Target) -> CommandOperation:
+    """Have the vehicle say in texts what keeps it from being armed."""
+    return CommandOperation(target, "pre-arm checks", mavlink.MAV_CMD_RUN_PREARM_CHECKS)
 
 
 def start_mission(target: Target) -> CommandOperation:
@@ -136,10 +149,15 @@ def land(target: Target) -> CommandOperation:
 
 
 def reposition(
-    target: Target, latitude_degE7: int, longitude_degE7: int, height_m: float
+    target: Target,
+    latitude_degE7: int,
+    longitude_degE7: int,
+    height_m: float,
+    speed_m_s: float | None = None,
 ) -> RepositionOperation:
-    """Take the load there and hold it, `height_m` above home."""
-    return RepositionOperation(target, latitude_degE7, longitude_degE7, height_m)
+    """Take the load there and hold it, `height_m` above the origin (NaN: at its height), at this speed (None:
+    the vehicle's own)."""
+    return RepositionOperation(target, latitude_degE7, longitude_degE7, height_m, speed_m_s)
 
 
 def set_mode(target: Target, name: str, main: int, sub: int, armed: bool) -> CommandOperation:

@@ -90,7 +90,9 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class _Row:
+class Row:
+    """A stage of the table."""
+
     after: Stage
     refused: Stage = Stage.OVER
     operations: Callable[[FlightClient], Sequence[Operation]] | None = None
@@ -115,6 +117,7 @@ class FlightClient:
         link_timeout_us: int = LINK_TIMEOUT_US,
     ) -> None:
         self.outcome: Outcome | None = None
+        self.fell_silent = False  # the vehicle did, which ended the flight
         self.stage = Stage.FIND
         self.view = VehicleView()
         self.connection = Connection(link_timeout_us)
@@ -135,6 +138,17 @@ class FlightClient:
         self._given_up_us: int | None = None  # the vehicle's clock at the failure
         self._pending: Outcome | None = None  # the outcome, once the aftermath is captured
 
+    # ---- what differs between autopilots
+
+    @property
+    def watched(self) -> frozenset[int]:
+        """Messages that may tell how the flight goes."""
+        return _WATCHED
+
+    def row(self, stage: Stage) -> Row:
+        """The table above."""
+        return _TABLE[stage]
+
     # ---- in and out
 
     def receive(self, datagram: bytes, now_us: int) -> None:
@@ -149,7 +163,7 @@ class FlightClient:
                 self._operations[0].receive(one.message, now_us)
             if self._parameters is not None and one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
                 self._parameters.receive(one.message, now_us)
-            if self.stage is Stage.FLY and one.id in _WATCHED and self._is_news(one):
+            if self.stage is Stage.FLY and one.id in self.watched and self._is_news(one):
                 self._watch()
 
     def poll(self, now_us: int) -> list[bytes]:
@@ -160,6 +174,7 @@ class FlightClient:
         if self._stage_began_us is None:
             self._stage_began_us = now_us
         if self.connection.lost(now_us):
+            self.fell_silent = True
             self._end(Outcome("lost", f"the vehicle fell silent while {self.stage.value}"))
         while self.outcome is None and self._advance(now_us):
             pass
@@ -184,7 +199,12 @@ class FlightClient:
     def lose(self, reason: str) -> None:
         """End the flight because a process or the link is gone."""
         if self.outcome is None:
-            self._end(self._pending or Outcome("lost", reason))
+            self._end((self._pending or Outcome("lost")).because(reason))
+
+    def explain_silence(self, why: str) -> None:
+        """Why the vehicle fell silent, if it did and that is known."""
+        if self.fell_silent and self.outcome is not None:
+            self.outcome = self.outcome.because(why)
 
     # ---- the table at work
 
@@ -192,7 +212,7 @@ class FlightClient:
         """Finish an operation or a stage if it is at its end; True if something changed."""
         if self.stage is Stage.FLY:
             return self._judge()
-        row = _TABLE[self.stage]
+        row = self.row(self.stage)
         if self._operations:
             result = self._operations[0].result
             if result is None:
@@ -221,7 +241,7 @@ class FlightClient:
             return True
         return False
 
-    def _refused(self, row: _Row, text: str, now_us: int) -> None:
+    def _refused(self, row: Row, text: str, now_us: int) -> None:
         if row.refused is row.after:  # the flight goes on without it
             self._operations.pop(0)
             return
@@ -248,7 +268,7 @@ class FlightClient:
             self._flight_began_us = self.view.time_us
             self._operations, self._parameters = [], None
             return
-        operations = _TABLE[stage].operations
+        operations = self.row(stage).operations
         self._operations = list(operations(self)) if operations else []
 
     def _end(self, outcome: Outcome) -> None:
@@ -324,7 +344,7 @@ class FlightClient:
         if self._mission_over:
             return Outcome("completed")
         if self._was_airborne:
-            where = f"item {self._item_flown} of {len(self.items)}"
+            where = f"item {self._item_flown} of {len(self.items) - 1}"
             return Outcome(
                 "interrupted", f"the vehicle was disarmed before the end of the mission, at {where}"
             )
@@ -362,13 +382,15 @@ class FlightClient:
 
 _FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
 _GROUND_PHASES = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
-_WATCHED = {
-    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
-    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
-    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
-    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
-}
+_WATCHED = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+        mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+        mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+    }
+)
 _PHASE, _SEQ = (Field(mavlink.MAVLink_load_setpoint_message, name) for name in ("phase", "seq"))
 _LANDING_PHASES = {mavlink.PLUMBLINE_PHASE_LOWER, mavlink.PLUMBLINE_PHASE_SET_DOWN}
 
@@ -407,13 +429,13 @@ def _not_found(client: FlightClient) -> Outcome:
 
 
 _TABLE = {
-    Stage.FIND: _Row(
+    Stage.FIND: Row(
         Stage.STREAMS, done=_found, barred=_already_armed, limit_us=FIND_LIMIT_US, late=_not_found
     ),
-    Stage.STREAMS: _Row(Stage.UPLOAD, refused=Stage.UPLOAD, operations=_streams),
-    Stage.UPLOAD: _Row(Stage.READY, operations=_upload),
-    Stage.READY: _Row(Stage.ARM, done=_ready, limit_us=READY_LIMIT_US),
-    Stage.ARM: _Row(Stage.START, operations=_single(command.arm)),
-    Stage.START: _Row(Stage.FLY, refused=Stage.DISARM, operations=_single(command.start_mission)),
-    Stage.DISARM: _Row(Stage.OVER, operations=_single(command.disarm)),
+    Stage.STREAMS: Row(Stage.UPLOAD, refused=Stage.UPLOAD, operations=_streams),
+    Stage.UPLOAD: Row(Stage.READY, operations=_upload),
+    Stage.READY: Row(Stage.ARM, done=_ready, limit_us=READY_LIMIT_US),
+    Stage.ARM: Row(Stage.START, operations=_single(command.arm)),
+    Stage.START: Row(Stage.FLY, refused=Stage.DISARM, operations=_single(command.start_mission)),
+    Stage.DISARM: Row(Stage.OVER, operations=_single(command.disarm)),
 }

@@ -40,8 +40,8 @@ class MissionUpload:
         self._items = tuple(items)
         self._kind = kind  # MAV_MISSION_TYPE
         self._name = _NAMES.get(kind, "upload")
-        self._asked: list[tuple[int, bool]] = []  # requests not yet answered: (seq, with integers)
-        self._last: tuple[int, bool] | None = None
+        self._asked: list[int] = []  # items asked for and not yet sent
+        self._last: int | None = None
         self._next = 0  # items 0 ... next-1 were asked for
         self._restarts = 0
         self._retry = Retry(RETRY_US, SENDS)
@@ -56,10 +56,9 @@ class MissionUpload:
         kind = message.get_msgId()
         if kind in (mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT, mavlink.MAVLINK_MSG_ID_MISSION_REQUEST):
             if message.seq < len(self._items):
-                request = (message.seq, kind == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT)
-                if request not in self._asked:
-                    self._asked.append(request)
-                self._last = request
+                if message.seq not in self._asked:
+                    self._asked.append(message.seq)
+                self._last = message.seq
                 self._next = max(self._next, message.seq + 1)
         elif kind == mavlink.MAVLINK_MSG_ID_MISSION_ACK:
             self._acknowledged(message.type)
@@ -87,7 +86,7 @@ class MissionUpload:
         if self.result is not None:
             return []
         if self._asked:
-            answers = [self._item(seq, integers) for seq, integers in self._asked]
+            answers = [self._item(seq) for seq in self._asked]
             self._asked.clear()
             self._retry.restart()
             self._retry.asked(now_us)
@@ -103,28 +102,24 @@ class MissionUpload:
         self._retry.asked(now_us)
         if self._last is None:
             return [mavlink.MAVLink_mission_count_message(*self._target, len(self._items), self._kind)]
-        return [self._item(*self._last)]
+        return [self._item(self._last)]
 
-    def _item(self, seq: int, integers: bool) -> Any:
+    def _item(self, seq: int) -> Any:
+        """With the place in whole numbers, however it was asked for: a float32 knows it to a metre."""
         item = self._items[seq]
-        shared = (*self._target, seq, item.frame, item.command, item.current, item.autocontinue)
-        parameters = (item.param1, item.param2, item.param3, item.param4)
-        if integers:
-            return mavlink.MAVLink_mission_item_int_message(
-                *shared, *parameters, item.x, item.y, item.z, self._kind
-            )
-        scale = 1e-7 if item.frame in _GLOBAL_FRAMES else 1.0
-        return mavlink.MAVLink_mission_item_message(
-            *shared, *parameters, item.x * scale, item.y * scale, item.z, self._kind
+        return mavlink.MAVLink_mission_item_int_message(
+            *self._target,
+            seq,
+            item.frame,
+            item.command,
+            item.current,
+            item.autocontinue,
+            *(item.param1, item.param2, item.param3, item.param4),
+            item.x,
+            item.y,
+            item.z,
+            self._kind,
         )
-
-
-_GLOBAL_FRAMES = {
-    mavlink.MAV_FRAME_GLOBAL,
-    mavlink.MAV_FRAME_GLOBAL_INT,
-    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-}
 
 
 class MissionDownload:

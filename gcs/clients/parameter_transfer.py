@@ -78,8 +78,9 @@ class ParameterGet:
     def __init__(self, target: Target, name: str) -> None:
         self.result: Result | None = None
         self.value = math.nan
+        self.name = name
+        self.unknown = False  # the vehicle says that it has none of this name
         self._target = target
-        self._name = name
         self._retry = Retry(RETRY_US, SENDS)
 
     @property
@@ -89,22 +90,23 @@ class ParameterGet:
     def receive(self, message: Any, now_us: int) -> None:
         if self.result is not None:
             return
-        error = _error(message, self._name)
+        error = _error(message, self.name)
         if error is not None:
+            self.unknown = message.error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
             self.result = Result(Status.REFUSED, error)
-        elif _is_value(message, self._name):
+        elif _is_value(message, self.name):
             self.value = from_the_wire(message.param_value, message.param_type)
-            self.result = Result(Status.DONE, f"{self._name} = {self.value:.9g}")
+            self.result = Result(Status.DONE, f"{self.name} = {self.value:.9g}")
 
     def poll(self, now_us: int) -> list[Any]:
         if self.result is not None or not self._retry.due(now_us):
             return []
         if self._retry.exhausted:
-            text = f"{self._name}: no answer after {self._retry.sends} tries; has the vehicle this parameter?"
+            text = f"{self.name}: no answer after {self._retry.sends} tries; has the vehicle this parameter?"
             self.result = Result(Status.UNANSWERED, text)
             return []
         self._retry.asked(now_us)
-        return [mavlink.MAVLink_param_request_read_message(*self._target, _name_bytes(self._name), -1)]
+        return [mavlink.MAVLink_param_request_read_message(*self._target, _name_bytes(self.name), -1)]
 
 
 class ParameterSet:
@@ -112,8 +114,9 @@ class ParameterSet:
 
     def __init__(self, target: Target, name: str, value: float) -> None:
         self.result: Result | None = None
+        self.name = name
+        self.unknown = False  # the vehicle says that it has none of this name
         self._target = target
-        self._name = name
         self._value = float32(value)
         self._held: float | None = None
         self._retry = Retry(RETRY_US, SENDS)
@@ -125,13 +128,14 @@ class ParameterSet:
     def receive(self, message: Any, now_us: int) -> None:
         if self.result is not None or not self._retry.sent:
             return
-        error = _error(message, self._name)
+        error = _error(message, self.name)
         if error is not None:
+            self.unknown = message.error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
             self.result = Result(Status.REFUSED, error)
-        elif _is_value(message, self._name):
+        elif _is_value(message, self.name):
             held = from_the_wire(message.param_value, message.param_type)
             if float32(held) == self._value:
-                self.result = Result(Status.DONE, f"{self._name} = {decimal_from_float32(self._value):.9g}")
+                self.result = Result(Status.DONE, f"{self.name} = {decimal_from_float32(self._value):.9g}")
             else:  # refused, or an answer to an older question: the next tries will tell
                 self._held = held
 
@@ -141,16 +145,16 @@ class ParameterSet:
         if self._retry.exhausted or (self._held is not None and self._retry.sent >= 3):
             wanted = decimal_from_float32(self._value)
             if self._held is None:
-                text = f"{self._name} = {wanted:.9g}: no answer after {self._retry.sent} tries"
+                text = f"{self.name} = {wanted:.9g}: no answer after {self._retry.sent} tries"
                 self.result = Result(Status.UNANSWERED, text)
             else:
-                text = f"{self._name} = {wanted:.9g}: the vehicle keeps {self._held:.9g}"
+                text = f"{self.name} = {wanted:.9g}: the vehicle keeps {self._held:.9g}"
                 self.result = Result(Status.REFUSED, text)
             return []
         self._retry.asked(now_us)
         return [
             mavlink.MAVLink_param_set_message(
-                *self._target, _name_bytes(self._name), self._value, mavlink.MAV_PARAM_TYPE_REAL32
+                *self._target, _name_bytes(self.name), self._value, mavlink.MAV_PARAM_TYPE_REAL32
             )
         ]
 

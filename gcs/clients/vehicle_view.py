@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from autopilot.wire.codec import Field, Received
+from autopilot.wire.convert.flight import rotor_forces
 from autopilot.wire.dialect import plumbline as mavlink
 
 BOOT_CLOCK = "SYSTEM_TIME"
 _TEXT_LENGTH = 50  # of one STATUSTEXT; a longer text comes in chunks
 
+# how a vehicle begins a text that it was asked for again: which of how many, and how old
+_RECALLED = re.compile(r"\[(\d+)/(\d+), (-?\d+\.\d) s ago\] (.*)", re.DOTALL)
 _STATUSTEXT = mavlink.MAVLINK_MSG_ID_STATUSTEXT
 _IDS = {kind.msgname: message_id for message_id, kind in mavlink.mavlink_map.items()}
 _CLOCKS = [
@@ -74,7 +78,7 @@ _MISSION_STATES = {
 
 
 class Text(NamedTuple):
-    """A STATUSTEXT as it came."""
+    """A STATUSTEXT, and when it was said by our clock."""
 
     now_us: int
     severity: int
@@ -120,6 +124,8 @@ class VehicleView:
         self.latest = Newest()  # of the vehicle
         self.truth = Newest()  # of the simulated world
         self.texts: list[Text] = []
+        self.recalled: list[Text] = []  # said earlier, and told again because somebody asked
+        self.recalled_all = False  # the last of these has come
         self._chunks: dict[int, list[str]] = {}
 
     def update(self, received: Received, now_us: int) -> None:
@@ -135,14 +141,23 @@ class VehicleView:
 
     def _text(self, message: Any, now_us: int) -> None:
         if not message.id:
-            self.texts.append(Text(now_us, message.severity, message.text))
+            self._said(now_us, message.severity, message.text)
             return
         chunks = self._chunks.setdefault(message.id, [])
         if message.chunk_seq == len(chunks):
             chunks.append(message.text)
         if len(message.text.encode()) < _TEXT_LENGTH:
-            self.texts.append(Text(now_us, message.severity, "".join(chunks)))
+            self._said(now_us, message.severity, "".join(chunks))
             del self._chunks[message.id]
+
+    def _said(self, now_us: int, severity: int, text: str) -> None:
+        again = _RECALLED.fullmatch(text)
+        if again is None:
+            self.texts.append(Text(now_us, severity, text))
+            return
+        number, total, age_s, said = again.groups()
+        self.recalled.append(Text(now_us - round(float(age_s) * 1e6), severity, said))
+        self.recalled_all = number == total
 
     def complaints_since(self, count: int, severity: int = mavlink.MAV_SEVERITY_WARNING) -> list[str]:
         """Texts at least as severe as `severity`, without those there were when `len(texts)` was `count`."""
@@ -162,9 +177,10 @@ class VehicleView:
     @property
     def ready_to_arm(self) -> bool | None:
         status = self.latest.get("SYS_STATUS")
-        if status is None:
+        bit = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        if status is None or not status.onboard_control_sensors_present & bit:
             return None
-        return bool(status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
+        return bool(status.onboard_control_sensors_health & bit)
 
     @property
     def landed(self) -> str | None:
@@ -216,4 +232,4 @@ class VehicleView:
         rotors = self.latest.get("ROTOR_STATE")
         if rotors is None or not math.isfinite(rotors.force_max) or rotors.force_max <= 0.0:
             return None
-        return float(max(rotors.force) / rotors.force_max)
+        return float(max(rotor_forces(rotors)) / rotors.force_max)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gcs.commands.options import PositiveType, connect_option
+from gcs.commands.options import PositiveType, connect_option, truth_option
 from gcs.shell.link import Address
 
 
@@ -23,12 +23,15 @@ from gcs.shell.link import Address
     help="Stop after so many seconds.",
 )
 @connect_option
-def capture_command(out: Path | None, duration_s: float | None, address: Address) -> None:
+@truth_option
+def capture_command(
+    out: Path | None, duration_s: float | None, address: Address, truth_at: Address | None
+) -> None:
     """Capture telemetry until Ctrl-C.
 
     The fast messages of the report are asked for, so that gcs report can be made of the log.
     """
     from gcs.workflows.capture import capture_to
 
-    path, records = capture_to(out, address, duration_s)
+    path, records = capture_to(out, address, duration_s, truth_at)
     click.echo(f"{records} messages captured to {path}")

@@ -1,4 +1,4 @@
-"""gcs arm, disarm, start, pause, resume, takeoff, land, mode: one command to a running vehicle each."""
+"""gcs arm, disarm, start, pause, resume, takeoff, goto, land, mode: one command to a running vehicle each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 from gcs.clients import command
 from gcs.clients.operation import Operation
 from gcs.clients.vehicle_view import FLOWN_MODES
-from gcs.commands.options import PositiveType, connect_option
+from gcs.commands.options import FiniteType, PositiveType, connect_option
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 
@@ -29,9 +29,16 @@ def _send(address: Address, make: Callable[[Session], Operation], begins: bool =
 def arm_command(force: bool, address: Address) -> None:
     """Start the rotors.
 
-    The vehicle refuses, and says why, while it is not ready.
+    A vehicle that is not ready yet is waited for, ten seconds at most; then it refuses, and says why.
     """
-    _send(address, lambda session: command.arm(session.target, force))
+    from gcs.workflows.readiness import wait_until_ready
+
+    def make(session: Session) -> Operation:
+        if not force:
+            wait_until_ready(session)
+        return command.arm(session.target, force)
+
+    _send(address, make)
 
 
 @click.command("disarm")
@@ -72,7 +79,7 @@ def resume_command(address: Address) -> None:
     _send(address, lambda session: command.resume(session.target))
 
 
-@click.command("takeoff")
+@click.command("takeoff", context_settings={"ignore_unknown_options": True})  # -1 is a number here
 @click.argument("height", type=PositiveType(), required=False)
 @click.option("--altitude", type=PositiveType(), help="The same as HEIGHT.")
 @connect_option
@@ -94,6 +101,33 @@ def takeoff_command(height: float | None, altitude: float | None, address: Addre
         return command.takeoff(session.target, vehicle_home(session).altitude_m + altitude_m)
 
     _send(address, make, begins=True)
+
+
+@click.command("goto", context_settings={"ignore_unknown_options": True})  # -1 is a number here
+@click.argument("east", type=FiniteType())
+@click.argument("north", type=FiniteType())
+@click.argument("up", type=FiniteType(), required=False)
+@click.option(
+    "--frame",
+    type=click.Choice(["home", "load"]),
+    default="home",
+    show_default=True,
+    help="From where EAST, NORTH and UP count: from home, or from where the load is now.",
+)
+@click.option("--speed", type=PositiveType(), help="m/s on the way, instead of the vehicle's own.")
+@connect_option
+def goto_command(
+    east: float, north: float, up: float | None, frame: str, speed: float | None, address: Address
+) -> None:
+    """Take the load to a place and hold it there.
+
+    EAST, NORTH and UP are the place of the load in m; without UP it keeps its height. The vehicle must be
+    flying.
+    """
+    from gcs.workflows.reposition import reposition
+
+    place = (east, north, up)
+    _send(address, lambda session: reposition(session, place, frame == "load", speed))
 
 
 @click.command("land")

@@ -14,10 +14,12 @@ from gcs.commands.options import (
     SettingType,
     json_option,
     law_option,
+    own_options,
     page_options,
     print_json,
     require_options,
     sensors_option,
+    truth_option,
     vehicle_option,
 )
 from gcs.errors import EXIT_REQUIRED
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 
 _OWN = (
     "law",
+    "estimator",
+    "planner",
     "sensors",
     "seed",
     "lockstep",
@@ -42,8 +46,15 @@ _OWN = (
 @click.command("fly")
 @click.argument("mission")
 @law_option
+@own_options
 @sensors_option
 @vehicle_option()
+@click.option(
+    "--autopilot",
+    "firmware",
+    metavar="KIND=PROGRAM",
+    help="Fly with an autopilot of others, ardupilot=PROGRAM or px4=PROGRAM; see docs/autopilots.md.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of all noise.")
 @click.option("--lockstep", is_flag=True, help="As fast as it goes, the same bytes each time (default).")
 @click.option(
@@ -75,6 +86,7 @@ _OWN = (
     flag_value=str(DEFAULT_PORT),
     help="Fly a vehicle that is running already, met at PORT or HOST:PORT (14550 if none is named).",
 )
+@truth_option
 @click.option(
     "--timeout",
     "limit_s",
@@ -93,8 +105,11 @@ def fly_command(
     ctx: click.Context,
     mission: str,
     law: str,
+    estimator: str | None,
+    planner: str | None,
     sensors: str,
     vehicle: str,
+    firmware: str | None,
     seed: int,
     lockstep: bool,
     speed: float | None,
@@ -102,6 +117,7 @@ def fly_command(
     settings: tuple[str, ...],
     out: Path | None,
     connect: Address | None,
+    truth_at: Address | None,
     limit_s: float | None,
     force: bool,
     overwrite: bool,
@@ -140,6 +156,20 @@ def fly_command(
                 ctx,
             )
 
+    elif truth_at is not None:
+        raise click.UsageError("--truth is that of a running simulator: add --connect", ctx)
+
+    program = None
+    if firmware is not None:
+        if connect is not None or real_time:
+            other = "--real-time" if real_time else "--connect"
+            raise click.UsageError(f"--autopilot and {other} exclude each other", ctx)
+        for name in ("law", "estimator", "planner"):
+            if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+                raise click.UsageError(f"--{name} is for our own autopilot; --autopilot brings its own", ctx)
+        from gcs.workflows.own_firmware import firmware_program
+
+        program = firmware_program(firmware)
     page = None
     if view:
         from gcs.workflows.flight_page import PageOptions
@@ -181,6 +211,10 @@ def fly_command(
         force=force,
         overwrite=overwrite,
         limit_s=limit_s,
+        firmware=program,
+        estimator=estimator or "",
+        planner=planner or "",
+        truth_at=truth_at,
     )
     run = f"gcs fly {mission}"
     with reporting(run, junit):

@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 import click
 
-from gcs.commands.options import json_option, print_json, print_table, vehicle_option
+from gcs.commands.options import json_option, planner_option, print_json, print_table, vehicle_option
 from gcs.errors import EXIT_DONE, EXIT_ERROR
 
 
@@ -37,19 +37,33 @@ def missions_command(as_json: bool) -> None:
 @click.command("check")
 @click.argument("mission")
 @vehicle_option("The vehicle that is to fly it")
+@planner_option
 @click.option("--as-asked", is_flag=True, help="Judge the paths as asked, not shaped.")
 @json_option
-def check_command(mission: str, vehicle: str, as_asked: bool, as_json: bool) -> int:
+@click.pass_context
+def check_command(
+    ctx: click.Context, mission: str, vehicle: str, planner: str | None, as_asked: bool, as_json: bool
+) -> int:
     """Check whether a vehicle can fly a mission.
 
     MISSION is a shipped name or the path of a mission file. Every limit that it breaks is named, with by how
     much and when; the exit code is 1 if there is any. Of what can be flown it is told how long it takes, how
     far from the asked path it is, and what it takes of rotors, cable and tilt. With --as-asked the paths are
-    judged as the laws thesis and lqr fly them, not shaped to what can be flown.
+    judged as the laws thesis and lqr fly them, not shaped to what can be flown. With --planner the paths
+    through waypoints are those of a planner of your own, and what is wrong with one is told.
     """
+    if planner and as_asked:
+        raise click.UsageError("--as-asked judges no path of a planner; leave --planner or it out", ctx)
+
     from gcs.workflows.check_mission import check_mission
 
-    found = check_mission(mission, vehicle, as_asked)
+    if planner:
+        from gcs.workflows.own_planner import own_planner
+
+        with own_planner(planner, vehicle) as own:
+            found = check_mission(mission, vehicle, as_asked, own)
+    else:
+        found = check_mission(mission, vehicle, as_asked)
     if as_json:
         print_json(asdict(found))
     else:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import click
 
-from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, Address, AddressError, parse_address
+from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -29,6 +29,36 @@ class AddressType(click.ParamType):  # type: ignore[type-arg]
             return replace(parse_address(value), signing_key=key)
         except AddressError as error:
             self.fail(str(error), param, ctx)
+
+
+class TruthType(click.ParamType):  # type: ignore[type-arg]
+    """Where a simulator tells what is true."""
+
+    name = "ADDRESS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Address:
+        try:
+            address = parse_address(str(value))
+        except AddressError as error:
+            self.fail(str(error), param, ctx)
+        if not address.listen:
+            self.fail(f"{value!r}; a simulator is only listened to: PORT or HOST:PORT", param, ctx)
+        return address
+
+
+class FiniteType(click.ParamType):  # type: ignore[type-arg]
+    """A finite number."""
+
+    name = "NUMBER"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            self.fail(f"{value!r}; must be a number", param, ctx)
+        return number
 
 
 class PositiveType(click.ParamType):  # type: ignore[type-arg]
@@ -80,6 +110,17 @@ def connect_option(function: F) -> F:
     )(function)
 
 
+def truth_option(function: F) -> F:
+    """--truth of every command that hears the simulator of a running vehicle."""
+    return click.option(
+        "--truth",
+        "truth_at",
+        type=TruthType(),
+        help="Where the vehicle's simulator tells what is true, PORT or HOST:PORT: what sitl --truth names.  "
+        f"[default: {SITL_TRUTH.port}]",
+    )(function)
+
+
 def page_options(function: F) -> F:
     """--port and --bind of every command that serves a page."""
     port = click.option(
@@ -103,13 +144,88 @@ def vehicle_option(what: str = "What flies, in truth and by belief") -> Callable
     return click.option("--vehicle", default="bebop", show_default=True, help=f"{what}: {VEHICLES.choice()}.")
 
 
+class LawType(click.ParamType):  # type: ignore[type-arg]
+    """The name of a shipped control law, or one that somebody brings."""
+
+    name = "NAME|FILE:CLASS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        from autopilot.own.law import load_law
+        from autopilot.own.source import OwnError
+        from autopilot.vehicle.parameters import LAWS
+
+        law = str(value)
+        if law not in LAWS:
+            try:
+                load_law(law)
+            except OwnError as error:
+                self.fail(str(error), param, ctx)
+        return law
+
+
+def law_help() -> str:
+    """What can be given to --law."""
+    from autopilot.vehicle.parameters import LAWS
+
+    return f"Control law to fly with: {', '.join(LAWS)}, or one of your own (docs/laws.md)."
+
+
 def law_option(function: F) -> F:
     """--law of every command that starts an autopilot, or compiles one."""
-    from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
+    from autopilot.vehicle.parameters import DEFAULT_LAW
 
-    law = click.Choice(LAWS)
-    help_text = "Control law to fly with."
-    return click.option("--law", type=law, default=DEFAULT_LAW, show_default=True, help=help_text)(function)
+    return click.option("--law", type=LawType(), default=DEFAULT_LAW, show_default=True, help=law_help())(
+        function
+    )
+
+
+class OwnType(click.ParamType):  # type: ignore[type-arg]
+    """A class that somebody brings."""
+
+    name = "FILE:CLASS"
+
+    def __init__(self, load: Callable[[str], object]) -> None:
+        self._load = load
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        from autopilot.own.source import OwnError
+
+        try:
+            self._load(str(value))
+        except OwnError as error:
+            self.fail(str(error), param, ctx)
+        return str(value)
+
+
+def _estimator(reference: str) -> object:
+    from autopilot.own.estimator import load_estimator
+
+    return load_estimator(reference)
+
+
+def _planner(reference: str) -> object:
+    from autopilot.own.planner import load_planner
+
+    return load_planner(reference)
+
+
+def own_options(function: F) -> F:
+    """--estimator and --planner of every command that starts an autopilot."""
+    estimator = click.option(
+        "--estimator",
+        type=OwnType(_estimator),
+        help="Estimator of your own to fly with, FILE.py:CLASS (docs/estimators.md).  [default: built in]",
+    )
+    return estimator(planner_option(function))
+
+
+def planner_option(function: F) -> F:
+    """--planner of every command that plans paths."""
+    return click.option(
+        "--planner",
+        type=OwnType(_planner),
+        help="Path planner of your own to fly with, FILE.py:CLASS (docs/planners.md).  [default: built in]",
+    )(function)
 
 
 def sensors_option(function: F) -> F:

@@ -1,26 +1,54 @@
-"""gcs status"""
+"""gcs status, gcs texts"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import click
 
-from gcs.commands.options import connect_option, json_option, print_json, print_table
+from gcs.commands.options import connect_option, json_option, print_json, print_table, truth_option
 from gcs.shell.link import Address
-from gcs.workflows.status import vehicle_status
+from gcs.workflows.status import vehicle_status, vehicle_texts
 
 
 @click.command("status")
 @json_option
 @connect_option
-def status_command(as_json: bool, address: Address) -> None:
-    """Show what the vehicle says of itself."""
-    record = vehicle_status(address)
+@truth_option
+def status_command(as_json: bool, address: Address, truth_at: Address | None) -> None:
+    """Show what the vehicle says of itself.
+
+    Below it stand its last warnings, and what was worse, with their age.
+    """
+    record = vehicle_status(address, truth_at)
     if as_json:
         print_json(record)
         return
+    texts = record.pop("texts")
     print_table([(name.replace("_", " "), _shown(value)) for name, value in record.items()])
+    if texts:
+        click.echo()
+        print_table(_lines(texts))
+
+
+@click.command("texts")
+@json_option
+@connect_option
+def texts_command(as_json: bool, address: Address) -> None:
+    """List what the vehicle has told the operators.
+
+    It keeps the last 50 texts, each with the time at which it was said last.
+    """
+    texts = vehicle_texts(address)
+    if as_json:
+        print_json(texts)
+    else:
+        print_table(_lines(texts))
+
+
+def _lines(texts: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    return [(f"{one['age_s']:.1f} s ago", one["severity"], one["text"]) for one in texts]
 
 
 def _shown(value: Any) -> str:
@@ -28,8 +56,4 @@ def _shown(value: Any) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.3f}"
-    if isinstance(value, list):
-        return " | ".join(value) or "-"
-    return str(value)
+    return f"{value:.3f}" if isinstance(value, float) else str(value)

@@ -8,10 +8,14 @@ from pathlib import Path
 
 import click
 
-from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS
+from autopilot.own.chosen import Own
+from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.commands.options import (
+    LawType,
     SettingType,
     json_option,
+    law_help,
+    own_options,
     print_json,
     require_options,
     sensors_option,
@@ -26,10 +30,11 @@ from gcs.shell.display import say
 @click.option(
     "--law",
     "laws",
-    type=click.Choice(LAWS),
+    type=LawType(),
     multiple=True,
-    help=f"Control law to fly with; may be given again.  [default: {DEFAULT_LAW}]",
+    help=f"{law_help()} May be given again.  [default: {DEFAULT_LAW}]",
 )
+@own_options
 @sensors_option
 @vehicle_option()
 @click.option(
@@ -83,6 +88,8 @@ def sweep_command(
     ctx: click.Context,
     mission: str,
     laws: tuple[str, ...],
+    estimator: str | None,
+    planner: str | None,
     sensors: str,
     vehicle: str,
     varied: tuple[str, ...],
@@ -122,6 +129,7 @@ def sweep_command(
     options = SweepOptions(
         mission=mission,
         laws=laws or (DEFAULT_LAW,),
+        own=Own(estimator=estimator or "", planner=planner or ""),
         sensors=sensors,
         vehicle=vehicle,
         varied=varied,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from gcs.commands.options import AddressType, page_options
-from gcs.shell.link import API_PORT, Address
+from gcs.commands.options import AddressType, page_options, truth_option
+from gcs.shell.link import API_PORT, SITL_TRUTH, Address
 
 
 @click.command("view")
@@ -25,6 +25,7 @@ from gcs.shell.link import API_PORT, Address
     is_flag=True,
     help="Do not listen to the simulator (errors of the estimator, true places): another program wants to.",
 )
+@truth_option
 @click.option("--feed", type=int, hidden=True, help="The descriptor at which gcs fly tells what it hears.")
 def view_command(
     addresses: tuple[Address, ...],
@@ -32,6 +33,7 @@ def view_command(
     bind: str,
     no_open: bool,
     no_truth: bool,
+    truth_at: Address | None,
     feed: int | None,
 ) -> None:
     """Show running vehicles live in a browser.
@@ -52,7 +54,7 @@ def view_command(
         host=bind,
         port=port,
         opens=not no_open,
-        truth=not no_truth,
+        truth=None if no_truth else truth_at or SITL_TRUTH,
     )
     if feed is not None:
         serve_feed(feed, options)

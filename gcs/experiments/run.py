@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -20,7 +21,8 @@ def start(experiment: Experiment, directory: Path, core: int) -> Child:
     store.begin(directory)
     arguments = ["fly", experiment.case, "--law", experiment.law, "--vehicle", experiment.vehicle]
     arguments += ["--sensors", SENSORS, "--seed", str(SEED), "--lockstep", "--force", "--overwrite"]
-    child = Child("gcs", [*arguments, "--out", str(directory)], directory / LOG_FILE)
+    program = [sys.executable, "-m", "gcs"]
+    child = Child("gcs", [*program, *arguments, "--out", str(directory)], directory / LOG_FILE)
     # it and its own children share one core while they are in lockstep: not the one of its neighbour
     return keep_on_core(child, core)
 

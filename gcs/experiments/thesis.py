@@ -16,6 +16,7 @@ from gcs.experiments.page import PAGE_FILE, render_page
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, in_reading_order
 from gcs.experiments.results import RESULTS_FILE, result, write_results
 from gcs.experiments.table import markdown
+from gcs.folders import make_folder
 
 FLIGHTS = "flights"
 FIGURES = "figures"
@@ -65,10 +66,7 @@ def _order(record: Record) -> tuple[int, int, int]:
 
 def make_directory(out: Path) -> None:
     """`out`, or one line on why not."""
-    try:
-        (out / FLIGHTS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GcsError(f"--out {out}: {error.strerror}") from None
+    make_folder(out / FLIGHTS, f"--out {out}")
 
 
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"

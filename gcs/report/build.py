@@ -105,9 +105,10 @@ def build_mcap(tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None) -
     meta = load_meta(tlog_path.parent / META_FILE) if meta is None else meta
     telemetry = load_telemetry(tlog_path)
     layout = layout_of(meta.vehicle)
+    places = tuple((x, -y) for x, y, _ in (rotor["position"] for rotor in layout["rotors"]))
     out_dir.mkdir(parents=True, exist_ok=True)
     path = out_dir / MCAP_FILE
-    write_mcap(path, telemetry, samples_of(telemetry), Layout(layout["arm"], layout["load_radius"]))
+    write_mcap(path, telemetry, samples_of(telemetry), Layout(places, layout["load_radius"]))
     return path
 
 

@@ -43,6 +43,7 @@ def render_page(
         outcome=outcome,
         mood=mood(outcome),
         reason=meta.reason,
+        truth_missing=meta.truth_missing,
         subtitle=_subtitle(record),
         figures=_figures(record, replay),
         groups=_groups(record),
@@ -83,7 +84,11 @@ def _figures(record: Record, replay: Json) -> list[Json]:
 def _groups(record: Record) -> list[dict[str, Any]]:
     """The groups of figures, each with what is known; a group in which nothing happened is left out."""
     return [
-        {"title": group.title, "rows": [_row(metric, record) for metric in metrics if _known(metric, record)]}
+        {
+            "title": group.title,
+            "window": group.window,
+            "rows": [_row(metric, record) for metric in metrics if _known(metric, record)],
+        }
         for group, metrics in GROUPS
         if any(record[metric.name] for metric in metrics)
     ]

@@ -23,7 +23,6 @@ from gcs.report.style import (
     ORANGE,
     PURPLE,
     RED,
-    ROTORS,
     Target,
     bands,
     draw,
@@ -32,6 +31,7 @@ from gcs.report.style import (
     new_figure,
     note_if_empty,
     phase_spans,
+    rotor_colour,
     rows,
     save,
     true_spans,
@@ -131,7 +131,8 @@ def error(view: View, path: Target) -> None:
     s = view.samples
     seen = view.visible(s.time_s)
     scale, unit = length_scale(s.error_m[seen])
-    believed = scale * (s.estimated_m - s.actual_m)
+    believed, filtered = scale * (s.estimated_m - s.actual_m), scale * (s.filtered_m - s.actual_m)
+    beside = bool(np.isfinite(filtered).any())  # an estimator of somebody's own flies
     columns = (
         ("position error", unit, scale * s.error_m),
         ("velocity error", f"{unit}/s", scale * s.error_m_s),
@@ -149,6 +150,9 @@ def error(view: View, path: Target) -> None:
                     alpha=0.8,
                     label="estimate − true",
                 )
+            if column == 0 and beside:
+                shown = filtered[seen, i]
+                draw(ax, s.time_s[seen], shown, color=GREEN, linewidth=0.8, label="built-in filter − true")
             draw(ax, s.time_s[seen], values[seen, i], color=BLUE, label="true − desired")
             note_if_empty(ax)
             ax.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
@@ -205,15 +209,20 @@ def psi(view: View, path: Target) -> None:
 
 def rotors(view: View, path: Target) -> None:
     """Force of each rotor, command and truth, with its limits and where they cut a command."""
-    figure, axes = rows(11.0, 5.8, 2, 2, share_y=True)
+    count = view.telemetry.rotors_truth.force_n.shape[1]
+    lines = -(-count // 2)
+    figure, axes = rows(11.0, 2.9 * lines, lines, 2, share_y=True)
     for i, ax in enumerate(axes.flat):
+        if i >= count:
+            ax.set_visible(False)
+            continue
         _rotor(view, ax, i)
         ax.set_title(f"Rotor {i + 1}")
     for ax in axes[:, 0]:
         ax.set_ylabel("force (N)")
     figure.subplots_adjust(hspace=0.26)
     view.shade(axes[:, 0])
-    view.shade(axes[:, 1])
+    view.shade(axes[: count // 2, 1])
     key(axes[0, 1])
     save(figure, path)
 
@@ -224,7 +233,14 @@ def _rotor(view: View, ax: Any, i: int) -> None:
     t = commanded.time_s[seen]
     draw(ax, t, commanded.force_n[seen, i], color=FAINT, linewidth=0.8, label="command")
     of_truth = view.visible(true.time_s)
-    draw(ax, true.time_s[of_truth], true.force_n[of_truth, i], color=ROTORS[i], linewidth=1.2, label="true")
+    draw(
+        ax,
+        true.time_s[of_truth],
+        true.force_n[of_truth, i],
+        color=rotor_colour(i),
+        linewidth=1.2,
+        label="true",
+    )
     note_if_empty(ax)
     _limits(view, ax)
     cut = (commanded.saturated[seen] >> i & 1) == 1
@@ -308,12 +324,12 @@ def overview(view: View, path: Target) -> None:
     above.tick_params(labelbottom=False)
     true = view.telemetry.rotors_truth
     of_truth = view.visible(true.time_s)
-    for i, colour in enumerate(ROTORS):
+    for i in range(true.force_n.shape[1]):
         draw(
             below,
             true.time_s[of_truth],
             true.force_n[of_truth, i],
-            color=colour,
+            color=rotor_colour(i),
             linewidth=0.9,
             alpha=0.9,
             label=str(i + 1),

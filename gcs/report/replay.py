@@ -6,7 +6,7 @@ longer than a report interpolates, a row without numbers stands in the gap, so t
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +20,7 @@ from gcs.analysis.align import MAX_GAP_S, as_of, linear
 from gcs.analysis.axes import Floats, quat_enu_flu_from_ned_frd
 from gcs.analysis.record import FlightMeta
 from gcs.analysis.samples import PHASE_NAMES, Samples, samples_of
-from gcs.analysis.tracks import Telemetry
+from gcs.analysis.tracks import Telemetry, numbers
 from gcs.report.packing import Column, pack
 from gcs.report.steps import step_texts
 from gcs.report.style import phase_spans
@@ -105,10 +105,10 @@ def layout_of(vehicle: str | None) -> Json:
     except (VehicleFileError, OSError):
         flown = load_vehicle(_USUAL)
     arm, z = flown.arm_m, -flown.rotor_height_m
-    places = ((-arm, 0.0), (0.0, arm), (arm, 0.0), (0.0, -arm))  # (2-13): behind, right, ahead, left
     return {
         "rotors": [
-            {"position": [x, y, z], "spin": -1 if i % 2 == 0 else 1} for i, (x, y) in enumerate(places)
+            {"position": [arm * rotor.x, -arm * rotor.y, z], "spin": -1 if rotor.yaw < 0.0 else 1}
+            for rotor in flown.layout
         ],
         "arm": arm,
         "cable": flown.cable_length_m,
@@ -182,8 +182,8 @@ def _columns(
         *_parts("quat", "wxyz", quat_enu_flu_from_ned_frd(samples.quat_wxyz), _UNIT),  # its own inverse
         *_xyz("cable", truth.q_cable, _UNIT),
         Column("tension", np.where(samples.attached, truth.tension_n, np.nan), _FORCE_N),
-        *_parts("rotor", "1234", as_of(rotors.time_s, rotors.force_n, t), _FORCE_N),
-        *_parts("command", "1234", as_of(commanded.time_s, commanded.force_n, t), _FORCE_N),
+        *_parts("rotor", numbers(rotors), as_of(rotors.time_s, rotors.force_n, t), _FORCE_N),
+        *_parts("command", numbers(commanded), as_of(commanded.time_s, commanded.force_n, t), _FORCE_N),
         Column("psi_R", linear(cascade.time_s, cascade.psi_R, t), _PSI),
         Column("psi_q", linear(cascade.time_s, cascade.psi_q, t), _PSI),
         Column("taut", (truth.taut == 1).astype(np.float64), 1.0),
@@ -234,5 +234,5 @@ def _xyz(name: str, values: Floats, step: float) -> list[Column]:
     return _parts(name, "xyz", values, step)
 
 
-def _parts(name: str, parts: str, values: Floats, step: float) -> list[Column]:
+def _parts(name: str, parts: Sequence[str], values: Floats, step: float) -> list[Column]:
     return [Column(f"{name}_{part}", values[:, i], step) for i, part in enumerate(parts)]

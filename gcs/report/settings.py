@@ -34,13 +34,13 @@ def changed_settings(telemetry: Telemetry, meta: FlightMeta) -> list[Setting]:
 
 
 def _tables(vehicle: str) -> tuple[ParameterTable, ...]:
-    from autopilot.vehicle.file import load_vehicle
+    from autopilot.vehicle.file import load_belief
     from autopilot.vehicle.parameters import autopilot_parameters
     from sitl.vehicles.sim_parameters import sim_parameters
     from sitl.vehicles.truth import load_truth
 
     try:
-        return sim_parameters(load_truth(vehicle)), autopilot_parameters(load_vehicle(vehicle))
+        return sim_parameters(load_truth(vehicle)), autopilot_parameters(load_belief(vehicle))
     except (VehicleFileError, OSError):
         return ()
 

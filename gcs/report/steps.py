@@ -42,9 +42,9 @@ def step_texts(items: Sequence[WireItem], home: Home) -> list[StepText]:
     except MissionItemError:
         return [StepText(seq, seq, command_name(item.command)) for seq, item in enumerate(items)]
     texts, alone = [], False
-    for first, last, step in found:
-        texts.append(StepText(first, last, describe(step, alone)))
-        alone = alone or isinstance(step, Release)
+    for one in found:
+        texts.append(StepText(one.first, one.last, describe(one.step, alone)))
+        alone = alone or isinstance(one.step, Release)
     return texts
 
 

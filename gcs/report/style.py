@@ -23,7 +23,13 @@ INK, GREY, PALE, SHADOW = "#22272e", "#7b838c", "#c9ced4", "#d5dae0"
 FAINT = "#a9b2bb"  # a line behind another
 
 AXES = ("x east", "y north", "z up")
-ROTORS = (BLUE, ORANGE, GREEN, PURPLE)
+_ROTORS = (BLUE, ORANGE, GREEN, PURPLE, "#56B4E9", "#B8A800", "#7A5230", INK)
+
+
+def rotor_colour(i: int) -> str:
+    """Of the rotor with this index; those beyond eight have colours again."""
+    return _ROTORS[i % len(_ROTORS)]
+
 
 _EARTH, _CALM, _BUSY, _HOME, _ALARM = "#faf2e2", "#f1f3f5", "#eef5fb", "#eaf5ee", "#fbe6e2"
 _BANDS = {

@@ -30,5 +30,6 @@ def record_table(record: Record) -> Table:
             value = Text(metric.read(record))
             if metric.name == "outcome":
                 value.stylize(_OUTCOME_STYLES.get(str(record[metric.name]), "bold yellow"))
-            table.add_row(group.title if i == 0 else "", metric.label, value, end_section=i == len(known) - 1)
+            head = (group.title, group.window)[i] if i < 2 else ""
+            table.add_row(head, metric.label, value, end_section=i == len(known) - 1)
     return table

@@ -75,6 +75,10 @@ class LiveBars:
             self._stage, self._plain_s = stage, now_s
             say(plain())
 
+    def _line_said(self) -> None:
+        """A plain line was said: the next one has time."""
+        self._plain_s = time.monotonic()
+
     def _draw(self, rows: Mapping[str, Row]) -> None:
         bars = self._bars or self._open()
         for name in [name for name in self._tasks if name not in rows]:
@@ -146,7 +150,7 @@ class FlightDisplay(LiveBars):
     def _fields(self, progress: Progress, now_s: float) -> dict[str, str]:
         return {
             "phase": progress.phase,
-            "item": f"item {progress.item + 1}/{progress.items}" if progress.sim_time_s else "",
+            "item": f"item {progress.item}/{progress.items - 1}" if progress.sim_time_s else "",
             "error": _or_dash(progress.load_error_m, 1e3, "mm"),
             "rotors": _or_dash(progress.rotor_use, 1e2, "%"),
             "clock": f"{progress.sim_time_s:6.1f} s",
@@ -168,29 +172,35 @@ class FlightDisplay(LiveBars):
 
 
 class CompileDisplay(LiveBars):
-    """What is being compiled, kernel by kernel, and how many parts remain."""
+    """What is being compiled, kernel by kernel, how many parts remain, and how long it took so far."""
 
     _transient = True
 
-    def update(self, running: Mapping[str, str], remain: int, total: int) -> None:
+    def update(self, running: Mapping[str, str], remain: int, total: int, elapsed_s: float) -> None:
         """Show the kernel of each running part by the part's title, and that `remain` of `total` parts are
-        not done."""
+        not done after so long."""
+        left = _left(remain, total, elapsed_s)
         self._show(
             lambda: {
                 "all": {
                     "description": "compiling the flight software, once",
                     "completed": total - remain,
                     "total": total,
-                    "kernel": f"{remain} of {total} parts remain",
+                    "kernel": left,
                 },
                 **{
                     title: {"description": f"  {title}", "completed": 0, "total": None, "kernel": kernel}
                     for title, kernel in running.items()
                 },
             },
-            lambda: f"compiling {_parts(running)}; {remain} of {total} parts remain",
-            " ".join(running),
+            lambda: f"compiling {_parts(running)}; {left}",
         )
+
+    def done(self, title: str, seconds: float, remain: int, total: int, elapsed_s: float) -> None:
+        """Elsewhere than on a terminal say that a part is done, and took so long."""
+        if not self._quiet and not is_live():
+            say(f"compiled {title} in {seconds:.0f} s; {_left(remain, total, elapsed_s)}")
+            self._line_said()
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn, TimeElapsedColumn
@@ -216,6 +226,10 @@ class StepDisplay(LiveBars):
         from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
 
         return (SpinnerColumn(), "{task.description}", BarColumn(), MofNCompleteColumn())
+
+
+def _left(remain: int, total: int, elapsed_s: float) -> str:
+    return f"{remain} of {total} parts remain after {elapsed_s:.0f} s" if remain else "that was the last part"
 
 
 def _parts(running: Mapping[str, str]) -> str:

@@ -14,7 +14,6 @@ from gcs.errors import GcsError
 DEFAULT_PORT = 14550
 API_PORT = 14540
 PAGE_PORT = 8090  # TCP, of the live page
-TRUTH_PORT = 14560  # where sitl sends what is true
 LOOPBACK = "127.0.0.1"
 _DATAGRAM = 65_535
 _BUFFER = 4 * 1024 * 1024  # the fast streams of a second, and a report being written meanwhile
@@ -35,6 +34,9 @@ class Address:
 
     def __str__(self) -> str:
         return f"{'' if self.listen else 'udpout:'}{self.host}:{self.port}"
+
+
+SITL_TRUTH = Address(LOOPBACK, 14560)  # where sitl tells what is true, unless it is told otherwise
 
 
 def parse_address(text: str) -> Address:
@@ -140,14 +142,6 @@ def open_address(address: Address) -> UdpSocket:
     except OSError as error:
         raise GcsError(f"host {address.host!r}: {error.strerror or error}") from None
     return UdpSocket("0.0.0.0" if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
-
-
-def truth_socket() -> UdpSocket | None:
-    """Where a simulator that runs by itself tells what is true; None if another program listens there."""
-    try:
-        return UdpSocket(LOOPBACK, TRUTH_PORT)
-    except GcsError:
-        return None
 
 
 def wait(sockets: list[UdpSocket], timeout_s: float) -> None:

@@ -11,7 +11,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -19,6 +20,10 @@ from types import TracebackType
 from gcs.errors import GcsError
 
 STOP_S = 3.0  # from SIGTERM to SIGKILL
+STOPPED_LIMIT_S = (
+    15.0  # of a child that was stopped (SIGSTOP): before its silence is taken for that of another
+)
+LOOK_S = 1.0  # between two looks at the states of the children
 _PR_SET_PDEATHSIG = 1
 _LAST_LINE = 4096  # bytes of the log in which the last line is looked for
 
@@ -26,13 +31,23 @@ _LAST_LINE = 4096  # bytes of the log in which the last line is looked for
 class Child:
     """One running program."""
 
-    def __init__(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> None:
+    def __init__(
+        self,
+        name: str,
+        command: Sequence[str],
+        log: Path,
+        inherits: Sequence[int] = (),
+        folder: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
         self.name = name
         self.log = log
         self.exit_code: int | None = None
         with log.open("wb") as stderr:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", name, *arguments],
+                command,
+                cwd=folder,
+                env={**os.environ, **environment} if environment else None,
                 stdin=subprocess.DEVNULL,
                 stdout=stderr,
                 stderr=subprocess.STDOUT,
@@ -49,6 +64,15 @@ class Child:
     def running(self) -> bool:
         self.exit_code = self._process.poll()
         return self.exit_code is None
+
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody has stopped it by a signal (state T); False where the system does not say."""
+        try:
+            state = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except (OSError, IndexError):
+            return False
+        return state in ("T", "t")
 
     def last_line(self) -> str:
         """The last line it wrote, empty if none."""
@@ -93,21 +117,62 @@ class Processes:
     def __init__(self) -> None:
         self._children: list[Child] = []
         self._cpus_before: set[int] | None = None
+        self._looked_s = 0.0
+        self._stopped_s: dict[int, float] = {}  # since when a child is seen to be stopped, by its id
 
     def start(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> Child:
         """Start `python -m NAME ARGUMENTS` with its output in `log`; it inherits these open descriptors."""
+        return self._begin(name, [sys.executable, "-m", name, *arguments], log, inherits)
+
+    def start_program(
+        self, name: str, command: Sequence[str], log: Path, folder: Path, environment: Mapping[str, str]
+    ) -> Child:
+        """Start a program of others, called `name`, in a folder, with its output in `log` and these variables
+        beside ours."""
+        return self._begin(name, command, log, (), folder, environment)
+
+    def _begin(
+        self,
+        name: str,
+        command: Sequence[str],
+        log: Path,
+        inherits: Sequence[int] = (),
+        folder: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> Child:
         try:
-            child = Child(name, arguments, log, inherits)
+            child = Child(name, command, log, inherits, folder, environment)
         except OSError as error:
             raise GcsError(f"{name} cannot be started: {error}") from None
         self._children.append(child)
         return child
 
     def ended(self) -> str:
-        """Why a child has ended, empty while all run."""
+        """Why a child has ended, or that it has been stopped for long; empty while all run."""
         for child in self._children:
             if not child.running:
                 return child.obituary()
+        return self._stopped(time.monotonic())
+
+    def stopped(self) -> str:
+        """Who is stopped by a signal at this moment; empty where nobody is."""
+        names = [f"{child.name} (process {child.pid})" for child in self._children if child.stopped]
+        return f"{' and '.join(names)} stopped by a signal" if names else ""
+
+    def _stopped(self, now_s: float) -> str:
+        if now_s - self._looked_s < LOOK_S:
+            return ""
+        self._looked_s = now_s
+        since = {
+            child.pid: self._stopped_s.get(child.pid, now_s) for child in self._children if child.stopped
+        }
+        self._stopped_s = since
+        for child in self._children:
+            stopped_s = now_s - since.get(child.pid, now_s)
+            if stopped_s >= STOPPED_LIMIT_S:
+                return (
+                    f"{child.name} (process {child.pid}) has been stopped by a signal for {stopped_s:.0f} s"
+                )
         return ""
 
     def share_one_core(self) -> None:

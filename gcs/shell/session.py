@@ -9,23 +9,17 @@ from typing import Any
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients import command
-from gcs.clients.connection import Connection
+from gcs.clients.connection import LINK_TIMEOUT_US, Connection
 from gcs.clients.datagrams import messages
 from gcs.clients.operation import Operation, Result, Status, Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.display import StepDisplay
-from gcs.shell.link import (
-    Address,
-    UdpSocket,
-    monotonic_us,
-    open_address,
-    truth_socket,
-    unix_us,
-    wait,
-)
+from gcs.shell.link import Address, monotonic_us, open_address, unix_us, wait
+from gcs.shell.truth import TruthLink
 
 FIND_S = 5.0
+TRUTH_S = 2.0  # it says five times a second of its clock whose it is
 REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may come a little later
 _TICK_S = 0.02
 
@@ -35,15 +29,17 @@ Seen = Callable[[bytes, int], None]  # a datagram of the vehicle and the time
 class Session:
     """One vehicle; `view` is what it has told."""
 
-    def __init__(self, address: Address, find_s: float | None = None) -> None:
+    def __init__(
+        self, address: Address, find_s: float | None = None, link_timeout_us: int = LINK_TIMEOUT_US
+    ) -> None:
         self.view = VehicleView()
         self.address = address
         self.on_received: Seen | None = None
         self.on_sent: Seen | None = None
         self.on_truth: Seen | None = None
-        self._truth: UdpSocket | None = None
+        self._truth: TruthLink | None = None
         self._find_s = FIND_S if find_s is None else find_s
-        self._connection = Connection()
+        self._connection = Connection(link_timeout_us)
         if address.signing_key is not None:
             self._connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
         self._socket = open_address(address)
@@ -55,10 +51,26 @@ class Session:
             raise NoVehicleError("no vehicle was looked for")
         return self._connection.target
 
-    def listen_to_truth(self) -> bool:
-        """Hear the simulated world too, as far as nobody else listens to it; False if somebody does."""
-        self._truth = truth_socket()
-        return self._truth is not None
+    @property
+    def lost(self) -> bool:
+        """True when the vehicle was there and has been silent for too long. What has come and was not read
+        yet counts as heard: on a busy machine it may be we who were late."""
+        return self._connection.lost(monotonic_us()) and not self._socket.waiting
+
+    def find_with_truth(self, truth: TruthLink) -> Target:
+        """As `find`; from then on the world that the vehicle flies in is heard too, and awaited for a moment.
+
+        `truth` remains the caller's, who closes it.
+        """
+        target = self.find()
+        try:
+            run = int(self.request(mavlink.MAVLINK_MSG_ID_SIM_BOOT).boot_id)
+        except GcsError:  # another firmware, or a vehicle that flies in no simulator
+            run = None
+        truth.of_vehicle(run)
+        self._truth = truth
+        self.watch(lambda: truth.heard, TRUTH_S)
+        return target
 
     def find(self) -> Target:
         """Wait for the vehicle's heartbeat."""
@@ -101,7 +113,7 @@ class Session:
         """Bring one operation to its end: NoVehicleError if nobody answers, RefusedError if it is a no."""
         texts_before = len(self.view.texts)
         self.watch(
-            lambda: operation.result is not None or self._connection.lost(monotonic_us()),
+            lambda: operation.result is not None or self.lost,
             None,
             label,
             operation,
@@ -149,8 +161,6 @@ class Session:
 
     def close(self) -> None:
         self._socket.close()
-        if self._truth is not None:
-            self._truth.close()
 
     def __enter__(self) -> Session:
         return self

@@ -6,15 +6,17 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from autopilot.core.flight_core import Setup
-from autopilot.core.scheduler import divider
 from autopilot.geometry.packed import Row, packed
 from autopilot.onboard.onboard import build_setup, plan_of
+from autopilot.own.chosen import Own, parameters_for
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import MissionPlan
 from autopilot.trajectory.prepare import Limits
 from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.parameters import apply_settings, autopilot_parameters
+from autopilot.vehicle.file import load_belief, load_vehicle
+from autopilot.vehicle.layout import Layout
+from autopilot.vehicle.parameters import apply_settings
+from autopilot.vehicle.rates import control_divider
 from autopilot.wire.convert import Home
 from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.flight import TIME_FACTOR, TIME_MARGIN_S
@@ -23,12 +25,13 @@ from gcs.sweep.plan import simulated
 from gcs.sweep.wire import wire_of
 from missions.model import Mission
 from sitl.plant.records import Truth
+from sitl.sensors.chosen import with_chosen
 from sitl.sensors.files import load_profile
 from sitl.sensors.profile import Profile
 from sitl.settings import Settings, settings_of
 from sitl.vehicles.sim_parameters import apply as apply_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
-from sitl.vehicles.truth import load_truth
+from sitl.vehicles.truth import truth_of
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Cell:
     items: int  # of the mission
     limit_us: int  # that the flight may last
     truth: Truth
+    layout: Layout
     profile: Profile
     settings: Settings
     wire: Row
@@ -47,38 +51,54 @@ class Cell:
 
 def cell_of(mission: Mission, conditions: Conditions) -> Cell:
     """The cell to which a flight under these conditions belongs. ValueError where it cannot be flown."""
-    return _cell(mission, conditions.vehicle, conditions.sensors, tuple(conditions.settings.items()))
+    settings, own = tuple(conditions.settings.items()), conditions.own
+    # what somebody brings may change under its name
+    return _cell(mission, conditions.vehicle, conditions.sensors, settings, own, own.digests)
 
 
 @lru_cache(maxsize=8)
-def _cell(mission: Mission, vehicle: str, sensors: str, set_values: tuple[tuple[str, float], ...]) -> Cell:
+def _cell(
+    mission: Mission,
+    vehicle: str,
+    sensors: str,
+    set_values: tuple[tuple[str, float], ...],
+    own: Own,
+    digests: tuple[str, ...],
+) -> Cell:
     home = Home()
-    table = autopilot_parameters(load_vehicle(vehicle))
+    file = load_vehicle(vehicle)
+    table = parameters_for(load_belief(vehicle), own)
     apply_settings(table, set_values)
-    truth = load_truth(vehicle)
+    truth = truth_of(file)
     sim_table = sim_parameters(truth)
     for name, value in simulated(dict(set_values)).items():
         sim_table.set(name, value)
     settings = settings_of(sim_table)
     profile = _profile(sensors)
-    every = divider(1e6 / settings.tick_us, table["CTL_RATE_HZ"], "CTL_RATE_HZ")
-    setup = build_setup(table, every)
+    every = control_divider(1e6 / settings.tick_us, table)
+    setup = build_setup(table, every, own)
     items = tuple(encode_mission(mission, home))
     return Cell(
         setup=setup,
-        plan=_plan(items, setup.settings.limits),
+        plan=_plan(items, setup.settings.limits) if setup.planner is None else _own_plan(items, setup),
         items=len(items),
         limit_us=round(1e6 * (expected_duration_s(mission) * TIME_FACTOR + TIME_MARGIN_S)),
         truth=apply_parameters(truth, sim_table),
+        layout=file.layout,
         profile=profile,
         settings=settings,
-        wire=packed(wire_of(profile, settings.noise_scale, home)),
+        wire=packed(wire_of(with_chosen(profile, settings.chosen), settings.noise_scale, home)),
     )
 
 
 @lru_cache(maxsize=8)
 def _profile(name: str) -> Profile:
     return load_profile(name)
+
+
+def _own_plan(items: tuple[WireItem, ...], setup: Setup) -> MissionPlan:
+    """By a planner that somebody has brought."""
+    return plan_of(StoredMission(items), Home(), setup.settings.limits, planner=setup.planner)
 
 
 @lru_cache(maxsize=64)

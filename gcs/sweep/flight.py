@@ -34,6 +34,7 @@ from gcs.sweep.kernel import NO_FIGURES, Figures, fly_stretch
 from gcs.sweep.wire import most_readings, wire_rate
 from missions.model import Mission
 from sitl.hil import HilSimulator
+from sitl.plant.chain.records import new_chain
 from sitl.plant.records import PlantState
 from sitl.world import Floats, World, new_world
 
@@ -44,7 +45,8 @@ _NO_ROWS = np.zeros((0, COLUMNS))
 _NEVER = 2**62
 _TICK, _NOW = place_of(World, "tick"), place_of(World, "now_us")
 _SLACK_EVENTS = place_of(World, "plant") + place_of(PlantState, "slack_events")
-_ENTRIES: dict[type, Callable[..., bool]] = {}  # machine code of `fly_stretch`, by the type of the law's rows
+# machine code of `fly_stretch`, by the types of the law's rows and of the cable's
+_ENTRIES: dict[tuple[type, type], Callable[..., bool]] = {}
 _LOAD_CARRIED = (Phase.HOLD, Phase.MISSION, Phase.RETURN)
 
 
@@ -110,7 +112,8 @@ class SweptFlight:
         self.core = FlightCore(cell.setup, LAID_OUT)
         self.item = 0  # of the mission, last flown
         self.core.change(with_plan(self.core.flight, cell.plan))
-        self.world = new_world(cell.truth, cell.profile, cell.settings, seed)
+        self.world = new_world(cell.truth, cell.profile, cell.settings, seed, cell.layout)
+        self.chain = new_chain(cell.truth, unpack(World, self.world.world, 0).plant)
         self.core.take_inbox(new_inbox(most_readings(self.world)))
         self.figures = packed(NO_FIGURES)
         self.asked: Floats = _NO_ROWS
@@ -143,6 +146,7 @@ class SweptFlight:
         if undecided:
             self._decide(now_us)
             self._fly(True, True, False, 0.0, self.tick)
+        self.core.raise_interruption()
         self._ground_turn(now_us)
         self._judge(now_us)
 
@@ -167,10 +171,12 @@ class SweptFlight:
             gripper_open,
             reel_rate,
             stop_tick,
+            self.chain,
         )
-        if law not in _ENTRIES:
-            _ENTRIES[law] = entry_of(fly_stretch, *arguments)
-        return _ENTRIES[law](*arguments)
+        entry = (law, type(self.chain))
+        if entry not in _ENTRIES:
+            _ENTRIES[entry] = entry_of(fly_stretch, *arguments)
+        return _ENTRIES[entry](*arguments)
 
     @property
     def tick(self) -> int:
@@ -266,7 +272,7 @@ class SweptFlight:
         if self.core.flight.mission.done:
             self.flown.outcome = "completed"
             return
-        where = f"item {self.item} of {self.cell.items}"
+        where = f"item {self.item} of {self.cell.items - 1}"
         self.flown.outcome = "interrupted"
         self.flown.reason = f"the vehicle was disarmed before the end of the mission, at {where}"
 

@@ -16,7 +16,7 @@ from autopilot.geometry.packed import unpack
 from gcs.sweep.flight import SweptFlight
 from gcs.sweep.lane_kernel import fly_lanes
 from gcs.sweep.lane_memory import LaneMemory
-from sitl.world import LOSS, OUTAGE_CHANCE
+from sitl.world import JITTER, LOSS, OUTAGE_CHANCE, WorldModel
 
 FEWEST = 3  # flights for which lanes pay
 _LONGEST, _SHORTEST = 2000, 8  # ticks of a block
@@ -27,9 +27,12 @@ _ENTRIES: dict[type, Callable[..., tuple[int, int]]] = {}  # machine code, by th
 
 
 def suits(flight: SweptFlight) -> bool:
-    """Whether a flight can be flown in lanes: nothing gets lost by chance."""
-    fate = flight.world.fate
-    return bool((fate[:, LOSS] == 0.0).all() and (fate[:, OUTAGE_CHANCE] == 0.0).all())
+    """Whether a flight can be flown in lanes: no reading is lost by chance, or late by a time of its own,
+    and the cable has no links."""
+    gnss = unpack(WorldModel, flight.world.model, 0).gnss
+    by_chance = flight.world.fate[:, [LOSS, OUTAGE_CHANCE, JITTER]]
+    alike = not by_chance.any() and gnss.float_chance == 0.0 and gnss.lost_chance == 0.0
+    return alike and flight.chain is None
 
 
 class Group:

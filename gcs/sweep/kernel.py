@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, fly_tick, row_at, vector_at
-from autopilot.estimation.records import EstimatorState
+from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, Seen, fly_tick, row_at, vector_at
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.supervisor.quiescence import Stretch
-from gcs.sweep.wire import Wire, deliver, wire_forces
+from gcs.sweep.wire import Wire, deliver, put_forces
+from sitl.plant.chain.records import ChainRows
+from sitl.plant.rotors import ASKED, FORCE
 from sitl.world import Floats, World, WorldModel, WorldRows, world_tick
 
 
@@ -48,9 +49,12 @@ def count(figures: Row, world: WorldRows, core: CoreRows, target: Vec3, asked: V
     the autopilot does."""
     f = unpack(Figures, figures, 0)
     plant, pilot = unpack(World, world.world, 0).plant, unpack(Pilot, core.pilot, 0)
-    estimator = unpack(EstimatorState, core.estimator, 0)
+    believed = unpack(Seen, core.seen, 0).state
     error = norm(sub(plant.x_load, asked))
-    force = plant.rotor_force
+    least, greatest = f.rotor_min, f.rotor_max
+    for i in range(world.rotor_table.shape[0]):
+        force = world.rotors[FORCE, i]
+        least, greatest = min(least, force), max(greatest, force)
     after = Figures(
         max(f.error_max, error),
         f.error_square + error * error,
@@ -62,15 +66,15 @@ def count(figures: Row, world: WorldRows, core: CoreRows, target: Vec3, asked: V
         f.ticks + 1.0,
         min(f.tension_min, plant.tension),
         max(f.tension_max, plant.tension),
-        max(f.estimator_error_max, norm(sub(plant.x_load, estimator.load.x_load))),
-        min(f.rotor_min, force[0], force[1], force[2], force[3]),
-        max(f.rotor_max, force[0], force[1], force[2], force[3]),
+        max(f.estimator_error_max, norm(sub(plant.x_load, believed.x_load))),
+        least,
+        greatest,
     )
     pack(after, figures, 0)
 
 
 @kernel
-def _trace(trace: Floats, world: World) -> None:
+def _trace(trace: Floats, world: World, rotors: Floats, count: int) -> None:
     if world.tick < trace.shape[0]:
         row, plant = trace[world.tick], world.plant
         for i in range(3):
@@ -78,7 +82,8 @@ def _trace(trace: Floats, world: World) -> None:
             row[3 + i] = plant.x_quad[i]
         for i in range(4):
             row[6 + i] = plant.quat_wxyz[i]
-            row[10 + i] = plant.rotor_force[i]
+        for i in range(min(count, row.shape[0] - 10)):
+            row[10 + i] = rotors[FORCE, i]
 
 
 @kernel
@@ -95,23 +100,24 @@ def fly_stretch(
     gripper_open: bool,
     reel_rate: float,
     stop_tick: int,
+    chain: ChainRows | None,
 ) -> bool:
     """Fly until the supervisor is to be asked (True) or the tick `stop_tick` is over (False).
 
     `begun`: the present tick is over; `decided`: but for the law's part, as the supervisor was to be asked.
     `asked` (ticks, 21) is where the mission asks the load to be, from the
     first tick of the core's stretch on; without rows no figures are taken. `trace` (ticks, 14) receives the
-    true state, as long as it lasts.
+    true state, as long as it lasts. `chain` is the memory of a cable of links, if it is one.
     """
     link = unpack(Wire, wire, 0)
     tick_us = unpack(WorldModel, world.model, 0).tick_us
     while True:
         if begun and not decided:
-            forces = unpack(Pilot, core.pilot, 0).mixed.forces
-            world_tick(world, wire_forces(forces), gripper_open, reel_rate)
+            put_forces(core.rotors, core.table, world)
+            world_tick(world, world.rotors[ASKED], gripper_open, reel_rate, chain)
         begun = True
         now = unpack(World, world.world, 0)
-        _trace(trace, now)
+        _trace(trace, now, world.rotors, world.rotor_table.shape[0])
         readings = 0 if decided else deliver(world, now.now_us, link, core.inbox)
         dt = 0.0 if now.tick == 0 else tick_us * 1e-6
         came = fly_tick(core, law_rows, readings, now.now_us, now.tick, dt, decided)

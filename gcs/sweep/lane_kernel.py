@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, fly_tick, row_at, vector_at
+from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, fly_tick, row_at, vector_at
 from autopilot.estimation.records import History
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
@@ -12,7 +12,8 @@ from autopilot.geometry.lanes import in_lanes, parted
 from autopilot.geometry.packed import Row, unpack, with_field
 from autopilot.supervisor.quiescence import Stretch
 from gcs.sweep.kernel import count
-from gcs.sweep.wire import Wire, deliver, wire_forces
+from gcs.sweep.wire import Wire, deliver, put_forces
+from sitl.plant.rotors import ASKED
 from sitl.world import World, WorldModel, WorldRows, world_tick
 
 
@@ -29,6 +30,8 @@ def world_in_lanes(rows: WorldRows) -> WorldRows:
         in_lanes(rows.queue),
         in_lanes(rows.commands),
         rows.command_ring,
+        in_lanes(rows.rotors),
+        rows.rotor_table,
     )
 
 
@@ -58,6 +61,8 @@ def core_in_lanes(rows: CoreRows) -> CoreRows:
         in_lanes(rows.stretch),
         rows.targets,
         rows.references,
+        in_lanes(rows.rotors),
+        rows.table,
     )
 
 
@@ -84,8 +89,8 @@ def fly_lanes(
     tick_us = unpack(WorldModel, world.model, 0).tick_us
     parted()
     for done in range(ticks):
-        forces = unpack(Pilot, core.pilot, 0).mixed.forces
-        world_tick(world, wire_forces(forces), False, 0.0)
+        put_forces(core.rotors, core.table, world)
+        world_tick(world, world.rotors[ASKED], False, 0.0)
         now = unpack(World, world.world, 0)
         readings = deliver(world, now.now_us, link, core.inbox)
         came = fly_tick(core, law_rows, readings, now.now_us, now.tick, tick_us * 1e-6, False)

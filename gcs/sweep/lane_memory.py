@@ -24,8 +24,8 @@ from gcs.sweep.flight import SweptFlight
 from sitl.world import Floats, WorldRows
 
 # of each flight; `inbox` last, of which only the first row is told on
-_WORLD = ("world", "seed", "errors", "queue", "commands")
-_CORE = ("estimator", "pilot", "seen", "commands", "stretch")
+_WORLD = ("world", "seed", "errors", "queue", "commands", "rotors")
+_CORE = ("estimator", "pilot", "seen", "commands", "stretch", "rotors")
 _HISTORY = ("covariance", "consistency")
 _SCRATCH = ("error", "shares", "gain", "scalars")
 _SHARED = ("clock", "command_ring")  # of the world: whole numbers, the same for all
@@ -122,7 +122,8 @@ class LaneMemory:
             name: tuple(getattr(flight.core.rows, name) for flight in flights)
             for name in ("targets", "references")
         }
-        theirs["winch"] = flights[0].core.rows.winch
+        for name in ("winch", "constants", "table"):
+            theirs[name] = getattr(flights[0].core.rows, name)
         self.core = self.core._replace(**theirs)
         self.asked = tuple(flight.asked for flight in flights)
 
@@ -150,6 +151,8 @@ class LaneMemory:
             len(flight.asked) > 0,
             self._own[member, self._shared].tobytes(),
             flight.core.rows.winch.tobytes(),
+            flight.core.rows.constants.tobytes(),
+            flight.core.rows.table.tobytes(),
         )
 
     def stop_us(self, member: int) -> int:
@@ -175,6 +178,5 @@ def _move(flight: SweptFlight, moved: dict[str, NDArray[Any]]) -> None:
     history = core.rows.history._replace(**_named("history.", moved))
     core.rows = core.rows._replace(history=history, **_named("core.", moved))
     core.law_rows = core.law_rows._replace(memory=moved["law"])
-    core.locate_forces()
     flight.world = flight.world._replace(**_named("world.", moved), **_named("shared.", moved))
     flight.figures = moved["figures"]

@@ -23,7 +23,7 @@ from autopilot.control.records import Cable, Reference, State, Vehicle
 from autopilot.core.flight_core import Setup
 from autopilot.geometry.linear import E1, ZERO, Vec3
 from autopilot.onboard.onboard import build_setup
-from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from gcs.analysis.axes import Floats
 from gcs.sweep.plan import SweepPlan, simulated
@@ -163,7 +163,7 @@ def moduli(vehicle: str, settings: Mapping[str, float]) -> list[float]:
     """Moduli of the eigenvalues of hovering, sorted, under settings by name."""
     import control
 
-    table = autopilot_parameters(load_vehicle(vehicle))
+    table = autopilot_parameters(load_belief(vehicle))
     apply_settings(table, settings.items())
     truth = load_truth(vehicle)
     sim_table = sim_parameters(truth)
@@ -190,8 +190,13 @@ def linear_range(
     plan: SweepPlan, law: str, name: str, nominal_value: float, limits: tuple[float, float]
 ) -> str:
     """How far the parameter may go from its value as delivered, at most to `limits`; empty if the linear loop
-    does not know it. Everything else is as delivered or set for all flights."""
-    fixed = {**dict(plan.settings), "CTL_LAW": float(LAWS.index(law))}
+    does not know it, or the law is somebody's own. Everything else is as delivered or set for all flights."""
+    # of an estimator or a planner of somebody's own
+    brought = {parameter.name for one in plan.own(law).loaded() for parameter in one.parameters}
+    if law not in LAWS or name in brought:
+        return ""
+    fixed = {known: value for known, value in plan.settings if known not in brought}
+    fixed["CTL_LAW"] = float(LAWS.index(law))
 
     def holds(value: float) -> bool:
         return moduli(plan.vehicle, {**fixed, name: value})[-1] < LOST

@@ -13,11 +13,18 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any
 
-from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.parameters import LAWS, autopilot_parameters
-from autopilot.wire.parameter_table import ParameterError
+from autopilot.own.chosen import NOTHING_OWN, Own, parameters_for
+from autopilot.own.law import law_number, name_of, own_law
+from autopilot.own.source import OwnError
+from autopilot.own.trial import try_all
+from autopilot.shell.watched_calls import watched_calls
+from autopilot.vehicle.file import load_belief
+from autopilot.vehicle.parameters import apply_settings
+from autopilot.vehicle.rates import RateError, control_divider
+from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
+from gcs.parameter_names import unknown_parameter
 from missions.fileformat import load_mission
 from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
@@ -72,6 +79,12 @@ class SweepPlan:
     varied: tuple[Varied, ...]
     settings: tuple[tuple[str, float], ...]  # the same for all flights
     sample: int = 0
+    estimator: str = ""  # that somebody has brought, of all flights
+    planner: str = ""
+
+    def own(self, law: str) -> Own:
+        """What of a flight with this law somebody has brought."""
+        return Own(own_law(law), self.estimator, self.planner)
 
     @property
     def points(self) -> int:
@@ -104,8 +117,9 @@ class SweepPlan:
     def conditions(self, case: Case) -> Conditions:
         """What the flight is flown under."""
         varied = {v.name: value for v, value in zip(self.varied, case.varied, strict=True)}
-        law = {"CTL_LAW": float(LAWS.index(case.law))}
-        return Conditions(self.vehicle, self.sensors, case.seed, {**dict(self.settings), **varied, **law})
+        law = {"CTL_LAW": float(law_number(case.law))}
+        settings = {**dict(self.settings), **varied, **law}
+        return Conditions(self.vehicle, self.sensors, case.seed, settings, self.own(case.law))
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -123,6 +137,8 @@ def from_json(values: Mapping[str, Any]) -> SweepPlan:
         varied=tuple(Varied(v["name"], tuple(v["values"]), bool(v["continuous"])) for v in values["varied"]),
         settings=tuple((name, float(value)) for name, value in values["settings"]),
         sample=int(values["sample"]),
+        estimator=values["estimator"],
+        planner=values["planner"],
     )
 
 
@@ -180,8 +196,10 @@ def make_plan(
     varied: Sequence[Varied],
     settings: Mapping[str, float],
     sample: int,
+    own: Own = NOTHING_OWN,
 ) -> SweepPlan:
-    """The plan, or PlanError with what is wrong with it."""
+    """The plan, or PlanError with what is wrong with it. Of `own` estimator and planner are those of all
+    flights."""
     names = [v.name for v in varied]
     for name in names:
         if names.count(name) > 1:
@@ -190,7 +208,13 @@ def make_plan(
             raise PlanError(f"{name} is both varied and set; leave one of the two out")
     if sample and not varied:
         raise PlanError("--sample draws the values of --vary, and there is none")
-    _check_values(vehicle, [*((v.name, value) for v in varied for value in v.values), *settings.items()])
+    values = [*((v.name, value) for v in varied for value in v.values), *settings.items()]
+    _check_laws(laws)
+    for law in laws:
+        brought = own._replace(law=own_law(law))
+        _check_values(vehicle, brought, values, settings)
+        if any(brought):
+            _try(vehicle, brought, settings)
     try:
         load_mission(mission)
         load_profile(sensors)
@@ -205,16 +229,43 @@ def make_plan(
         tuple(varied),
         tuple(sorted(settings.items())),
         sample,
+        own.estimator,
+        own.planner,
     )
     if plan.flights > MOST_FLIGHTS:
         raise PlanError(f"{plan.flights} flights are too many, {MOST_FLIGHTS} at most; --sample takes a few")
     return plan
 
 
-def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
+def _check_laws(laws: Sequence[str]) -> None:
+    """PlanError if two laws could not be told apart in a table."""
+    try:
+        names = {law: name_of(law) for law in laws}
+    except OwnError as error:
+        raise PlanError(f"--law {error}") from None
+    for law, name in names.items():
+        if list(names.values()).count(name) > 1:
+            raise PlanError(f"--law {law}: another law has the name {name}, too; give it `name = ...`")
+
+
+def _try(vehicle: str, own: Own, settings: Mapping[str, float]) -> None:
+    """PlanError if what somebody has brought fails before it flies."""
+    table = parameters_for(load_belief(vehicle), own)
+    apply_settings(table, settings.items())
+    try:
+        with watched_calls():
+            try_all(own, table.values())
+    except OwnError as error:
+        raise PlanError(str(error)) from None
+
+
+def _check_values(
+    vehicle: str, own: Own, values: Sequence[tuple[str, float]], settings: Mapping[str, float]
+) -> None:
+    """PlanError unless all these values, of which `settings` do not vary, can be set."""
     try:
         world = sim_parameters(load_truth(vehicle))
-        table = autopilot_parameters(load_vehicle(vehicle))
+        table = parameters_for(load_belief(vehicle), own)
     except ValueError as error:
         raise PlanError(str(error)) from None
     for name, value in values:
@@ -224,10 +275,25 @@ def _check_values(vehicle: str, values: Sequence[tuple[str, float]]) -> None:
             )
         if name == "CTL_LAW":
             raise PlanError("CTL_LAW is what --law says; give --law instead")
+        option = "--set" if name in settings else "--vary"
         holder = world if name.startswith("SIM_") and name not in table else table
+        if name not in holder:
+            raise PlanError(f"{option} {unknown_parameter(name, [*table.names, *world.names])}")
         try:
             holder.set(name, value)
             if name == "SIM_RATE_HZ":
                 settings_of(world)
         except ParameterError as error:
+            raise PlanError(f"{option} {error}") from None
+    _check_rates(world, table, values)
+
+
+def _check_rates(world: ParameterTable, table: ParameterTable, values: Sequence[tuple[str, float]]) -> None:
+    """PlanError if the law cannot run at one of its rates with one of the sensors'."""
+    ticks, jobs = ([value for name, value in values if name == one] for one in ("SIM_RATE_HZ", "CTL_RATE_HZ"))
+    for tick_hz, job_hz in product(ticks or [world["SIM_RATE_HZ"]], jobs or [table["CTL_RATE_HZ"]]):
+        table.set("CTL_RATE_HZ", job_hz)
+        try:
+            control_divider(tick_hz, table)
+        except RateError as error:
             raise PlanError(str(error)) from None

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gcs.batch.reuse import Origin, file_digests, origin_of
+from gcs.folders import make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
 
 PLAN_FILE = "plan.json"
@@ -16,11 +17,15 @@ ENTRIES = ("gcs.sweep.work",)  # of the code that flies a sweep
 def sweep_origin(plan: SweepPlan) -> Origin:
     """What the flights of a plan follow from when they are flown now."""
     files = file_digests((plan.mission, plan.vehicle, plan.sensors))
+    for law in plan.laws:
+        files |= {one.reference: one.digest for one in plan.own(law).loaded()}
     return origin_of({"plan": plan.to_json(), "files": files}, ENTRIES)
 
 
 def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -> None:
-    """Write plan.json; PlanError if the directory holds flights of another origin."""
+    """Write plan.json; PlanError if the directory holds flights of another origin, GcsError if nothing can be
+    written into it."""
+    make_folder(directory, f"--out {directory}")
     path = directory / PLAN_FILE
     if path.exists():
         found = _read(directory)
@@ -32,7 +37,6 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
                 " --fresh to discard its flights"
             )
         return
-    directory.mkdir(parents=True, exist_ok=True)
     fields = {"command": command, "flights": plan.flights, "origin": origin.to_json()}
     path.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
 

@@ -9,8 +9,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.own.chosen import parameters_for
+from autopilot.vehicle.file import load_belief
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.analysis.axes import Floats
 from gcs.sweep.margin import linear_range
@@ -88,6 +88,7 @@ def _map(flights: Flights, plan: SweepPlan, names: tuple[str, ...], units: dict[
     rows = found.shown.ravel().tolist()
     return {
         "law": flights.law,
+        "reference": flights.reference,
         "names": names,
         "units": [units[name] for name in names],
         "axes": [axis.tolist() for axis in found.axes],
@@ -133,7 +134,7 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
                     "every": _range(found.all_from, found.all_to),
                     "some": _range(found.some_from, found.some_to),
                     "flown": _range(float(values.min()), float(values.max())),
-                    "linear": linear_range(plan, flights.law, varied.name, nominal, limits),
+                    "linear": linear_range(plan, flights.reference, varied.name, nominal, limits),
                 }
             )
     return rows
@@ -160,7 +161,10 @@ def _law(flights: Flights) -> dict[str, Any]:
 
 
 def _tables(plan: SweepPlan) -> tuple[ParameterTable, ...]:
-    return (sim_parameters(load_truth(plan.vehicle)), autopilot_parameters(load_vehicle(plan.vehicle)))
+    """Of the simulator, and of the autopilot with each law."""
+    belief = load_belief(plan.vehicle)
+    tables = (parameters_for(belief, own) for own in dict.fromkeys(map(plan.own, plan.laws)))
+    return (sim_parameters(load_truth(plan.vehicle)), *tables)
 
 
 def _parameter(tables: tuple[ParameterTable, ...], name: str) -> Parameter:

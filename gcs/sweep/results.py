@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.own.law import name_of
 from gcs.analysis.axes import Floats
 from gcs.sweep.plan import SweepPlan
 
@@ -32,6 +33,7 @@ class Flights:
     lost_phase: tuple[str, ...]
     index: NDArray[np.int64]  # (n,) of the sweep
     seed: NDArray[np.int64]  # (n,)
+    reference: str  # of the law, as it was named
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,8 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     error = table.column("load_error_max_m").to_numpy()
     index, seed = (table.column(column).to_numpy() for column in ("index", "seed"))
     found = []
-    for name in plan.laws:
+    for reference in plan.laws:
+        name = name_of(reference)
         rows = law == name
         found.append(
             Flights(
@@ -82,6 +85,7 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
                 tuple(phase[rows].tolist()),
                 index[rows],
                 seed[rows],
+                reference,
             )
         )
     return found
@@ -140,7 +144,7 @@ def reach(flights: Flights, plan: SweepPlan, name: str, nominal: float) -> Reach
     """
     centres = levels(plan, name)
     names = [varied.name for varied in plan.varied]
-    planned = np.array([case.varied for case in plan.cases() if case.law == flights.law])
+    planned = np.array([case.varied for case in plan.cases() if case.law == flights.reference])
     flown = np.stack([flights.values[other] for other in names], axis=1)[flights.completed]
     asked, good = (_settings(rows, names.index(name), centres) for rows in (planned, flown))
     every = np.array([bool(a) and a == g for a, g in zip(asked, good, strict=True)])

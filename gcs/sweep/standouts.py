@@ -12,6 +12,7 @@ import numpy as np
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.results import Flights, flights_of
 from gcs.sweep.store import Store
+from gcs.workflows.flight_options import own_words
 
 FOLDER = "flights"  # of a sweep's directory: flown again, each with a report
 
@@ -21,6 +22,7 @@ class Standout:
     """A flight that somebody wants to see."""
 
     law: str
+    reference: str  # of the law, as it was named
     kind: str  # worst, median or lost
     index: int  # of the sweep
     seed: int
@@ -66,6 +68,7 @@ def stored_standouts(directory: Path, plan: SweepPlan) -> list[Standout]:
 def _standout(flights: Flights, kind: str, row: int) -> Standout:
     return Standout(
         law=flights.law,
+        reference=flights.reference,
         kind=kind,
         index=int(flights.index[row]),
         seed=int(flights.seed[row]),
@@ -83,6 +86,7 @@ def flight_settings(plan: SweepPlan, varied: Mapping[str, float]) -> tuple[str, 
 def base_command(plan: SweepPlan) -> str:
     """What the commands of all flights begin with; law, seed and what is varied follow."""
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
+    words += own_words(plan.estimator, plan.planner)
     for setting in flight_settings(plan, {}):
         words += ["--set", setting]
     return shlex.join(words)
@@ -90,7 +94,7 @@ def base_command(plan: SweepPlan) -> str:
 
 def command_of(plan: SweepPlan, flight: Standout, directory: Path) -> str:
     """The command that flies it again into the directory of the sweep."""
-    words = ["--law", flight.law, "--seed", str(flight.seed)]
+    words = ["--law", flight.reference, "--seed", str(flight.seed)]
     for name, value in flight.varied.items():
         words += ["--set", f"{name}={value!r}"]
     out = shlex.join(["--out", str(directory / FOLDER / flight.name)])

@@ -13,6 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from autopilot.own.law import name_of
 from gcs.sweep.flight import Flown
 from gcs.sweep.plan import Case, SweepPlan
 
@@ -51,7 +52,14 @@ def row_of(plan: SweepPlan, case: Case, flown: Flown, wall_s: float) -> Row:
     """The row of a flight."""
     figures = {f.name: getattr(flown, f.name) for f in fields(Flown) if f.name != "texts"}
     varied = {v.name: value for v, value in zip(plan.varied, case.varied, strict=True)}
-    return {"index": case.index, "law": case.law, "seed": case.seed, **varied, **figures, "wall_s": wall_s}
+    return {
+        "index": case.index,
+        "law": name_of(case.law),
+        "seed": case.seed,
+        **varied,
+        **figures,
+        "wall_s": wall_s,
+    }
 
 
 class Store:

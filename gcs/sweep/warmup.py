@@ -6,7 +6,14 @@ import sys
 from collections.abc import Sequence
 
 from autopilot.geometry.machine_code import ROOT
-from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts, name_what_is_compiled
+from autopilot.shell.compiling import (
+    OWN,
+    SIMULATOR,
+    Part,
+    autopilot_parts,
+    compiled_for,
+    name_what_is_compiled,
+)
 
 _MODULE = "gcs.sweep.warmup"
 
@@ -16,7 +23,7 @@ def sweep_parts(laws: Sequence[str]) -> list[Part]:
     source = ROOT / "gcs" / "sweep" / "flight.py"
     alone = [
         Part(f"the sweep's {law} flight", _MODULE, ("alone", law), source, f"alone-{law}", 25.0)
-        for law in laws
+        for law in compiled_for(laws)
     ]
     return [*autopilot_parts(*laws), SIMULATOR, *alone]
 
@@ -31,14 +38,17 @@ def main(part: str, law: str) -> None:
     """Compile it, or find it compiled; prints the names of the kernels that it compiles."""
     name_what_is_compiled()
     # only now: the import itself compiles the first ones
-    from autopilot.vehicle.parameters import LAWS
+    from autopilot.own.chosen import Own
+    from autopilot.own.law import law_number, own_law
+    from autopilot.own.rehearsal import REFERENCE
     from gcs.closed_loop import Conditions
     from gcs.sweep.cell import cell_of
     from gcs.sweep.flight import Boarding, SweptFlight
     from gcs.sweep.group import FEWEST, Group
     from missions.fileformat import load_mission
 
-    conditions = Conditions(settings={"CTL_LAW": float(LAWS.index(law))})
+    named = REFERENCE if law == OWN else law
+    conditions = Conditions(settings={"CTL_LAW": float(law_number(named))}, own=Own(own_law(named)))
     cell = cell_of(load_mission("hover"), conditions)
     flights = [SweptFlight(cell, seed, Boarding(0, 0)) for seed in range(FEWEST)]
     if part == "lanes":

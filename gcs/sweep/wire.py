@@ -11,18 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from autopilot.control.actuators.mixer import FORCE
 from autopilot.estimation import inbox as box
 from autopilot.estimation.records import Array, DirectionReading, GnssReading, LoadReading, PoseReading
 from autopilot.geometry.frames import quat_enu_flu_from_ned_frd, quat_ned_frd_from_enu_flu
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import single
+from autopilot.geometry.lanes import if_above, single
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack
 from autopilot.wire.convert import Home
 from autopilot.wire.convert.geodesy import EARTH_RADIUS_M
 from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.convert.simulator import REEL_MAX, ROTOR_FMAX
-from sitl.plant.records import Rotors
+from sitl.messages import SPEEDS_US, rotor_speed
+from sitl.plant.rotors import ASKED
+from sitl.sensors.gnss import FIXED, LOST
 from sitl.sensors.profile import Profile, stated_of
 from sitl.world import BARO, CABLE, GNSS, IMU, LOAD, MAG, MOCAP, READING, SHOWS, WorldRows, arrived
 
@@ -38,6 +41,7 @@ class Wire(NamedTuple):
     direction_std: float
     fix_horizontal_std: float
     fix_vertical_std: float
+    fix_float_std: float
     rtk: float  # 1.0: fixes with carrier phase
     home: Vec3  # degrees north and east, m
     metres_per_degree: float
@@ -51,14 +55,12 @@ def _single3(row: Row, first: int) -> Vec3:
 
 
 @kernel
-def wire_forces(forces: Rotors) -> Rotors:
-    """Rotor forces (N) as HIL_ACTUATOR_CONTROLS carries them."""
-    return (
-        single(forces[0] / ROTOR_FMAX) * ROTOR_FMAX,
-        single(forces[1] / ROTOR_FMAX) * ROTOR_FMAX,
-        single(forces[2] / ROTOR_FMAX) * ROTOR_FMAX,
-        single(forces[3] / ROTOR_FMAX) * ROTOR_FMAX,
-    )
+def put_forces(rotors: Array, table: Array, world: WorldRows) -> None:
+    """Put the forces of the rotors (N) where the world takes them, as HIL_ACTUATOR_CONTROLS carries them;
+    `rotors` and `table` are the mixer's."""
+    asked = world.rotors
+    for i in range(min(table.shape[0] - 1, world.rotor_table.shape[0])):
+        asked[ASKED, i] = single(rotors[FORCE, i] / ROTOR_FMAX) * ROTOR_FMAX
 
 
 def wire_rate(rate: float) -> float:
@@ -107,7 +109,10 @@ def _fix(row: Row, wire: Wire) -> GnssReading:
         np.rint(row[READING + 4] * 100.0) * 0.01,
         -(np.rint(-row[READING + 5] * 100.0) * 0.01),
     )
-    return GnssReading(0.0, position, velocity, wire.fix_horizontal_std, wire.fix_vertical_std, wire.rtk)
+    quality = row[READING + 6]
+    horizontal = if_above(quality, FIXED, wire.fix_float_std, wire.fix_horizontal_std)
+    vertical = if_above(quality, FIXED, wire.fix_float_std, wire.fix_vertical_std)
+    return GnssReading(0.0, position, velocity, horizontal, vertical, wire.rtk)
 
 
 @kernel
@@ -158,7 +163,7 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
             count += 1
         at = arrived(CABLE, now_us, rows)
     newest = _newest(GNSS, now_us, rows)
-    if newest >= 0:
+    if newest >= 0 and rows.queue[GNSS, newest, READING + 6] < LOST:
         inbox[count, box.KIND], inbox[count, box.SHOWS] = box.FIX, rows.queue[GNSS, newest, SHOWS]
         pack(_fix(rows.queue[GNSS, newest], wire), inbox[count], box.READING)
         count += 1
@@ -174,12 +179,19 @@ def deliver(rows: WorldRows, now_us: int, wire: Wire, inbox: Array) -> int:
         for i in range(3):
             inbox[count, box.READING + i] = single(rows.queue[MAG, newest, READING + i])
         count += 1
+    if now_us % SPEEDS_US == 0:
+        for first in range(0, rows.rotor_table.shape[0], 4):
+            inbox[count, box.KIND] = box.SPEEDS
+            inbox[count, box.READING] = first
+            for i in range(4):
+                inbox[count, box.READING + 1 + i] = rotor_speed(rows, first + i)
+            count += 1
     return count
 
 
 def most_readings(rows: WorldRows) -> int:
     """Readings that can arrive at one tick."""
-    return int(rows.queue.shape[0] * rows.queue.shape[1])
+    return int(rows.queue.shape[0] * rows.queue.shape[1]) + len(rows.rotor_table)
 
 
 def wire_of(profile: Profile, noise_scale: float, home: Home) -> Wire:
@@ -204,6 +216,7 @@ def wire_of(profile: Profile, noise_scale: float, home: Home) -> Wire:
         float(np.float32(stated.direction)),
         saturated(stated.gnss_horizontal * 100.0, 0, 0xFFFE) * 0.01,
         saturated(stated.gnss_vertical * 100.0, 0, 0xFFFE) * 0.01,
+        saturated(stated.gnss_float * 100.0, 0, 0xFFFE) * 0.01,
         1.0 if profile.gnss is not None and profile.gnss.fix == "rtk" else 0.0,
         (home.latitude_deg, home.longitude_deg, home.altitude_m),
         metres,

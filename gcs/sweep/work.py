@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 from autopilot.geometry.lane_numbers import LANES
+from autopilot.own.law import name_of
 from autopilot.shell.compiling import Part
+from autopilot.shell.watched_calls import watched_calls
 from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
 from gcs.sweep.flight import Boarding, Flown, SweptFlight, boarding, fly
@@ -44,14 +46,15 @@ def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None]) -> Work:
     warm(sweep_parts(plan.laws))
     mission = load_mission(plan.mission)
     cases = {law: Case(0, law, plan.seeds[0], ()) for law in plan.laws}
-    bare = SweepPlan(plan.mission, plan.vehicle, plan.sensors, plan.laws, plan.seeds, (), plan.settings)
+    bare = replace(plan, varied=(), sample=0)
     boardings, in_lanes = {}, set()
     for law, case in cases.items():
         conditions = bare.conditions(case)
         try:
-            boardings[law] = boarding(mission, conditions)
+            with watched_calls():
+                boardings[law] = boarding(mission, conditions)
         except ValueError as error:
-            raise PlanError(f"law {law}: {error}") from None
+            raise PlanError(f"law {name_of(law)}: {error}") from None
         one = SweptFlight(cell_of(mission, conditions), case.seed, boardings[law])
         if _lanes_pay(plan, law) and suits(one):
             warm([lanes_part(law)])
@@ -62,7 +65,7 @@ def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None]) -> Work:
 def _lanes_pay(plan: SweepPlan, law: str) -> bool:
     """Whether there are flights that differ by their seeds alone, and enough of them to compile for, if that
     is not done yet."""
-    compiled = hasattr(lane_kernel.fly_lanes, "overloads")
+    compiled = hasattr(lane_kernel.fly_lanes, "overloads") and not any(plan.own(law))
     enough = plan.points * len(plan.seeds) >= LANES_PAY
     return compiled and len(plan.seeds) >= FEWEST and (enough or lanes_part(law).ready)
 
@@ -72,6 +75,10 @@ def fly_cases(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row]:
     rows: list[Row] = []
     for (law, _), cell in groupby(cases, key=lambda case: (case.law, case.varied)):
         members = list(cell)
+        if any(work.plan.own(law)):
+            with watched_calls():
+                rows += [_fly_one(work, case, clock) for case in members]
+            continue
         for first in range(0, len(members), LANES):
             some = members[first : first + LANES]
             at_once = law in work.in_lanes and len(some) >= FEWEST

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from autopilot.vehicle.layout import MOST
 from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
@@ -17,7 +18,7 @@ from gcs.clients import command
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterSet
 from gcs.clients.vehicle_view import FLOWN_MODES
-from gcs.view.controls import NAMES, ROTORS
+from gcs.view.controls import NAMES
 from gcs.view.vehicle import WatchedVehicle
 
 Arguments = Mapping[str, Any]
@@ -111,8 +112,8 @@ def _push(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
 
 
 def _fail(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
-    """Stop `rotor` (1 ... 4), or let it run again."""
-    rotor = _number(arguments, "rotor", 1, ROTORS)
+    """Stop `rotor` (counted from 1), or let it run again."""
+    rotor = _number(arguments, "rotor", 1, MOST)
     failure = _OFF if arguments.get("failed") is True else _OK
     parameters = (_MOTOR, failure, float(round(rotor)))
     name = f"rotor {round(rotor)} {'off' if failure == _OFF else 'on'}"

@@ -32,7 +32,6 @@ SLIDERS = (
     Slider("SIM_NOISE_SCALE", "Noise of the sensors", "times", 0.0, 10.0, 0.5, 1.0),
     Slider("SIM_LOSS_PCT", "Losses of the ground link", "%", 0.0, 60.0, 5.0, 0.0),
 )
-ROTORS = 4
 NAMES = {slider.name for slider in SLIDERS}
 # what the page shows or draws besides
 READ = ("VEH_ARM_LEN", "VEH_CABLE_LEN", "SIM_ENGINE_FAIL", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST")

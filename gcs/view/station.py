@@ -39,6 +39,7 @@ FAST_MESSAGES = (
 )
 MOST_REQUESTS = 32  # that wait; a page that asks for more is told no
 _REASON_US = 300_000  # a refusal is explained by a STATUSTEXT that may come a little later
+_ASK_AGAIN_US = 2_000_000
 _TEXTS = 60  # kept for pages that open later
 
 
@@ -75,6 +76,8 @@ class Station:
         self._tasks: dict[int, deque[_Task]] = {}
         self._news: list[dict[str, Any]] = []
         self._texts: deque[dict[str, Any]] = deque(maxlen=_TEXTS)
+        self._unknown_run = False  # a world was heard in which no vehicle says it flies
+        self._next_ask_us = 0
 
     # ---- what comes in
 
@@ -96,13 +99,19 @@ class Station:
                     self._fetch_plans(vehicle, ids)
         return heard
 
-    def receive_truth(self, datagram: bytes) -> None:
-        """Take a datagram of the simulated world in; whose it is can be told only where one vehicle is."""
-        if len(self.vehicles) != 1:
-            return
-        (vehicle,) = self.vehicles.values()
-        for one in messages(datagram)[0]:
-            vehicle.truth.put(one)
+    def receive_truth(self, datagram: bytes, run: int | None = None, alone: bool = True) -> None:
+        """Take a datagram of a simulated world in: that of the vehicle that says it flies in this run of it.
+
+        `alone`: no other world tells its truth; then it is that of the only vehicle, if this does not say.
+        """
+        for vehicle in self.vehicles.values():
+            boot = vehicle.view.latest.get("SIM_BOOT")
+            unsaid = boot is None and alone and len(self.vehicles) == 1
+            if unsaid or (boot is not None and boot.boot_id == run):
+                for one in messages(datagram)[0]:
+                    vehicle.truth.put(one)
+                return
+        self._unknown_run = True
 
     def ask(self, page: Any, request: Any) -> None:
         """Begin what a page asks for; what becomes of it is told by `news`."""
@@ -131,6 +140,11 @@ class Station:
 
     def poll(self, now_us: int) -> Iterator[Outgoing]:
         """The datagrams to send now."""
+        if self._unknown_run and self._speaks and now_us >= self._next_ask_us:
+            # one of them may have begun anew with its simulator
+            self._unknown_run, self._next_ask_us = False, now_us + _ASK_AGAIN_US
+            for system, vehicle in self.vehicles.items():
+                self._tasks[system].append(_Task(None, "", [_which_run(vehicle)]))
         for system, vehicle in self.vehicles.items():
             connection = vehicle.connection
             if self._speaks:
@@ -320,7 +334,12 @@ def _first_questions(vehicle: WatchedVehicle) -> list[Operation]:
     home = command.request_message(target, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     names = (*READ, *(slider.name for slider in SLIDERS))
     parameters = [ParameterGet(target, name) for name in names]
-    return [*streams, home, *parameters]
+    return [*streams, home, _which_run(vehicle), *parameters]
+
+
+def _which_run(vehicle: WatchedVehicle) -> Operation:
+    """The question in which run of the simulated world it flies."""
+    return command.request_message(vehicle.target, mavlink.MAVLINK_MSG_ID_SIM_BOOT)
 
 
 _PLANS = (mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY)

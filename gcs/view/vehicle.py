@@ -10,6 +10,7 @@ from typing import Any
 from autopilot.wire.codec import Received
 from autopilot.wire.convert import Home
 from autopilot.wire.convert.axes import ned_from_enu
+from autopilot.wire.convert.flight import rotor_forces
 from autopilot.wire.convert.geodesy import enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_encoding import from_the_wire
@@ -201,7 +202,7 @@ class WatchedVehicle:
         if message is None:
             return None, None
         limited = math.isfinite(message.force_max) and message.force_max > 0.0
-        forces = [force if math.isfinite(force) else 0.0 for force in message.force]
+        forces = [force if math.isfinite(force) else 0.0 for force in rotor_forces(message)]
         full = message.force_max if limited else max(sum(forces), 1e-6)
         shares = [round(force / full, 3) for force in forces]
         return shares, (_rounded(message.force_max, 3) if limited else None)

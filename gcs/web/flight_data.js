@@ -46,6 +46,8 @@
       this._columns = columns;
       this.time = columns.time || new Float64Array(0);
       this._windTimes = values.wind.map((row) => row[0]);
+      this.rotors = [];
+      while (columns[`rotor_${this.rotors.length + 1}`]) this.rotors.push(this.rotors.length + 1);
       this._most = (values.limits_n && values.limits_n[1]) || values.vehicle.rotor_max_n || 1;
     }
 
@@ -131,7 +133,7 @@
         known, index: seen,
         vehicle: position && {
           id: 1, position, attitude,
-          rotors: [1, 2, 3, 4].map((k) => this._between(`rotor_${k}`, seen, 0) / this._most),
+          rotors: this.rotors.map((k) => this._between(`rotor_${k}`, seen, 0) / this._most),
           load: load && { position: load, attached },
           taut: attached && taut,
           asked: this._place("asked", seen, part),
@@ -142,7 +144,7 @@
           swing: attached && taut ? Math.atan2(Math.hypot(cable[0], cable[1]), -cable[2]) * DEGREES : NaN,
           tilt: Math.acos(Math.min(Math.max(1 - 2 * (attitude[1] ** 2 + attitude[2] ** 2), -1), 1)) * DEGREES,
           speed: attached ? norm(["x", "y", "z"].map((axis) => this._between(`velocity_${axis}`, seen, 0))) : this._pace(seen),
-          rotors: Math.max(...[1, 2, 3, 4].map((k) => this._between(`rotor_${k}`, seen, 0))) / this._most,
+          rotors: Math.max(...this.rotors.map((k) => this._between(`rotor_${k}`, seen, 0))) / this._most,
           attached, taut,
         },
       };

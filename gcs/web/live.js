@@ -36,7 +36,7 @@
 
   const TAKE = {
     hello(record) {
-      controls.offer(record.controls, record.rotors);
+      controls.offer(record.controls);
       controls.enable(false);
     },
     session(record) {
@@ -59,9 +59,7 @@
     vehicle(record) {
       const vehicle = vehicleOf(record.id);
       vehicle.record = record;
-      vehicle.layout = {
-        armLength: record.layout.arm, cableLength: record.layout.cable,
-        rotors: Plumbline.plusFrame(record.layout.arm) };
+      vehicle.layout = layoutOf(vehicle);
       if (record.id === page.chosen) choose(record.id);
     },
     history(record) {
@@ -80,6 +78,8 @@
           vehicle.at = now;
         }
         vehicle.state = state;
+        if (vehicle.record && rotorsOf(vehicle) !== vehicle.layout.rotors.length) vehicle.layout = layoutOf(vehicle);
+        if (state.id === page.chosen) controls.offerRotors(rotorsOf(vehicle));
       }
       for (const [id, samples] of Object.entries(record.samples)) addSamples(vehicleOf(Number(id)), samples);
       enable();
@@ -107,6 +107,17 @@
       if (scene && moved(last, sample)) scene.extendTrack(vehicle.id, sample[AT.load], sample[AT.error], sample[AT.asked]);
     }
     if (vehicle.samples.length > MOST_SAMPLES) vehicle.samples.splice(0, MOST_SAMPLES / 4);
+  }
+
+  /** How many rotors a vehicle has, as far as it has told. */
+  function rotorsOf(vehicle) {
+    return vehicle.state && vehicle.state.rotors ? vehicle.state.rotors.length : 4;
+  }
+
+  /** What the scene draws of a vehicle. */
+  function layoutOf(vehicle) {
+    const { arm, cable } = vehicle.record.layout;
+    return { armLength: arm, cableLength: cable, rotors: Plumbline.frameOf(arm, rotorsOf(vehicle)) };
   }
 
   /** Whether the path goes on: a load that stands still adds no points. */
@@ -212,11 +223,12 @@
     };
   }
 
-  let panelsAt = 0, plotsAt = 0;
+  let sceneAt = 0, panelsAt = 0, plotsAt = 0;
   function frame(now) {
     requestAnimationFrame(frame);
     const chosen = page.vehicles.get(page.chosen);
-    if (scene) {
+    if (scene && now - sceneAt >= scene.interval) {
+      sceneAt = now;
       const shown = [];
       for (const vehicle of page.vehicles.values()) {
         if (!vehicle.state || !vehicle.state.position) continue;
@@ -231,6 +243,7 @@
         scene.show({ time: shown[0].time || 0, vehicles: shown, wind });
       }
       scene.render();
+      page.frames += 1;
     }
     if (now - panelsAt > PANELS_MS && chosen && chosen.state) {
       panelsAt = now;
@@ -240,7 +253,6 @@
       plotsAt = now;
       plots.setSamples(chosen.samples);
     }
-    page.frames += 1;
   }
 
   function connect() {

@@ -45,8 +45,8 @@
       }
     }
 
-    /** The sliders and rotors that the server offers. */
-    offer(controls, rotors) {
+    /** The sliders that the server offers. */
+    offer(controls) {
       byId("sliders").replaceChildren();
       this.sliders.clear();
       for (const control of controls) {
@@ -63,9 +63,14 @@
         byId("sliders").append(label);
         this.sliders.set(control.name, { input, show });
       }
+    }
+
+    /** A button for each of so many rotors. */
+    offerRotors(count) {
+      if (this.rotors && this.rotors.length === count) return;
       const box = byId("failures");
       for (const old of box.querySelectorAll("button")) old.remove();
-      this.rotors = Array.from({ length: rotors }, (_, index) => {
+      this.rotors = Array.from({ length: count }, (_, index) => {
         const button = makeButton(String(index + 1), "grave", () => {
           this.ask("fail", { rotor: index + 1, failed: button.getAttribute("aria-pressed") !== "true" });
         });

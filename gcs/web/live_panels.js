@@ -104,7 +104,7 @@
       } else if (!state.armed && this.session.kind === "fly" && this.session.stage) {
         text = this.session.stage;
       } else if (state.phase === "mission" && state.items) {
-        text = `mission, item ${state.item + 1} of ${state.items}`;
+        text = `mission, item ${state.item}`;
       }
       if (state.load && !state.load.attached) text += ", without the load";
       else if (state.armed && state.taut === false) text += ", cable slack";

@@ -17,6 +17,7 @@
   const COLOURS = ["#4ea1ff", "#ffb454", "#54c7ac", "#c792ea", "#ff7a5c", "#8fb8de", "#e0c341", "#93a3b3"];
   const SPANS = [[20, "20 s"], [60, "1 min"], [300, "5 min"], [Infinity, "all"]];
   const HEIGHT = 132;
+  const LEAST = 0.01; // what an axis spans at least: less is noise, in every unit of these signals
 
   function scaled(value, factor) {
     return value === null || value === undefined ? null : value * factor;
@@ -142,6 +143,7 @@
       axes: [
         { ...axis, size: 20, gap: 2, values: (_, ticks) => ticks.map((t) => `${+t.toFixed(2)} s`) },
         { ...axis, size: 42, gap: 3, label: `${signal.label}, ${signal.unit}`, labelSize: 14, labelGap: 0,
+          values: (_, ticks) => ticks.map((v) => String(Number(v.toPrecision(6)))),
           labelFont: "11px system-ui, sans-serif" },
       ],
       series: [{}, { stroke: colour, width: 1.6, points: { show: false }, spanGaps: false }],
@@ -150,7 +152,7 @@
 
   function ranged(low, high) {
     if (low === null || high === null || !Number.isFinite(low)) return [0, 1];
-    const least = Math.min(low, 0), most = Math.max(high, least + 1e-3);
+    const least = Math.min(low, 0), most = Math.max(high, least + LEAST);
     return [low < 0 ? low - 0.08 * (most - low) : least, most + 0.08 * (most - least)];
   }
 

@@ -47,11 +47,11 @@
   }
 
   function rotors(flight, name, title) {
-    const forces = columns(flight, name, ["1", "2", "3", "4"]);
+    const names = flight.rotors.map(String);
+    const forces = columns(flight, name, names);
     if (!forces) return null;
-    const series = lines(["1", "2", "3", "4"], forces, { width: 1.1 });
+    const series = lines(names, forces, { width: 1.1 });
     [1, 2, 0].forEach((colour, i) => { series[i].color = colour; });
-    series[3].color = 3;
     const limits = flight.limits_n || [];
     limits.forEach((limit, i) => series.push({ name: i ? "greatest" : "least", dash: true, color: "faint", quiet: true,
       values: flight.time.map((_, k) => (Number.isFinite(forces[0][k]) ? limit : NaN)) }));

@@ -3,8 +3,7 @@
 "use strict";
 (() => {
   const GROUND_D = 0;
-  // a plus frame as the mixer counts it: rotor 1 behind, 2 right, 3 in front, 4 left
-  const PLUS_FRAME = [[-1, 0, -1], [0, 1, 1], [1, 0, -1], [0, -1, 1]];
+  const PROCESSOR_MS = 100;
   const CLICK_PX = 4; // a pointer that moved further turns the camera and picks nothing
   // x east, y up, z south are the axes of three.js
   const NED_TO_SCENE = new THREE.Matrix4().set(0, 1, 0, 0, 0, 0, -1, 0, -1, 0, 0, 0, 0, 0, 0, 1);
@@ -22,9 +21,11 @@
       this.layout = {
         armLength: arm,
         cableLength: options.cableLength || 0.7,
-        rotors: options.rotors || Plumbline.plusFrame(arm),
+        rotors: options.rotors || Plumbline.frameOf(arm, 4),
       };
       this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+      /** The least time between two pictures of what moves, ms: the flights run on the processor too. */
+      this.interval = drawnByProcessor(this.renderer.getContext()) ? PROCESSOR_MS : 0;
       this.scene = new THREE.Scene();
       this.world = new THREE.Group();
       this.world.quaternion.setFromRotationMatrix(NED_TO_SCENE);
@@ -85,6 +86,10 @@
       for (const vehicle of state.vehicles) {
         told.add(vehicle.id);
         let craft = this.crafts.get(vehicle.id);
+        if (craft && vehicle.layout && craft.layout.rotors.length !== vehicle.layout.rotors.length) {
+          craft.dispose();
+          craft = null;
+        }
         if (!craft) {
           craft = new Plumbline.SceneCraft(this.world, vehicle.layout || this.layout, this.theme);
           this.crafts.set(vehicle.id, craft);
@@ -351,8 +356,14 @@
     }
   }
 
-  /** The rotors of a vehicle whose arms are that long (m). */
-  Plumbline.plusFrame = (arm) => PLUS_FRAME.map(([x, y, spin]) => ({ position: [x * arm, y * arm, 0], spin }));
+  /**
+   * The rotors of a vehicle whose arms are that long (m), counterclockwise from the rear: four in a plus, more with the
+   * gap between two of them ahead.
+   */
+  Plumbline.frameOf = (arm, count) => Array.from({ length: count }, (_, i) => {
+    const angle = Math.PI + ((count === 4 ? 2 * i : 2 * i - 1) * Math.PI) / count;
+    return { position: [arm * Math.cos(angle), -arm * Math.sin(angle), 0], spin: i % 2 ? 1 : -1 };
+  });
 
   function toScene([n, e, d]) {
     return new THREE.Vector3(e, -d, -n);
@@ -372,6 +383,13 @@
   function meet(ray, height) {
     const found = ray.intersectPlane(new THREE.Plane(new THREE.Vector3(0, 1, 0), -height), new THREE.Vector3());
     return found ? toNed(found) : null;
+  }
+
+  /** Whether there is no graphics card, and pictures take the processor's time. */
+  function drawnByProcessor(gl) {
+    const named = gl.getExtension("WEBGL_debug_renderer_info");
+    const renderer = gl.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
+    return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
   }
 
   function makeLegend(parent) {

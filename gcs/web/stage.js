@@ -37,9 +37,13 @@
       this.scene.controls.addEventListener("change", changed);
       new ResizeObserver(changed).observe(canvas);
       Plumbline.Theme.onChange(changed);
-      const frame = () => {
-        if (this._dirty) { this._dirty = false; this.scene.render(); }
+      let drawnAt = 0;
+      const frame = (now) => {
         requestAnimationFrame(frame);
+        if (!this._dirty || now - drawnAt < this.scene.interval) return;
+        this._dirty = false;
+        drawnAt = now;
+        this.scene.render();
       };
       requestAnimationFrame(frame);
     }

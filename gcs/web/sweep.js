@@ -37,7 +37,7 @@
   const quoted = (word) => (/^[\w@%+=:,./-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\"'\"'")}'`);
 
   function commandOf(base, map, shown) {
-    const words = ["--law", map.law, "--seed", String(shown.seed)];
+    const words = ["--law", map.reference, "--seed", String(shown.seed)];
     map.varied.forEach((name, i) => words.push("--set", `${name}=${shown.values[i]}`));
     return [base, ...words.map(quoted)].join(" ");
   }

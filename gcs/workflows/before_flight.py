@@ -10,18 +10,22 @@ from sitl.sensors.shipped import PROFILES
 
 
 def check_options(options: FlightOptions) -> None:
-    """GcsError if there is no such vehicle or sensor profile, or if a parameter cannot be set so."""
+    """GcsError if there is no such vehicle or sensor profile, if a parameter cannot be set so, or if what
+    somebody brings cannot fly."""
     if _as_shipped(options):
         return
     from gcs.workflows.flight_inputs import check_flight_inputs
 
-    check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings))
+    check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings), options.own)
 
 
 def _as_shipped(options: FlightOptions) -> bool:
     """Nothing is asked for that could be refused; to know more, most of the simulator would be loaded."""
     return (
-        options.vehicle in VEHICLES.names() and options.sensors in PROFILES.names() and not options.settings
+        not any(options.own)
+        and options.vehicle in VEHICLES.names()
+        and options.sensors in PROFILES.names()
+        and not options.settings
     )
 
 

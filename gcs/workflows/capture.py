@@ -12,22 +12,30 @@ from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.display import say
-from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, monotonic_us, unix_us
+from gcs.shell.link import Address, monotonic_us, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
+from gcs.shell.truth import TruthLink
 from gcs.workflows.report import TLOG_FILE
 
 
-def capture_to(out: Path | None, address: Address, duration_s: float | None) -> tuple[Path, int]:
+def capture_to(
+    out: Path | None, address: Address, duration_s: float | None, truth_at: Address | None = None
+) -> tuple[Path, int]:
     """Record telemetry until `duration_s` is over or somebody asks to stop; the log and its messages' number.
 
     Without `out` the log goes to flights/capture-TIME/flight.tlog. Parameters come first.
+    `truth_at`: where the simulator tells what is true; None: where `sitl` does by default.
     """
     path = out or Path("flights") / f"capture-{datetime.now():%Y%m%d-%H%M%S}" / TLOG_FILE
-    with Session(address) as session, StopRequest("stopping") as stop:
-        if not session.listen_to_truth():
-            say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the log will have no truth of the simulator")
-        target = session.find()
+    with (
+        TruthLink(truth_at) as world,
+        Session(address) as session,
+        StopRequest("stopping") as stop,
+    ):
+        target = session.find_with_truth(world)
+        if world.missing:
+            say(f"the log will have no truth of the simulator: {world.missing}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             file = path.open("wb")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
+from autopilot.trajectory.route import PlanError, Planner
 from autopilot.wire.convert import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
@@ -23,9 +24,13 @@ def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Viol
     return found
 
 
-def path_reports(mission: Mission, vehicle: str) -> list[PathReport]:
-    """How the vehicle flies it, its paths shaped by the autopilot."""
-    return paths(mission, load_limits(vehicle))
+def path_reports(mission: Mission, vehicle: str, planner: Planner | None = None) -> list[PathReport]:
+    """How the vehicle flies it, its paths shaped by the autopilot, and with `planner` those through waypoints
+    made by that; GcsError says what is wrong with one of these."""
+    try:
+        return paths(mission, load_limits(vehicle), planner)
+    except PlanError as error:
+        raise GcsError(f"{mission.name}: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -44,11 +49,14 @@ class Check:
         return (f"{self.mission}: vehicle {self.vehicle} can fly it", *map(str, self.paths))
 
 
-def check_mission(name_or_path: str, vehicle: str, as_asked: bool) -> Check:
-    """Check a mission against a vehicle; `as_asked`: without shaping, and without a report of its paths."""
+def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None) -> Check:
+    """Check a mission against a vehicle; `as_asked`: without shaping, and without a report of its paths.
+
+    GcsError if somebody's own `planner` does not plan it.
+    """
     mission = load(name_or_path)
     found = violations(mission, vehicle, not as_asked)
-    reports = [] if found or as_asked else path_reports(mission, vehicle)
+    reports = [] if found or as_asked else path_reports(mission, vehicle, planner)
     return Check(mission.name, vehicle, tuple(found), tuple(reports))
 
 

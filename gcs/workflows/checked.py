@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 
 from autopilot.geometry.machine_code import ROOT, is_marked, mark_ready
-from autopilot.vehicle.file import VEHICLES
+from autopilot.vehicle.file import VEHICLES, belief_of
 from missions.model import Mission
 from missions.toml_files import FileError
 
@@ -30,5 +30,5 @@ def note_flyable(mission: Mission, vehicle: str, shaped: bool) -> None:
 
 
 def _part(mission: Mission, vehicle: str, shaped: bool) -> str:
-    what = (mission.steps, VEHICLES.read(vehicle).text, shaped)
+    what = (mission.steps, VEHICLES.read(belief_of(vehicle)).text, shaped)
     return f"flies-{hashlib.sha256(repr(what).encode()).hexdigest()[:16]}"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from autopilot.vehicle.parameters import LAWS
+from autopilot.own.law import law_number
+from autopilot.shell.watched_calls import watched_calls
 from autopilot.wire.convert import Home
 from gcs.clients.capture import FrameLog
 from gcs.clients.flight import Outcome
@@ -20,9 +21,9 @@ def fly_here(mission: Mission, options: FlightOptions, log: FrameLog) -> Outcome
     check_options(options)
     warm_up(flight_parts((options.law,)), options.quiet)
     check_mission(mission, options)
-    settings = {"CTL_LAW": float(LAWS.index(options.law)), **dict(map(setting_of, options.settings))}
+    settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(setting_of, options.settings))}
     client = flight_client(mission, options, Home())
-    with FlightDisplay(mission.name, options.quiet) as display:
+    with FlightDisplay(mission.name, options.quiet) as display, watched_calls():
 
         def watch(*_: object) -> bool:
             if display.due:
@@ -31,7 +32,7 @@ def fly_here(mission: Mission, options: FlightOptions, log: FrameLog) -> Outcome
 
         return fly(
             mission,
-            Conditions(options.vehicle, options.sensors, options.seed, settings),
+            Conditions(options.vehicle, options.sensors, options.seed, settings, options.own),
             log,
             watch,
             client,

@@ -7,33 +7,85 @@ ground station knows both tables of parameters.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 
-from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.own.chosen import NOTHING_OWN, Own, parameters_for
+from autopilot.own.source import OwnError
+from autopilot.vehicle.file import load_belief, load_vehicle
+from autopilot.vehicle.model import Vehicle
+from autopilot.vehicle.parameters import apply_settings
+from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
+from gcs.parameter_names import unknown_parameter
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
+from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
 
 _WORLD = "SIM_"
 
 
-def check_flight_inputs(vehicle: str, sensors: str, settings: Iterable[tuple[str, float]]) -> None:
-    """GcsError if there is no such vehicle or sensor profile, or if a parameter cannot be set so."""
+def check_flight_inputs(
+    vehicle: str, sensors: str, settings: Iterable[tuple[str, float]], given_own: Own = NOTHING_OWN
+) -> None:
+    """GcsError if there is no such vehicle or sensor profile, if a parameter cannot be set so, if a rate does
+    not divide the rate that it must divide, or if what somebody brings cannot fly."""
+    try:
+        found, believed = load_vehicle(vehicle), load_belief(vehicle)
+        load_profile(sensors)
+    except FileError as error:
+        raise input_error(error) from None
+    given = list(settings)
+    own, world = _table(believed, given_own), sim_parameters(truth_of(found))
+    for name, value in given:
+        table = world if name.startswith(_WORLD) and name not in own else own
+        if name not in table:
+            raise InputError(f"--set {unknown_parameter(name, [*own.names, *world.names])}")
+        _check(table, name, value)
+        table.set(name, value)
+    try:
+        control_divider(1e6 / settings_of(world).tick_us, own)
+    except (ParameterError, RateError) as error:
+        raise InputError(f"--set {error}") from None
+    if any(given_own):
+        _try(given_own, own, given)
+
+
+def split_settings(
+    vehicle: str, sensors: str, settings: Iterable[tuple[str, float]]
+) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
+    """The settings of the simulator, and those that are left to an autopilot of others; GcsError as above."""
     try:
         found = load_vehicle(vehicle)
         load_profile(sensors)
     except FileError as error:
         raise input_error(error) from None
-    own, world = autopilot_parameters(found), sim_parameters(truth_of(found))
-    for name, value in settings:
-        table = world if name.startswith(_WORLD) and name not in own else own
-        if name not in table:
-            raise InputError(f"--set {name}: {_unknown(name, [*own.names, *world.names])}")
-        _check(table, name, value)
+    world = sim_parameters(truth_of(found))
+    given = list(settings)
+    ours = [(name, value) for name, value in given if name in world]
+    for name, value in ours:
+        _check(world, name, value)
+    return ours, [(name, value) for name, value in given if name not in world]
+
+
+def _table(vehicle: Vehicle, own: Own) -> ParameterTable:
+    try:
+        return parameters_for(vehicle, own)
+    except OwnError as error:
+        raise InputError(str(error)) from None
+
+
+def _try(own: Own, table: ParameterTable, settings: list[tuple[str, float]]) -> None:
+    from autopilot.own.trial import try_all  # and with it all that flies
+    from autopilot.shell.watched_calls import watched_calls
+
+    apply_settings(table, settings)
+    try:
+        with watched_calls():
+            try_all(own, table.values())
+    except OwnError as error:
+        raise InputError(str(error)) from None
 
 
 def _check(table: ParameterTable, name: str, value: float) -> None:
@@ -41,15 +93,3 @@ def _check(table: ParameterTable, name: str, value: float) -> None:
         table.check(name, value)
     except ParameterError as error:
         raise InputError(f"--set {error}") from None
-
-
-def _unknown(name: str, names: list[str]) -> str:
-    """What is said of an unknown parameter: the nearest one, and all that begin as it does."""
-    near = get_close_matches(name, names, n=1, cutoff=0.75)
-    hint = f"did you mean {near[0]}? " if near else ""
-    prefix = name.partition("_")[0] + "_"
-    kin = sorted(known for known in names if known.startswith(prefix))
-    if kin:
-        return f"no such parameter; {hint}there are {', '.join(kin)}"
-    groups = ", ".join(sorted({known.partition("_")[0] + "_" for known in names}))
-    return f"no such parameter; {hint}names begin with one of {groups}"

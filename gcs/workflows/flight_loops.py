@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient
@@ -21,8 +21,37 @@ _WAIT_S = 0.2
 _TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to those who must be punctual
 START_LIMIT_S = 60.0  # some seconds on an idle machine; all kernels are compiled before
 SILENCE_LIMIT_S = 20.0  # of a vehicle in lockstep that was there before
+STANDING_LIMIT_S = 60.0  # of the clock of a vehicle that speaks; no busy machine holds it up for so long
 
 Ended = Callable[[], str]  # why a process of ours has ended, or empty
+
+
+class Drained(Protocol):
+    """Where datagrams come from: a socket, or the part of it that concerns the vehicle."""
+
+    def drain(self) -> list[bytes]:
+        """All that are there, without waiting."""
+
+
+class Clock:
+    """Notices that the vehicle's clock stands while the vehicle still speaks: its simulator is silent."""
+
+    def __init__(self, now_s: float) -> None:
+        self._time_us: int | None = None
+        self._looked_s = now_s
+        self._stood_s = 0.0  # while we ourselves ran
+
+    def standing(self, time_us: int | None, now_s: float) -> str:
+        """What is wrong with a clock that is at `time_us` now (None: not known), empty where nothing is."""
+        passed_s, self._looked_s = min(now_s - self._looked_s, 1.0), now_s
+        if time_us is None or time_us != self._time_us:
+            self._time_us, self._stood_s = time_us, 0.0
+            return ""
+        self._stood_s += passed_s
+        if self._stood_s < STANDING_LIMIT_S:
+            return ""
+        since = f"{time_us * 1e-6:.3f} s for {self._stood_s:.0f} s"
+        return f"the vehicle's clock has stood at {since}: the autopilot speaks, but its simulator is silent"
 
 
 def run_lockstep(
@@ -45,6 +74,8 @@ def run_lockstep(
     pending: list[bytes] = []
     started = False
     promised_us = 0  # how far the vehicle may go by itself
+    asked_us: int | None = None  # the time of the vehicle's last question
+    clock = Clock(time.monotonic())
     heard_s = time.monotonic()
     while client.outcome is None:
         datagrams = vehicle.wait(_WAIT_S)
@@ -66,6 +97,9 @@ def run_lockstep(
             question_ns = turns.question(datagram)
             if question_ns is None:
                 pending.append(datagram)
+                reason = (ended() or clock.standing(asked_us, heard_s)) if started else ""
+                if reason:
+                    client.lose(reason)
                 continue
             given = turns.repeated(question_ns)
             if given is not None:
@@ -75,7 +109,7 @@ def run_lockstep(
                 started = True
                 first_word()
             pending.append(datagram)
-            now_us = question_ns // 1000
+            now_us = asked_us = question_ns // 1000
             truth_queue.put(truth.drain())
             told = truth_queue.until(now_us)
             for sent in ground_turn(client, capture, told, pending, now_us):
@@ -111,7 +145,7 @@ def run_wall_clock(
     client: FlightClient,
     capture: Capture,
     vehicle: UdpSocket,
-    truth: UdpSocket | None,
+    truth: Drained,
     ended: Ended,
     display: FlightDisplay,
     stop: StopRequest,
@@ -119,11 +153,11 @@ def run_wall_clock(
     page: FlightPage | None = None,
 ) -> None:
     """Fly until the client has its outcome. Log records bear the vehicle's clock once it is known."""
-    started = False
+    started, clock = False, Clock(time.monotonic())
     while client.outcome is None:
         time.sleep(_TICK_S)
         now_us = monotonic_us()
-        told, heard = truth.drain() if truth else [], vehicle.drain()
+        told, heard = truth.drain(), vehicle.drain()
         for sent in ground_turn(client, capture, told, heard, now_us):
             vehicle.send(sent)
         if page is not None:
@@ -136,7 +170,7 @@ def run_wall_clock(
         _show(display, client)
         if stop:
             client.interrupt()
-        reason = ended()
+        reason = ended() or clock.standing(client.view.time_us, now_us * 1e-6)
         if reason and client.connection.target is None:
             raise NoVehicleError(reason)
         if reason:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
+from autopilot.own.estimator import load_estimator
+from autopilot.own.law import name_of
+from autopilot.own.planner import load_planner
 from gcs.workflows.flight_options import FlightOptions, setting_of
 
 if TYPE_CHECKING:
@@ -13,7 +16,13 @@ if TYPE_CHECKING:
     from missions.model import Mission
 
 
-def meta_of(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: float) -> FlightMeta:
+def _law(options: FlightOptions) -> str:
+    return name_of(options.law) if options.firmware is None else options.firmware.kind
+
+
+def meta_of(
+    mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: float, truth_missing: str = ""
+) -> FlightMeta:
     """What is kept of a flight beside its telemetry."""
     from gcs.analysis.record import FlightMeta
 
@@ -21,12 +30,15 @@ def meta_of(mission: Mission, options: FlightOptions, outcome: Outcome, wall_s: 
     return FlightMeta(
         mission=options.mission,
         title=mission.title,
-        law=options.law if own else None,
+        law=_law(options) if own else None,
+        estimator=load_estimator(options.estimator).name if options.estimator else None,
+        planner=load_planner(options.planner).name if options.planner else None,
         sensors=options.sensors if own else None,
         vehicle=options.vehicle if own else None,
         seed=options.seed if own else None,
         outcome=outcome.name,
         reason=outcome.reason or None,
+        truth_missing=truth_missing or None,
         wall_s=wall_s,
         command=options.command_line(),
         version=version("plumbline"),

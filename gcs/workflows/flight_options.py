@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
+from autopilot.own.chosen import Own
+from autopilot.own.law import own_law
 from gcs.shell.link import Address
 
 _REFUSED = 2.0  # MIS_INFEASIBLE
+
+
+class FirmwareProgram(NamedTuple):
+    """An autopilot of others that is started for the flight: which one, and its program."""
+
+    kind: str
+    path: Path
 
 
 @dataclass(frozen=True)
@@ -28,13 +38,27 @@ class FlightOptions:
     force: bool
     overwrite: bool
     limit_s: float | None
+    firmware: FirmwareProgram | None = None  # that flies instead of our autopilot
+    estimator: str = ""  # that somebody has brought; empty: the built-in one
+    planner: str = ""
+    truth_at: Address | None = None  # where the world of `connect` tells what is true
+
+    @property
+    def own(self) -> Own:
+        """What of the flight somebody has brought."""
+        return Own(own_law(self.law), self.estimator, self.planner)
 
     def command_line(self) -> str:
         """The command that flies it again."""
         words = ["gcs fly", self.mission]
         if self.connect is not None:
-            return " ".join([*words, "--connect", str(self.connect)])
-        words += ["--law", self.law, "--sensors", self.sensors, "--vehicle", self.vehicle]
+            words += ["--connect", str(self.connect)]
+            return " ".join([*words, "--truth", str(self.truth_at)] if self.truth_at else words)
+        if self.firmware is None:
+            words += ["--law", self.law, *own_words(self.estimator, self.planner)]
+        else:
+            words += ["--autopilot", f"{self.firmware.kind}={self.firmware.path}"]
+        words += ["--sensors", self.sensors, "--vehicle", self.vehicle]
         words += ["--seed", str(self.seed)]
         words += ["--lockstep"] if self.speed is None else ["--speed", f"{self.speed:g}"]
         words += ["--real-time"] if self.real_time else []
@@ -48,6 +72,12 @@ class FlightOptions:
         name = "MIS_INFEASIBLE="
         given = [float(s.removeprefix(name)) for s in self.settings if s.startswith(name)]
         return any(value < _REFUSED for value in given)
+
+
+def own_words(estimator: str, planner: str) -> list[str]:
+    """Estimator and planner on a command line, where somebody has brought any."""
+    words = ["--estimator", estimator] if estimator else []
+    return [*words, "--planner", planner] if planner else words
 
 
 def setting_of(text: str) -> tuple[str, float]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from autopilot.own.law import name_of
 from autopilot.wire.convert import Home
 from autopilot.wire.items import encode_mission
 from gcs.clients.capture import Capture
@@ -156,7 +157,7 @@ def _about(mission: Mission, options: FlightOptions) -> dict[str, Any]:
     record: dict[str, Any] = {"kind": "fly", "mission": mission.name, "title": mission.title}
     record["waypoints"] = waypoints_record(encode_mission(mission, Home()), Home())
     if own:
-        record |= {"law": options.law, "sensors": options.sensors, "vehicle_name": options.vehicle}
+        record |= {"law": name_of(options.law), "sensors": options.sensors, "vehicle_name": options.vehicle}
         record |= {"seed": options.seed, "speed": options.speed}
         record["settings"] = dict(setting_of(setting) for setting in options.settings)
     return record

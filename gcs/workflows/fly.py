@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,14 +19,15 @@ from gcs.errors import (
     StoppedError,
     disk_trouble,
 )
+from gcs.folders import make_folder
 from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.before_flight import check_mission, check_options
 from gcs.workflows.flight_meta import meta_of
-from gcs.workflows.flight_options import FlightOptions
+from gcs.workflows.flight_options import FirmwareProgram, FlightOptions
 from gcs.workflows.mission_file import load
-from gcs.workflows.own_vehicle import AUTOPILOT_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
+from gcs.workflows.own_vehicle import AUTOPILOT_LOG, FIRMWARE_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
 from gcs.workflows.report import TLOG_FILE, make_report
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.warmup import flight_parts, warm_up
@@ -69,32 +69,37 @@ class Flight:
 def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> Flight:
     """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
     the report are drawn. With `view` a page shows it, and stays."""
-    if options.connect is None:
+    if options.connect is None and options.firmware is None:
         check_options(options)
     mission = load(options.mission)
     out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
     with _Folder(out, options.overwrite) as folder:
         if options.connect is None:
-            warm_up(flight_parts((options.law,)), options.quiet)
+            laws = (options.law,) if options.firmware is None else ()
+            warm_up(flight_parts(laws), options.quiet)
         with (
             StopRequest("stopping; Ctrl-C again abandons the report") as stop,
             _page(mission, options, view, stop) as page,
         ):
             watch = Stopwatch()
-            tlog = out / TLOG_FILE
+            tlog, truth_missing = out / TLOG_FILE, ""
             with tlog.open("wb") as file:
                 log = TlogWriter(file)
-                if options.connect is None:
+                if options.firmware is not None:
+                    client = _fly_firmware(mission, options, options.firmware, log, out, stop, watch, page)
+                elif options.connect is None:
                     client = _fly_own(mission, options, log, out, stop, watch, page)
                 else:
-                    client = _fly_running(mission, options, options.connect, log, stop, watch, page)
+                    client, truth_missing = _fly_running(
+                        mission, options, options.connect, log, stop, watch, page
+                    )
 
             def tell(record: Record, outcome: Outcome) -> None:
                 told(record, outcome)
                 if page is not None:
                     page.tell(outcome=outcome.name, reason=outcome.reason)
 
-            flight = _end(mission, options, client, watch.stop(), out, folder, stop, tell)
+            flight = _end(mission, options, client, truth_missing, watch.stop(), out, folder, stop, tell)
             if page is not None:
                 page.tell(report=str(out.resolve()))
                 page.stay(stop)
@@ -136,6 +141,22 @@ def _fly_own(
         return fly_own(mission, options, log, own, stop, watch, page)
 
 
+def _fly_firmware(
+    mission: Mission,
+    options: FlightOptions,
+    program: FirmwareProgram,
+    log: TlogWriter,
+    out: Path,
+    stop: StopRequest,
+    watch: Stopwatch,
+    page: FlightPage | None,
+) -> FlightClient:
+    from gcs.workflows.own_firmware import fly_firmware, own_firmware
+
+    with own_firmware(program, options, out) as own:
+        return fly_firmware(mission, options, program, log, own, stop, watch, page)
+
+
 def _fly_running(
     mission: Mission,
     options: FlightOptions,
@@ -144,7 +165,7 @@ def _fly_running(
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None,
-) -> FlightClient:
+) -> tuple[FlightClient, str]:
     from gcs.workflows.running_flight import fly_running
 
     check_mission(mission, options)
@@ -155,6 +176,7 @@ def _end(
     mission: Mission,
     options: FlightOptions,
     client: FlightClient,
+    truth_missing: str,
     wall_s: float,
     out: Path,
     folder: _Folder,
@@ -173,7 +195,7 @@ def _end(
     if options.real_time and outcome.name != "completed":
         outcome = outcome.because(_too_slow(tlog))
     try:
-        meta = meta_of(mission, options, outcome, wall_s)
+        meta = meta_of(mission, options, outcome, wall_s, truth_missing)
         record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
     except KeyboardInterrupt:
         say(f"report abandoned; the telemetry is in {tlog}")
@@ -200,7 +222,7 @@ def _too_slow(tlog: Path) -> str:
 class _Folder:
     """The output directory; if the flight came to nothing, what we put there is taken away again."""
 
-    _OURS = (TLOG_FILE, ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG)
+    _OURS = (TLOG_FILE, ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG)
 
     def __init__(self, path: Path, overwrite: bool) -> None:
         self._path = path
@@ -213,12 +235,7 @@ class _Folder:
     def __enter__(self) -> _Folder:
         if not self._overwrite and (self._path / self._OURS[0]).exists():
             raise GcsError(f"--out {self._path}: holds a flight already; name another, or add --overwrite")
-        try:
-            self._path.mkdir(parents=True, exist_ok=True)
-            if not os.access(self._path, os.W_OK):
-                raise PermissionError(13, "Permission denied")
-        except OSError as error:
-            raise GcsError(f"--out {self._path}: {error.strerror}") from None
+        make_folder(self._path, f"--out {self._path}")
         return self
 
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:

@@ -57,5 +57,6 @@ def fly_own(
             run_lockstep(client, Capture(log, LOCKSTEP_BOOT_UNIX_US), *link)
         else:
             run_wall_clock(client, Capture(log, unix_us()), *link)
+            client.explain_silence(own.processes.stopped())
         watch.stop()
     return client

@@ -13,13 +13,12 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from autopilot.vehicle.parameters import LAWS
 from gcs.shell.link import LOOPBACK, UdpSocket, free_port
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_options import FlightOptions
+from gcs.workflows.flight_options import FlightOptions, own_words
 
 ONBOARD_LOG = "flight.ulg"
-SIMULATOR_LOG, AUTOPILOT_LOG = "sitl.log", "autopilot.log"
+SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG = "sitl.log", "autopilot.log", "firmware.log"
 _WATCHERS = ("--gcs", f"{LOOPBACK}:14550", "--api", f"{LOOPBACK}:14540")
 
 
@@ -65,7 +64,7 @@ def _start(
     simulator = f"{LOOPBACK}:{free_port()}"
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
     pace += ["--real-time"] if options.real_time else []
-    both = ["--vehicle", options.vehicle, "--set", f"CTL_LAW={LAWS.index(options.law)}"]
+    both = ["--vehicle", options.vehicle]
     if options.force:
         both += ["--set", "MIS_INFEASIBLE=0"]
     for setting in options.settings:
@@ -82,5 +81,6 @@ def _start(
     ]
     processes.start("sitl", [*world, *pace, *both, "--quiet"], out / SIMULATOR_LOG)
     link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_WATCHERS]
-    home = ["--sim", simulator, "--storage", str(storage)]
-    processes.start("autopilot", [*home, *link, *both, "--quiet"], out / AUTOPILOT_LOG)
+    home = ["--sim", simulator, "--storage", str(storage), "--law", options.law]
+    own = own_words(options.estimator, options.planner)
+    processes.start("autopilot", [*home, *own, *link, *both, "--quiet"], out / AUTOPILOT_LOG)

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from autopilot.wire.parameter_table import ParameterError, parse_text
-from gcs.clients.operation import Target
+from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
 from gcs.errors import GcsError, RefusedError
 from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
+from gcs.parameter_names import unknown_parameter
 from gcs.shell.display import StepDisplay, say
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -34,7 +35,7 @@ def get_parameters(names: Sequence[str], address: Address) -> dict[str, float | 
         target = session.find()
         for name in names:
             operation = ParameterGet(target, name.upper())
-            session.run(operation, name)
+            exchange(session, operation, name)
             found[name.upper()] = operation.value
     return found
 
@@ -43,7 +44,28 @@ def set_parameter(name: str, value: float, address: Address) -> str:
     """Set one parameter and read it back; a line that says so."""
     with Session(address) as session:
         operation = ParameterSet(session.find(), name.upper(), value)
-        return session.run(operation, name).text
+        return exchange(session, operation, name).text
+
+
+def exchange(
+    session: Session,
+    operation: ParameterGet | ParameterSet,
+    label: str = "",
+    names: list[str] | None = None,
+) -> Result:
+    """Bring a get or a set to its end; RefusedError names the nearest parameters where there is no such.
+
+    `names`: where the names of the vehicle's parameters are kept between one exchange and the next.
+    """
+    try:
+        return session.run(operation, label)
+    except RefusedError:
+        if not operation.unknown:
+            raise
+    known = [] if names is None else names
+    if not known:
+        known += _listed(session, session.target)
+    raise RefusedError(unknown_parameter(operation.name, known))
 
 
 def save_parameters(file: Path, address: Address) -> int:
@@ -71,10 +93,11 @@ def load_parameters(file: Path, address: Address) -> tuple[int, int]:
     refused = 0
     with Session(address) as session, StepDisplay("parameters") as display:
         target = session.find()
+        names: list[str] = []
         for done, (name, value) in enumerate(values.items()):
             display.update(done, len(values))
             try:
-                session.run(ParameterSet(target, name, value))
+                exchange(session, ParameterSet(target, name, value), names=names)
             except RefusedError as error:
                 refused += 1
                 say(str(error))

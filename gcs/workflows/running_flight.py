@@ -11,9 +11,10 @@ from gcs.clients import command
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
 from gcs.shell.display import FlightDisplay, say
-from gcs.shell.link import LOOPBACK, TRUTH_PORT, Address, open_address, truth_socket, unix_us
+from gcs.shell.link import Address, open_address, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
+from gcs.shell.truth import TruthLink
 from gcs.workflows.flight_loops import run_wall_clock
 from gcs.workflows.flight_options import FlightOptions
 from gcs.workflows.own_flight import flight_client
@@ -32,16 +33,34 @@ def fly_running(
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None = None,
-) -> FlightClient:
-    """Fly with the vehicle at `address`; if the flight is stopped early, it is told to hold."""
-    with Session(address) as session:
-        session.find()
-        client = flight_client(mission, options, vehicle_home(session))
+) -> tuple[FlightClient, str]:
+    """Fly with the vehicle at `address`; if the flight is stopped early, it is told to hold.
+
+    Returns why there is no truth of the world that it flew in, too; empty where there is.
+    """
+    with TruthLink(options.truth_at) as truth:
+        with Session(address) as session:
+            session.find_with_truth(truth)
+            client = flight_client(mission, options, vehicle_home(session))
+        if truth.missing:
+            say(f"the report will have no truth of the simulator: {truth.missing}")
+        _fly(client, mission, options, address, truth, log, stop, watch, page)
+        return client, truth.missing
+
+
+def _fly(
+    client: FlightClient,
+    mission: Mission,
+    options: FlightOptions,
+    address: Address,
+    truth: TruthLink,
+    log: FrameLog,
+    stop: StopRequest,
+    watch: Stopwatch,
+    page: FlightPage | None,
+) -> None:
     if address.signing_key is not None:
         client.connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
-    truth = truth_socket()
-    if truth is None:
-        say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the report will have no truth of the simulator")
     vehicle = open_address(address)
     try:
         with FlightDisplay(mission.name, options.quiet) as display:
@@ -50,14 +69,11 @@ def fly_running(
         watch.stop()
     finally:
         vehicle.close()
-        if truth is not None:
-            truth.close()
     if client.outcome is not None and client.outcome.name in ("interrupted", "timeout") and client.view.armed:
         with Session(address) as session:
             session.find()
             session.run(command.pause(session.target))
             say("the vehicle holds; gcs land brings it down")
-    return client
 
 
 def vehicle_home(session: Session) -> Home:

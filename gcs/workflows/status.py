@@ -1,28 +1,81 @@
-"""What a running vehicle says of itself, listened to for a moment."""
+"""What a running vehicle says of itself, listened to for a moment, and what it has said before."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from gcs.clients.vehicle_view import VehicleView
-from gcs.shell.link import Address
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients import command
+from gcs.clients.vehicle_view import Text, VehicleView
+from gcs.errors import NoVehicleError, RefusedError
+from gcs.shell.display import say
+from gcs.shell.link import Address, monotonic_us
 from gcs.shell.session import Session
+from gcs.shell.truth import TruthLink
 
 LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
+RECALL_S = 1.0  # kept texts take a fifth of that
+SHOWN_TEXTS = 10  # of these that are warnings or worse
+
+_SEVERITIES = {
+    value: str(entry.name).removeprefix("MAV_SEVERITY_").lower()
+    for value, entry in mavlink.enums["MAV_SEVERITY"].items()
+}
 
 
-def vehicle_status(address: Address) -> dict[str, Any]:
-    """The record of the vehicle at `address`."""
-    with Session(address) as session:
-        session.listen_to_truth()
-        session.find()
+def vehicle_status(address: Address, truth_at: Address | None = None) -> dict[str, Any]:
+    """The record of the vehicle at `address`; `texts` are the last warnings, and what is worse.
+
+    `truth_at`: where its simulator tells what is true; None: where `sitl` does by default.
+    """
+    with TruthLink(truth_at) as truth, Session(address) as session:
+        session.find_with_truth(truth)
         session.watch(lambda: False, LISTEN_S, "listening")
-        return status_record(session.view)
+        if truth.missing:
+            say(f"no rate, lateness and missed ticks of the simulator: {truth.missing}")
+        texts = [text for text in recall(session) if text.severity <= mavlink.MAV_SEVERITY_WARNING]
+        return {**status_record(session.view), "texts": text_records(texts[-SHOWN_TEXTS:])}
+
+
+def vehicle_texts(address: Address) -> list[dict[str, Any]]:
+    """What the vehicle at `address` has told the operators, the oldest first."""
+    with Session(address) as session:
+        session.find()
+        return text_records(recall(session))
+
+
+def recall(session: Session) -> list[Text]:
+    """What the vehicle has said, the oldest first; of one that keeps no texts, what it said meanwhile."""
+    view = session.view
+    try:
+        session.run(command.request_message(session.target, mavlink.MAVLINK_MSG_ID_STATUSTEXT))
+    except (RefusedError, NoVehicleError):
+        return list(view.texts)
+    heard = len(view.texts)
+    session.watch(lambda: view.recalled_all, RECALL_S)
+    kept = {(text.severity, text.text) for text in view.recalled}
+    return [*view.recalled, *(text for text in view.texts[heard:] if text[1:] not in kept)]
+
+
+def text_records(texts: list[Text]) -> list[dict[str, Any]]:
+    """Texts with their age in s and the name of their severity."""
+    now_us = monotonic_us()
+    return [
+        {
+            "age_s": max(0.0, (now_us - said_us) * 1e-6),
+            "severity": _SEVERITIES.get(severity, str(severity)),
+            "text": text,
+        }
+        for said_us, severity, text in texts
+    ]
 
 
 def status_record(view: VehicleView) -> dict[str, Any]:
-    """Keys of `gcs status --json`; None for what the vehicle has not sent."""
+    """Keys of `gcs status --json` but for the texts; None for what the vehicle has not sent."""
     load = view.latest.get("LOAD_STATE")
+    if load is not None and not math.isfinite(load.tension):
+        load = None  # it is not seen
     current = view.latest.get("MISSION_CURRENT")
     battery = view.latest.get("SYS_STATUS")
     world = view.truth.get("SIM_STATUS")
@@ -47,5 +100,4 @@ def status_record(view: VehicleView) -> dict[str, Any]:
         "rate_hz": None if world is None else world.rate_hz,
         "late_p99_us": None if world is None else world.late_p99_us,
         "missed_ticks": None if world is None else world.missed,
-        "texts": [text.text for text in view.texts],
     }

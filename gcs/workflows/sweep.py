@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from autopilot.own.chosen import NOTHING_OWN, Own
 from gcs.batch.pool import dask_cluster, own_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
@@ -52,6 +53,7 @@ class SweepOptions:
     fresh: bool
     quiet: bool
     command: str  # as it was typed
+    own: Own = NOTHING_OWN  # estimator and planner that somebody has brought, of all flights
     reports: bool = False  # of the flights that stand out
 
 
@@ -98,6 +100,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
         [read_varied(text, options.sample is not None) for text in options.varied],
         dict(setting_of(text) for text in options.settings),
         options.sample or 0,
+        options.own,
     )
     directory = options.out or Path("sweeps") / Path(options.mission).stem
     scheduler = options.scheduler
@@ -131,7 +134,7 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
         fly(
             FlightOptions(
                 mission=plan.mission,
-                law=one.law,
+                law=one.reference,
                 sensors=plan.sensors,
                 vehicle=plan.vehicle,
                 seed=one.seed,
@@ -144,6 +147,8 @@ def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quie
                 force=True,
                 overwrite=True,
                 limit_s=None,
+                estimator=plan.estimator,
+                planner=plan.planner,
             ),
             lambda record, outcome: None,
         )

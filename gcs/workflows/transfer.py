@@ -10,6 +10,7 @@ from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.missions import MissionDownload, MissionUpload
 from gcs.errors import GcsError
 from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
+from gcs.formats.plan import Plan
 from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -26,30 +27,43 @@ Tell = Callable[[str], None]
 
 def upload(mission: str, vehicle: str, force: bool, skip: bool, address: Address, tell: Tell) -> None:
     """Check a mission by name or path against `vehicle` and upload it; `tell` gets a line for each list."""
-    if is_foreign(Path(mission)):
-        _upload_foreign(Path(mission), vehicle, force, skip, address, tell)
-        return
+    send = checked_upload(mission, vehicle, force, skip, tell)
+    with Session(address) as session:
+        session.find()
+        send(session)
+
+
+def checked_upload(
+    mission: str, vehicle: str, force: bool, skip: bool, tell: Tell
+) -> Callable[[Session], None]:
+    """Read a mission by name or path, and check it against `vehicle`; what uploads it to a vehicle that was
+    found. A file of other ground stations is checked then: its places are judged by the vehicle's home."""
+    path = Path(mission)
+    if is_foreign(path):
+        plan = read_foreign(path)
+        return lambda session: _upload_foreign(session, path, plan, vehicle, force, skip, tell)
     loaded = load_checked(mission, vehicle, force)
-    with Session(address) as session:
-        target = session.find()
+
+    def send(session: Session) -> None:
         items = encode_mission(loaded, vehicle_home(session))
-        tell(session.run(MissionUpload(target, items), "upload").text)
+        tell(session.run(MissionUpload(session.target, items), "upload").text)
+
+    return send
 
 
-def _upload_foreign(path: Path, vehicle: str, force: bool, skip: bool, address: Address, tell: Tell) -> None:
-    plan = read_foreign(path)
-    with Session(address) as session:
-        target = session.find()
-        items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
-        if not force:
-            check_items(path.name, items, home, vehicle)
-        # the fence first: the vehicle judges the mission by it
-        for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
-            if area is not None:
-                text = session.run(MissionUpload(target, area, kind)).text
-                if area:
-                    tell(text)
-        tell(session.run(MissionUpload(target, items), "upload").text)
+def _upload_foreign(
+    session: Session, path: Path, plan: Plan, vehicle: str, force: bool, skip: bool, tell: Tell
+) -> None:
+    items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
+    if not force:
+        check_items(path.name, items, home, vehicle)
+    # the fence first: the vehicle judges the mission by it
+    for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
+        if area is not None:
+            text = session.run(MissionUpload(session.target, area, kind)).text
+            if area:
+                tell(text)
+    tell(session.run(MissionUpload(session.target, items), "upload").text)
 
 
 def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from autopilot.trajectory.feasibility import VehicleLimits
-from autopilot.vehicle.file import VehicleFileError, load_vehicle
+from autopilot.vehicle.file import VehicleFileError, load_belief
 from gcs.errors import input_error
 
 
 def load_limits(name_or_path: str) -> VehicleLimits:
     """The limits of a shipped vehicle or of a vehicle file; GcsError says what is wrong with it."""
     try:
-        return VehicleLimits(load_vehicle(name_or_path))
+        return VehicleLimits(load_belief(name_or_path))
     except VehicleFileError as error:
         raise input_error(error) from None

@@ -15,21 +15,21 @@ from typing import Any, Protocol
 from autopilot.vehicle.file import load_vehicle
 from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients.connection import Connection
+from gcs.clients.truth import Worlds
 from gcs.errors import GcsError
 from gcs.shell.display import say
 from gcs.shell.feed import COMMAND, EVENT, TRUTH, FeedEnd, inherited
 from gcs.shell.link import (
     LOOPBACK,
-    TRUTH_PORT,
+    SITL_TRUTH,
     Address,
     UdpSocket,
     monotonic_us,
     open_address,
-    truth_socket,
     unix_us,
 )
 from gcs.shell.page_server import Pages, PageServer, Site
-from gcs.view.controls import ROTORS, SLIDERS
+from gcs.view.controls import SLIDERS
 from gcs.view.station import Station
 from gcs.web import LIVE_FILES, LIVE_PAGE, asset
 
@@ -45,7 +45,7 @@ class ViewOptions:
     host: str = LOOPBACK
     port: int | None = None  # None: PAGE_PORT, or any that is free
     opens: bool = True  # a browser, where there is one
-    truth: bool = True  # listen to the simulated world
+    truth: Address | None = SITL_TRUTH  # where the simulated world tells what is true; None: it is not heard
 
 
 class Links(Protocol):
@@ -61,20 +61,19 @@ class Links(Protocol):
 class UdpLinks:
     """Vehicles that run by themselves, met at one address or several."""
 
-    def __init__(self, addresses: tuple[Address, ...], truth: bool) -> None:
+    def __init__(self, addresses: tuple[Address, ...], truth: Address | None) -> None:
         self._sockets: list[UdpSocket] = []
         self._ways: dict[int, tuple[UdpSocket, tuple[str, int]]] = {}  # to a system
         self._spoken: list[UdpSocket] = []  # of `udpout:`: the vehicle waits for our first word
         self._truth: UdpSocket | None = None
+        self._worlds = Worlds()
         try:
             for address in addresses:
                 self._sockets.append(open_address(address))
                 if not address.listen:
                     self._spoken.append(self._sockets[-1])
             if truth:
-                self._truth = truth_socket()
-                if self._truth is None:
-                    say(f"UDP {LOOPBACK}:{TRUTH_PORT} is in use: the page shows what the autopilot believes")
+                self._truth = _truth_socket(truth)
         except GcsError:
             self.close()
             raise
@@ -85,8 +84,9 @@ class UdpLinks:
             for datagram, sender in link.drain_with_senders():
                 for system in station.receive(datagram, now_us):
                     self._ways[system] = (link, sender)
-        for datagram in self._truth.drain() if self._truth else ():
-            station.receive_truth(datagram)
+        for datagram, sender in self._truth.drain_with_senders() if self._truth else ():
+            run = self._worlds.run(datagram, sender)
+            station.receive_truth(datagram, run, alone=len(self._worlds) == 1)
         for out in station.poll(now_us):
             way = self._ways.get(out.system)
             if way is not None:
@@ -99,6 +99,17 @@ class UdpLinks:
     def close(self) -> None:
         for link in (*self._sockets, *((self._truth,) if self._truth else ())):
             link.close()
+
+
+def _truth_socket(address: Address) -> UdpSocket | None:
+    """Where the simulated world tells what is true; None if another program listens there."""
+    try:
+        return UdpSocket(address.host, address.port)
+    except GcsError:
+        say(
+            f"UDP {address} is in use: the page shows what the autopilot believes; --truth names another port"
+        )
+        return None
 
 
 class FedLinks:
@@ -191,7 +202,7 @@ async def _serve(
 
     def opened() -> list[dict[str, Any]]:
         controls = [slider.record() for slider in SLIDERS]
-        hello = {"type": "hello", "controls": controls, "rotors": ROTORS}
+        hello = {"type": "hello", "controls": controls}
         return [hello, *station.greeting(), session.record]
 
     def count_changed(count: int) -> None:

@@ -13,6 +13,7 @@ from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
 from gcs.errors import GcsError
 from gcs.shell.display import CompileDisplay, say
 from gcs.shell.processes import Child, Processes
+from gcs.workflows.expected import expected_s, in_words
 
 _LOOK_S = 0.05
 _CHECK = Part(
@@ -21,14 +22,15 @@ _CHECK = Part(
     (),
     ROOT / "gcs" / "workflows" / "check_mission.py",
     "check",
-    3.0,
+    4.0,
 )
 _REPORT = Part("the report", "gcs.report.warm", (), ROOT / "gcs" / "report" / "style.py", "report", 3.0)
 
 
 def flight_parts(laws: Sequence[str]) -> list[Part]:
-    """What `gcs fly` needs for flights with these laws."""
-    return [*autopilot_parts(*laws), SIMULATOR, _CHECK, _REPORT]
+    """What `gcs fly` needs for flights with these laws; with none, by an autopilot of others."""
+    own = autopilot_parts(*laws) if laws else ()
+    return [*own, SIMULATOR, _CHECK, _REPORT]
 
 
 def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
@@ -39,29 +41,37 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
     total = len(waiting)
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if not quiet:
-        cost_s = max(waiting[0].cost_s, sum(part.cost_s for part in waiting) / cores)
-        say(f"compiling the flight software, once; about {cost_s:.0f} s on an idle machine")
+        expected = in_words(expected_s([part.cost_s for part in waiting], cores))
+        count = f"{total} parts" if total > 1 else waiting[0].title
+        say(f"compiling the flight software, once: {count}, {expected} on an idle machine")
     with (
         tempfile.TemporaryDirectory(prefix="plumbline-") as logs,
         Processes() as processes,
         CompileDisplay(quiet) as display,
     ):
-        running: dict[str, tuple[Part, Child]] = {}
+        running: dict[str, tuple[Part, Child, float]] = {}
+        all_begun_s = time.monotonic()
+
+        def left(now_s: float) -> tuple[int, int, float]:
+            return len(waiting) + len(running), total, now_s - all_begun_s
+
         while waiting or running:
             while waiting and len(running) < cores:
                 part = waiting.pop(0)
                 log = Path(logs) / f"{part.mark}.log"
-                running[part.title] = part, processes.start(part.module, part.arguments, log)
+                child = processes.start(part.module, part.arguments, log)
+                running[part.title] = part, child, time.monotonic()
             display.update(
-                {title: child.last_line() for title, (_, child) in running.items()},
-                len(waiting) + len(running),
-                total,
+                {title: child.last_line() for title, (_, child, _) in running.items()},
+                *left(time.monotonic()),
             )
             time.sleep(_LOOK_S)
-            for title, (part, child) in list(running.items()):
+            for title, (part, child, begun_s) in list(running.items()):
                 if child.running:
                     continue
                 if child.exit_code != 0:
                     raise GcsError(f"{title} cannot be compiled: {child.obituary()}")
                 part.done()
                 del running[title]
+                now_s = time.monotonic()
+                display.done(title, now_s - begun_s, *left(now_s))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, axpy, sub
+from autopilot.geometry.linear import ZERO, Vec3, axpy
 from autopilot.geometry.so3 import quat_normalise
 from sitl.plant.impact import stretched
 from sitl.plant.rates import rates
-from sitl.plant.records import Motion, Rotors, Truth
-from sitl.plant.rotors import approach, decay
+from sitl.plant.records import Motion, Truth
+from sitl.plant.rotors import BEGIN, END, MIDDLE, RotorRows, wrenches
 
 # classical Runge-Kutta, and a fifth evaluation at the end of the step with weight zero
 _STAGE_SHIFT = (0.0, 0.5, 0.5, 1.0)
@@ -21,7 +21,6 @@ class Flow(NamedTuple):
     """Where a Runge-Kutta step leads."""
 
     motion: Motion
-    rotor_force: Rotors
     tension_before: float  # N, at the start of the step, negative if the cable would have to push
     tension: float  # N, at its end
     accel_quad: Vec3
@@ -36,8 +35,8 @@ def _shift(motion: Motion, s: float, rate: Motion) -> Motion:
     return Motion(
         axpy(s, rate.x_load, motion.x_load),
         axpy(s, rate.v_load, motion.v_load),
-        axpy(s, rate.cable, motion.cable),
-        axpy(s, rate.cable_dot, motion.cable_dot),
+        axpy(s, rate.apart, motion.apart),
+        axpy(s, rate.apart_dot, motion.apart_dot),
         (p[0] + s * d[0], p[1] + s * d[1], p[2] + s * d[2], p[3] + s * d[3]),
         axpy(s, rate.omega, motion.omega),
         motion.length + s * rate.length,
@@ -46,18 +45,14 @@ def _shift(motion: Motion, s: float, rate: Motion) -> Motion:
 
 
 @kernel
-def flow(
-    motion: Motion, rotor_force: Rotors, command: Rotors, truth: Truth, wind: Vec3, taut: float, h: float
-) -> Flow:
-    """One Runge-Kutta step of length h in one mode; the rotor lag is exact at every stage."""
-    half_decay = 0.0
-    if truth.rotor_tau > 0.0:
-        half_decay = decay(0.5 * h / truth.rotor_tau)
-    else:
-        rotor_force = command
+def flow(motion: Motion, rotors: RotorRows, truth: Truth, wind: Vec3, taut: float, h: float) -> Flow:
+    """One Runge-Kutta step of length h in one mode; the lag of the rotors is exact at every stage. Their
+    forces stay as they are; those at the end of the step are in the row END."""
+    wrench, middle, end = wrenches(rotors, truth, h)
     nothing = Motion(ZERO, ZERO, ZERO, ZERO, (0.0, 0.0, 0.0, 0.0), ZERO, 0.0, 0.0)
     rate, total = nothing, nothing
-    force, remainder, tension_before = rotor_force, 1.0, 0.0
+    tension_before = 0.0
+    row = BEGIN
     # a loop, so that the equations are compiled once and not five times
     for stage in range(5):
         if stage < 4:
@@ -66,25 +61,25 @@ def flow(
             at = _shift(motion, h, total)
             quat = quat_normalise(at.quat)
             at = Motion(
-                at.x_load, at.v_load, at.cable, at.cable_dot, quat, at.omega, at.length, at.length_dot
+                at.x_load, at.v_load, at.apart, at.apart_dot, quat, at.omega, at.length, at.length_dot
             )
             if taut > 0.0:
                 at = stretched(at, truth)
         # the stages lie at 0, 1/2, 1/2, 1 and 1 of the step
-        if stage % 2 == 1:
-            remainder *= half_decay
-            force = approach(rotor_force, command, remainder)
-        found = rates(at, force, truth, wind, taut)
+        if stage == 1:
+            wrench, row = middle, MIDDLE
+        elif stage == 3:
+            wrench, row = end, END
+        found = rates(at, wrench, rotors, row, truth, wind, taut)
         if stage == 0:
             tension_before = found.tension
         rate = found.motion
         total = _shift(total, _STAGE_WEIGHT[stage], rate)
     return Flow(
         at,
-        force,
         tension_before,
         found.tension,
-        sub(rate.v_load, rate.cable_dot),
+        found.accel_quad,
         found.quad_normal,
         found.load_normal,
     )

@@ -10,6 +10,8 @@ from math import inf
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import norm, sub
 from autopilot.geometry.packed import with_field
+from autopilot.geometry.so3 import rotation_from_quat
+from sitl.plant.attachment import attached_at
 from sitl.plant.records import PlantState, Truth
 
 
@@ -31,4 +33,5 @@ def dropped(state: PlantState) -> PlantState:
 @kernel
 def takes_hold(state: PlantState, truth: Truth) -> bool:
     """Whether a gripper that closes has the cable: the load lies on the ground, and within reach."""
-    return state.load_on_ground > 0.0 and norm(sub(state.x_load, state.x_quad)) <= truth.cable_length
+    held = attached_at(state.x_quad, rotation_from_quat(state.quat_wxyz), truth)
+    return state.load_on_ground > 0.0 and norm(sub(state.x_load, held)) <= truth.cable_length

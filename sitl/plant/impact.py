@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import axpy, dot, norm, scale
+from autopilot.geometry.so3 import rotation_from_quat
+from sitl.plant.attachment import by_inertia, cable_of, effective_mass, off_centre, turning_arm
 from sitl.plant.records import Motion, Truth
 
 
@@ -21,19 +23,34 @@ from sitl.plant.records import Motion, Truth
 def stretched(motion: Motion, truth: Truth) -> Motion:
     """The pair with its distance set to the cable length and no velocity along the cable but the winch's.
 
-    Centre of mass and linear momentum stay. After a taut step this takes back the integrator's drift; at the
+    Centre of mass and momenta stay. After a taut step this takes back the integrator's drift; at the
     instant a slack cable comes taut it is the perfectly inelastic impact.
     """
-    length = norm(motion.cable)
-    q_cable = scale(1.0 / length, motion.cable)
+    cable, cable_dot = cable_of(motion, truth)
+    length = norm(cable)
+    q_cable = scale(1.0 / length, cable)
     share = truth.quad_mass / (truth.quad_mass + truth.load_mass)
     excess = length - motion.length
-    speed = dot(q_cable, motion.cable_dot) - motion.length_dot
+    speed = dot(q_cable, cable_dot) - motion.length_dot
+    if off_centre(truth):
+        R = rotation_from_quat(motion.quat)
+        impulse = effective_mass(q_cable, R, truth) * speed
+        apart = impulse * (1.0 / truth.load_mass + 1.0 / truth.quad_mass)
+        return Motion(
+            axpy(-share * excess, q_cable, motion.x_load),
+            axpy(-impulse / truth.load_mass, q_cable, motion.v_load),
+            axpy(-excess, q_cable, motion.apart),
+            axpy(-apart, q_cable, motion.apart_dot),
+            motion.quat,
+            axpy(impulse, by_inertia(turning_arm(q_cable, R, truth), truth), motion.omega),
+            motion.length,
+            motion.length_dot,
+        )
     return Motion(
         axpy(-share * excess, q_cable, motion.x_load),
         axpy(-share * speed, q_cable, motion.v_load),
         scale(motion.length, q_cable),
-        axpy(-speed, q_cable, motion.cable_dot),
+        axpy(-speed, q_cable, cable_dot),
         motion.quat,
         motion.omega,
         motion.length,

@@ -3,7 +3,7 @@
 | symbol | code | frame, unit | equation |
 |---|---|---|---|
 | x_L, v_L | x_load, v_load | world, m, m/s | (2-30) |
-| L q | cable | world, m | (2-32) |
+| c = L q | cable | world, m | (2-32) |
 | R | R | body to world | (2-34) |
 | Omega | omega | body, rad/s | (2-35) |
 | f, M | thrust, moment | N; body, N m | (2-13) |
@@ -15,17 +15,50 @@ m_Q x_Q'' = F_Q + T q, and |x_L - x_Q| = L asks for T = mu (q . (F_L/m_L - F_Q/m
 without drag, ground and winch is (2-31) and (2-33). Slack is the same with T = 0. In the cable vector c = L q
 the two last terms are (c'.c' - L'^2) / L - L''.
 
-Assumed: cable massless, inextensible, attached at the vehicle's centre of mass; the load is a point.
+A cable that is attached at rho from the vehicle's centre of mass (`attachment`) turns it with T n, where
+n = rho x R^T q, and x_A'' has, beside x_Q'', R (Omega' x rho + Omega x (Omega x rho)). With alpha what Omega'
+is without the cable, and since q . R (J^-1 n x rho) = n . J^-1 n,
+
+    T = mu (q . (F_L/m_L - F_Q/m_Q - R (alpha x rho + Omega x (Omega x rho))) + (c'.c' - L'^2) / L - L'')
+    1/mu = 1/m_L + 1/m_Q + n . J^-1 n
+
+Assumed: cable massless, inextensible; the load is a point. What air and ground do to the rotors, and these to
+load and cable, is in `air`, `wake` and `cable_drag`; each is left out while its number is 0.
 """
 
 from __future__ import annotations
 
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, axpy, column, cross, dot, norm, scale, sub, times
+from autopilot.geometry.linear import (
+    Vec3,
+    add,
+    apply,
+    apply_transposed,
+    axpy,
+    column,
+    cross,
+    dot,
+    norm,
+    scale,
+    sub,
+    times,
+)
 from autopilot.geometry.so3 import quat_derivative, quat_normalise, rotation_from_quat
+from sitl.plant.air import blows, felt_by_rotors
+from sitl.plant.attachment import (
+    accel_beside,
+    arm_to,
+    by_inertia,
+    effective_mass,
+    off_centre,
+    speed_beside,
+    turning_arm,
+)
+from sitl.plant.cable_drag import UNTOUCHED, drag_of_cable
 from sitl.plant.contact import load_force, quad_wrench
-from sitl.plant.records import Motion, Rates, Rotors, Truth
-from sitl.plant.rotors import thrust_and_moment
+from sitl.plant.records import Motion, Rates, Truth
+from sitl.plant.rotors import RotorRows, Wrench
+from sitl.plant.wake import wake_at, wake_of
 
 
 @kernel
@@ -36,49 +69,83 @@ def drag_force(v: Vec3, wind: Vec3, linear: float, quadratic: float) -> Vec3:
 
 
 @kernel
-def rates(motion: Motion, rotor_force: Rotors, truth: Truth, wind: Vec3, taut: float) -> Rates:
-    """Time derivative of `motion` under the given rotor forces and wind (world, m/s)."""
+def rates(
+    motion: Motion, wrench: Wrench, rotors: RotorRows, stage: int, truth: Truth, wind: Vec3, taut: float
+) -> Rates:
+    """Time derivative of `motion` under what the rotors do, `wrench`, and the wind (world, m/s); what each
+    rotor gives is in the row `stage`."""
     R = rotation_from_quat(quat_normalise(motion.quat))
     Omega = motion.omega
-    v_quad = sub(motion.v_load, motion.cable_dot)
-    thrust, moment = thrust_and_moment(rotor_force, truth)
+    v_quad = sub(motion.v_load, motion.apart_dot)
+    x_quad = sub(motion.x_load, motion.apart)
+    cable, cable_dot = motion.apart, motion.apart_dot
+    beside = off_centre(truth)
+    if beside:
+        cable = sub(cable, arm_to(R, truth))
+        cable_dot = sub(cable_dot, speed_beside(R, Omega, truth))
+    thrust, moment = wrench.thrust, wrench.moment
 
-    ground_quad, ground_moment = quad_wrench(sub(motion.x_load, motion.cable), v_quad, R, Omega, truth)
+    ground_quad, ground_moment = quad_wrench(x_quad, v_quad, R, Omega, truth)
     a_quad = add(
         scale(thrust, column(R, 2)),
         add(drag_force(v_quad, wind, truth.quad_drag, truth.quad_drag_quadratic), ground_quad),
     )
-    a_quad = scale(1.0 / truth.quad_mass, a_quad)
+    if blows(truth):
+        felt = felt_by_rotors(rotors, stage, x_quad, v_quad, R, Omega, wind, truth)
+        a_quad = add(a_quad, apply(R, felt.force))
+        moment = add(moment, felt.moment)
+    air_at_load, on_cable = wind, UNTOUCHED
+    if truth.air.downwash > 0.0 or truth.air.cable_diameter > 0.0:
+        wake = wake_of(rotors, stage, x_quad, v_quad, R, wind, truth)
+        if truth.air.downwash > 0.0:
+            air_at_load = add(wind, wake_at(motion.x_load, wake, rotors, stage, truth))
+        if taut > 0.0 and truth.air.cable_diameter > 0.0:
+            on_cable = drag_of_cable(motion, cable, cable_dot, wind, wake, rotors, stage, truth)
+            a_quad = add(a_quad, on_cable.vehicle)
+            moment = add(moment, cross(truth.attachment, apply_transposed(R, on_cable.vehicle)))
     ground_load = load_force(motion.x_load, motion.v_load, truth)
-    a_load = add(drag_force(motion.v_load, wind, truth.load_drag, truth.load_drag_quadratic), ground_load)
+    a_load = add(
+        drag_force(motion.v_load, air_at_load, truth.load_drag, truth.load_drag_quadratic), ground_load
+    )
+    if truth.air.cable_diameter > 0.0:
+        a_load = add(a_load, on_cable.load)
+    a_quad = scale(1.0 / truth.quad_mass, a_quad)
     a_load = scale(1.0 / truth.load_mass, a_load)
-
-    tension = 0.0
-    a_cable = sub(a_load, a_quad)  # gravity, the same for both, is not in it
-    if taut > 0.0:
-        length = norm(motion.cable)
-        q_cable = scale(1.0 / length, motion.cable)
-        reduced_mass = truth.load_mass * truth.quad_mass / (truth.load_mass + truth.quad_mass)
-        turning = dot(motion.cable_dot, motion.cable_dot) - motion.length_dot * motion.length_dot
-        pull = dot(q_cable, a_cable) + turning / length - truth.reel_accel
-        tension = reduced_mass * pull
-        a_load = axpy(-tension / truth.load_mass, q_cable, a_load)
-        a_cable = axpy(-pull, q_cable, a_cable)
 
     J = truth.inertia
     moment = axpy(-truth.spin_drag * norm(Omega), Omega, add(moment, ground_moment))
     moment = sub(moment, cross(Omega, times(J, Omega)))
+    alpha = by_inertia(moment, truth)
+
+    tension = 0.0
+    a_apart = sub(a_load, a_quad)  # gravity, the same for both, is not in it
+    if taut > 0.0:
+        length = norm(cable)
+        q_cable = scale(1.0 / length, cable)
+        turning = dot(cable_dot, cable_dot) - motion.length_dot * motion.length_dot
+        pull = dot(q_cable, a_apart) + turning / length - truth.reel_accel
+        if beside:
+            pull -= dot(q_cable, accel_beside(R, Omega, alpha, truth))
+        tension = effective_mass(q_cable, R, truth) * pull
+        a_load = axpy(-tension / truth.load_mass, q_cable, a_load)
+        if beside:
+            alpha = axpy(tension, by_inertia(turning_arm(q_cable, R, truth), truth), alpha)
+            pull = tension * (1.0 / truth.load_mass + 1.0 / truth.quad_mass)
+        a_apart = axpy(-pull, q_cable, a_apart)
+
+    falling = (a_load[0], a_load[1], a_load[2] - truth.gravity)
     return Rates(
         Motion(
             motion.v_load,
-            (a_load[0], a_load[1], a_load[2] - truth.gravity),
-            motion.cable_dot,
-            a_cable,
+            falling,
+            motion.apart_dot,
+            a_apart,
             quat_derivative(motion.quat, Omega),
-            (moment[0] / J[0], moment[1] / J[1], moment[2] / J[2]),
+            alpha,
             motion.length_dot,
             truth.reel_accel,
         ),
+        sub(falling, a_apart),
         tension,
         ground_quad[2],
         ground_load[2],

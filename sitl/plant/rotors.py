@@ -1,11 +1,68 @@
-"""Four rotors: limits, first-order lag, and the forces and moments of (2-13)."""
+"""Any number of rotors: limits, first-order lag of each, and what they do to the body, (2-13).
+
+| symbol | code | frame, unit | |
+|---|---|---|---|
+| F_i | rows[FORCE, i] | N | force of a rotor, as it is |
+| u_i | rows[TARGET, i] | N | what it goes to: its command as far as it can follow it |
+| x_i, y_i | table | body, of `arm` | place |
+| c_i | table | of `torque_ratio` | drag torque by force, with the sign of the moment about the upward axis |
+| tau_i | table | of `rotor_tau` | F_i' = (u_i - F_i) / tau_i |
+
+    f = sum F_i     M_x = sum y_i F_i     M_y = -sum x_i F_i     M_z = sum c_i F_i
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import Vec3
-from sitl.plant.records import Rotors, Truth
+from autopilot.vehicle.layout import MOST, Layout
+from sitl.plant.drive import driven_force, is_driven
+from sitl.plant.records import Truth
+
+Array = NDArray[np.float64]
+
+# rows of `RotorRows.rows`, one column a rotor, with room for the most
+ASKED, COMMAND, TARGET, FORCE, END, SHARE, BEFORE, BEGIN, MIDDLE = range(9)
+# columns of `RotorRows.table`, one row a rotor
+ROLL, PITCH, YAW, STRENGTH, LAG, LEFT = range(6)
+
+
+class RotorRows(NamedTuple):
+    """The rotors of a vehicle, in arrays: all numbers of them are flown by the same machine code."""
+
+    table: Array  # (n, 6) what only parameters change
+    rows: Array  # (9, MOST) N: asked at this tick, in force, what it goes to, as it is, at the end of a step;
+    # share of its command that it gives; as it was before a step; at the begin and in the middle of a step
+
+
+class Wrench(NamedTuple):
+    """Thrust f in N and moment M in N m, body frame."""
+
+    thrust: float
+    moment: Vec3
+
+
+def rotor_table(layout: Layout, left: tuple[float, ...] = ()) -> Array:
+    """The table of these rotors; `left` is the share of its command that each gives when it has failed."""
+    table = np.zeros((len(layout), 6))
+    for row, rotor in zip(table, layout, strict=True):
+        row[:] = (rotor.y, -rotor.x, rotor.yaw, rotor.strength, rotor.lag, 1.0)
+    if left:
+        table[:, LEFT] = left
+    return table
+
+
+def rotors_at_rest() -> Array:
+    """The rows of whole rotors that stand still."""
+    rows = np.zeros((9, MOST))
+    rows[SHARE] = 1.0
+    return rows
 
 
 @kernel
@@ -15,15 +72,25 @@ def _clamp(force: float, low: float, high: float) -> float:
 
 
 @kernel
-def limited(command: Rotors, truth: Truth) -> Rotors:
-    """The command in N as far as each rotor can follow it at all."""
-    low, high, share = truth.rotor_min, truth.rotor_max, truth.rotor_share
-    return (
-        share[0] * _clamp(command[0], low, high),
-        share[1] * _clamp(command[1], low, high),
-        share[2] * _clamp(command[2], low, high),
-        share[3] * _clamp(command[3], low, high),
-    )
+def limit(rotors: RotorRows, truth: Truth) -> None:
+    """What each rotor goes to: its command as far as it can follow it at all."""
+    rows = rotors.rows
+    driven = is_driven(truth)
+    for i in range(rotors.table.shape[0]):
+        strength = rotors.table[i, STRENGTH]
+        low, high = strength * truth.rotor_min, strength * truth.rotor_max
+        force = _clamp(rows[COMMAND, i], low, high)
+        if driven:
+            force = driven_force(force, high, truth.drive, truth.supply)
+        rows[TARGET, i] = rows[SHARE, i] * force
+
+
+@kernel
+def keep(rotors: RotorRows, source: int, target: int) -> None:
+    """Copy a row."""
+    rows = rotors.rows
+    for i in range(rotors.table.shape[0]):
+        rows[target, i] = rows[source, i]
 
 
 @kernel
@@ -47,22 +114,35 @@ def decay(x: float) -> float:
 
 
 @kernel
-def approach(force: Rotors, command: Rotors, remainder: float) -> Rotors:
-    """Rotor forces when `remainder` of the way from `force` to `command` is left."""
+def wrenches(rotors: RotorRows, truth: Truth, h: float) -> tuple[Wrench, Wrench, Wrench]:
+    """What the rotors do now, after h/2 and after h (s), when each has the force in the row BEGIN, MIDDLE or
+    END."""
+    table, rows = rotors.table, rotors.rows
+    f0 = f1 = f2 = 0.0
+    x0 = x1 = x2 = 0.0
+    y0 = y1 = y2 = 0.0
+    z0 = z1 = z2 = 0.0
+    lag, half = -1.0, 0.0  # what is left of the way to the target after h/2
+    for i in range(table.shape[0]):
+        if table[i, LAG] != lag:
+            lag = table[i, LAG]
+            half = 0.0
+            if lag * truth.rotor_tau > 0.0:
+                half = decay(0.5 * h / (lag * truth.rotor_tau))
+        target, begin = rows[TARGET, i], rows[FORCE, i]
+        if not lag * truth.rotor_tau > 0.0:
+            begin = target
+        middle = target + half * (begin - target)
+        end = target + half * half * (begin - target)
+        rows[BEGIN, i], rows[MIDDLE, i], rows[END, i] = begin, middle, end
+        roll, pitch, yaw = table[i, ROLL], table[i, PITCH], table[i, YAW]
+        f0, f1, f2 = f0 + begin, f1 + middle, f2 + end
+        x0, x1, x2 = x0 + roll * begin, x1 + roll * middle, x2 + roll * end
+        y0, y1, y2 = y0 + pitch * begin, y1 + pitch * middle, y2 + pitch * end
+        z0, z1, z2 = z0 + yaw * begin, z1 + yaw * middle, z2 + yaw * end
+    arm, ratio = truth.arm, truth.torque_ratio
     return (
-        command[0] + remainder * (force[0] - command[0]),
-        command[1] + remainder * (force[1] - command[1]),
-        command[2] + remainder * (force[2] - command[2]),
-        command[3] + remainder * (force[3] - command[3]),
-    )
-
-
-@kernel
-def thrust_and_moment(force: Rotors, truth: Truth) -> tuple[float, Vec3]:
-    """Total thrust f in N and moment M in N m, body frame, plus configuration (2-13)."""
-    thrust = force[0] + force[1] + force[2] + force[3]
-    return thrust, (
-        truth.arm * (force[3] - force[1]),
-        truth.arm * (force[0] - force[2]),
-        truth.torque_ratio * (-force[0] + force[1] - force[2] + force[3]),
+        Wrench(f0, (arm * x0, arm * y0, ratio * z0)),
+        Wrench(f1, (arm * x1, arm * y1, ratio * z1)),
+        Wrench(f2, (arm * x2, arm * y2, ratio * z2)),
     )

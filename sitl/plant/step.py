@@ -13,14 +13,16 @@ from math import ceil
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above
-from autopilot.geometry.linear import ZERO, Vec3, axpy, dot, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, sub
+from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import tangent
-from autopilot.geometry.so3 import IDENTITY_QUAT
+from autopilot.geometry.so3 import IDENTITY_QUAT, rotation_from_quat
+from sitl.plant.attachment import arm_to, cable_of, off_centre, speed_beside
 from sitl.plant.contact import quad_reach
 from sitl.plant.flow import Flow, flow
 from sitl.plant.impact import stretched
-from sitl.plant.records import Motion, PlantState, Rotors, Truth
-from sitl.plant.rotors import limited
+from sitl.plant.records import Motion, PlantState, Truth
+from sitl.plant.rotors import BEFORE, END, FORCE, RotorRows, keep, limit
 
 # Longest steps, from benchmarks/plant_convergence.py: docs/plant.md has the table.
 MAX_STEP = 4e-3  # s, in the air
@@ -46,8 +48,8 @@ _LEAST_SPEED = 1e-60  # m/s, rad/s: of what rests on the ground
 @kernel
 def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
     """Longest step that resolves what may happen next; divides `remaining` evenly."""
-    v_quad_z = motion.v_load[2] - motion.cable_dot[2]
-    quad_clearance = motion.x_load[2] - motion.cable[2] - quad_reach(truth)
+    v_quad_z = motion.v_load[2] - motion.apart_dot[2]
+    quad_clearance = motion.x_load[2] - motion.apart[2] - quad_reach(truth)
     load_clearance = motion.x_load[2] - truth.load_radius
     longest = MAX_STEP
     if (
@@ -62,35 +64,36 @@ def segment_length(motion: Motion, truth: Truth, remaining: float) -> float:
 
 
 @kernel
-def _excess(motion: Motion, tension: float, taut: float) -> float:
+def _excess(motion: Motion, tension: float, taut: float, truth: Truth) -> float:
     """Positive when the mode must change: N the cable would push, or m it is longer than it is."""
     if taut > 0.0:
         return -tension - _TENSION_TOLERANCE
-    return norm(motion.cable) - motion.length - _LENGTH_TOLERANCE
+    return norm(cable_of(motion, truth)[0]) - motion.length - _LENGTH_TOLERANCE
 
 
 @kernel
-def _closing(motion: Motion) -> float:
+def _closing(motion: Motion, truth: Truth) -> float:
     """Speed in m/s at which the ends part faster than the cable is let out."""
-    return dot(motion.cable, motion.cable_dot) / norm(motion.cable) - motion.length_dot
+    cable, cable_dot = cable_of(motion, truth)
+    return dot(cable, cable_dot) / norm(cable) - motion.length_dot
 
 
 @kernel
-def _sound(motion: Motion) -> bool:
+def sound(motion: Motion) -> bool:
     """Whether the motion is finite and within the domain of the model; a comparison with nan is false."""
-    v_quad = sub(motion.v_load, motion.cable_dot)
+    v_quad = sub(motion.v_load, motion.apart_dot)
     return (
         norm(motion.omega) < _MAX_RATE
         and norm(motion.v_load) < _MAX_SPEED
         and norm(v_quad) < _MAX_SPEED
         and norm(motion.x_load) < _MAX_DISTANCE
-        and norm(motion.cable) < _MAX_DISTANCE
+        and norm(motion.apart) < _MAX_DISTANCE
         and abs(motion.quat[0]) <= 1.0 + 1e-9
     )
 
 
 @kernel
-def _held(state: PlantState) -> PlantState:
+def held(state: PlantState) -> PlantState:
     """`state`, marked as the last one before the motion left the domain of the model."""
     return PlantState(
         state.x_load,
@@ -101,7 +104,6 @@ def _held(state: PlantState) -> PlantState:
         state.v_quad,
         state.quat_wxyz,
         state.omega_body,
-        state.rotor_force,
         state.taut,
         state.slack_events,
         state.vehicle_on_ground,
@@ -124,31 +126,33 @@ def _at_rest(speed: float) -> float:
 
 
 @kernel
-def _resting(v: Vec3) -> Vec3:
+def resting(v: Vec3) -> Vec3:
     return (_at_rest(v[0]), _at_rest(v[1]), _at_rest(v[2]))
 
 
 @kernel
-def _state_of(end: Flow, q_before: Vec3, taut: float, slack_events: float, snap_speed: float) -> PlantState:
+def state_of(
+    end: Flow, q_before: Vec3, taut: float, slack_events: float, snap_speed: float, truth: Truth
+) -> PlantState:
     """The record of where a step led."""
     motion = end.motion
-    v_load, cable_dot = _resting(motion.v_load), _resting(motion.cable_dot)
+    v_load, apart_dot = resting(motion.v_load), resting(motion.apart_dot)
     q_cable, q_cable_dot = q_before, ZERO
-    distance = norm(motion.cable)
+    cable, cable_dot = cable_of(with_field(motion, "apart_dot", apart_dot), truth)
+    distance = norm(cable)
     # where the load passes through the vehicle the direction is undefined: keep the last one
     if distance > _LEAST_DISTANCE:
-        q_cable = scale(1.0 / distance, motion.cable)
+        q_cable = scale(1.0 / distance, cable)
         q_cable_dot = scale(1.0 / distance, tangent(q_cable, cable_dot))
     return PlantState(
         motion.x_load,
         v_load,
         q_cable,
         q_cable_dot,
-        sub(motion.x_load, motion.cable),
-        sub(v_load, cable_dot),
+        sub(motion.x_load, motion.apart),
+        sub(v_load, apart_dot),
         motion.quat,
-        _resting(motion.omega),
-        end.rotor_force,
+        resting(motion.omega),
         taut,
         slack_events,
         1.0 if end.quad_normal > 0.0 else 0.0,
@@ -161,8 +165,9 @@ def _state_of(end: Flow, q_before: Vec3, taut: float, slack_events: float, snap_
 
 
 @kernel
-def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, h: float) -> PlantState:
-    """The state h seconds later under constant rotor commands (N) and wind (world, m/s).
+def advance(state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: float) -> PlantState:
+    """The state h seconds later under constant wind (world, m/s) and the commands in `rotors`, whose forces
+    are brought there in place.
 
     Meant for h up to MAX_STEP; a longer one is divided. A state that leaves the domain of the model (see the
     limits above) is not returned: the one before it is, marked `diverged`, and stays.
@@ -172,21 +177,27 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
     """
     if state.diverged > 0.0:
         return state
-    command = limited(rotor_command, truth)
-    taut, slack_events, rotor_force = state.taut, state.slack_events, state.rotor_force
+    limit(rotors, truth)
+    keep(rotors, FORCE, BEFORE)
+    taut, slack_events = state.taut, state.slack_events
     if taut > 0.0:
         cable = scale(truth.cable_length, state.q_cable)
         cable_dot = scale(truth.cable_length, state.q_cable_dot)
         if truth.reel_rate != 0.0:
             cable_dot = axpy(truth.reel_rate, state.q_cable, cable_dot)
+        apart, apart_dot = cable, cable_dot
+        if off_centre(truth):
+            R = rotation_from_quat(state.quat_wxyz)
+            apart = add(cable, arm_to(R, truth))
+            apart_dot = add(cable_dot, speed_beside(R, state.omega_body, truth))
     else:
-        cable = sub(state.x_load, state.x_quad)
-        cable_dot = sub(state.v_load, state.v_quad)
+        apart = sub(state.x_load, state.x_quad)
+        apart_dot = sub(state.v_load, state.v_quad)
     motion = Motion(
         state.x_load,
         state.v_load,
-        cable,
-        cable_dot,
+        apart,
+        apart_dot,
         state.quat_wxyz,
         state.omega_body,
         truth.cable_length,
@@ -199,15 +210,15 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
         low, high, low_excess, high_excess, side = 0.0, t, 0.0, 0.0, 0
         switched = False
         for trial in range(_MAX_SEARCH):
-            end = flow(motion, rotor_force, command, truth, wind, taut, t)
-            excess = _excess(end.motion, end.tension, taut)
+            end = flow(motion, rotors, truth, wind, taut, t)
+            excess = _excess(end.motion, end.tension, taut, truth)
             if trial == 0:
-                low_excess, high_excess = _excess(motion, end.tension_before, taut), excess
+                low_excess, high_excess = _excess(motion, end.tension_before, taut, truth), excess
                 if taut <= 0.0 and impacts >= _MAX_IMPACTS:
                     break
                 if low_excess > 0.0:
                     # overdue: the forces jumped, or the last step had used up its impacts
-                    switched = taut > 0.0 or _closing(motion) > 0.0
+                    switched = taut > 0.0 or _closing(motion, truth) > 0.0
                     break
                 if not excess > 0.0:
                     break
@@ -226,7 +237,8 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
         if switched and low_excess > 0.0:
             t = 0.0
         else:
-            motion, rotor_force = end.motion, end.rotor_force
+            motion = end.motion
+            keep(rotors, END, FORCE)
         remaining -= t
         if switched:
             if taut > 0.0:
@@ -235,29 +247,30 @@ def advance(state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, 
             else:
                 taut = 1.0
                 impacts += 1
-                snap_speed = max(snap_speed, _closing(motion))
+                snap_speed = max(snap_speed, _closing(motion, truth))
                 motion = stretched(motion, truth)
         elif not remaining > 0.0:
             break
-    if not _sound(end.motion):
-        return _held(state)
-    return _state_of(end, state.q_cable, taut, slack_events, snap_speed)
+    if not sound(end.motion):
+        keep(rotors, BEFORE, FORCE)
+        return held(state)
+    return state_of(end, state.q_cable, taut, slack_events, snap_speed, truth)
 
 
 @kernel
 def advance_many(
-    state: PlantState, truth: Truth, rotor_command: Rotors, wind: Vec3, h: float, n: int
+    state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: float, n: int
 ) -> PlantState:
     """n steps of length h under the same commands and wind."""
     for _ in range(n):
-        state = advance(state, truth, rotor_command, wind, h)
+        state = advance(state, truth, rotors, wind, h)
     return state
 
 
 def initial_state(truth: Truth) -> PlantState:
     """Vehicle and load at rest on the ground, heading east, the load at home, the cable slack."""
     offset = 0.5 * truth.cable_length
-    cable = (offset, 0.0, truth.load_radius - truth.gear_height)
+    cable = sub((offset, 0.0, truth.load_radius - truth.gear_height), truth.attachment)
     length = norm(cable)
     return PlantState(
         x_load=(0.0, 0.0, truth.load_radius),
@@ -268,7 +281,6 @@ def initial_state(truth: Truth) -> PlantState:
         v_quad=ZERO,
         quat_wxyz=IDENTITY_QUAT,
         omega_body=ZERO,
-        rotor_force=(0.0, 0.0, 0.0, 0.0),
         taut=0.0,
         slack_events=0.0,
         vehicle_on_ground=1.0,

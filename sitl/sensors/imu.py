@@ -57,16 +57,24 @@ def start(config: ImuConfig, noise: Noise) -> ImuState:
 def sample(
     truth_state: PlantState, sensor_state: ImuState, config: ImuConfig, noise: Noise
 ) -> tuple[ImuReading, ImuState]:
-    """Specific force R^T (x'' + g e3) and body rate, each with bias and white noise, cut at full scale."""
+    """Specific force R^T (x'' + g e3) and body rate, each with bias and white noise."""
     R = rotation_from_quat(truth_state.quat_wxyz)
     a = truth_state.accel_quad
     force = apply_transposed(R, (a[0], a[1], a[2] + config.gravity))
     accel = add3(force, sensor_state.accel_bias, white(config.accel_noise, noise, 0))
     gyro = add3(truth_state.omega_body, sensor_state.gyro_bias, white(config.gyro_noise, noise, 1))
     return (
-        ImuReading(clip(accel, config.accel_range), clip(gyro, config.gyro_range)),
+        ImuReading(accel, gyro),
         ImuState(
             drift_step(sensor_state.accel_bias, config.accel_drift, noise, 2),
             drift_step(sensor_state.gyro_bias, config.gyro_drift, noise, 3),
         ),
+    )
+
+
+@kernel
+def cut(reading: ImuReading, config: ImuConfig) -> ImuReading:
+    """The reading cut at full scale."""
+    return ImuReading(
+        clip(reading.accel_body, config.accel_range), clip(reading.gyro_body, config.gyro_range)
     )

@@ -8,20 +8,27 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, add3
 from sitl.plant.records import PlantState
 from sitl.sensors.noise import Drift, Noise, drift_start, drift_step, white
+from sitl.sensors.room import Room, distortion
 
 
 class LoadConfig(NamedTuple):
-    """Deviations per sample, per axis; velocity_noise is nan where velocity is not measured."""
+    """Deviations per sample, per axis; velocity_noise is nan where velocity is not measured.
+
+    `wander` is a bounded, correlated error of the position.
+    """
 
     position_noise: float
     velocity_noise: float
     position_drift: Drift
+    wander: Drift
+    room: Room
 
 
 class LoadTrackerState(NamedTuple):
-    """Offset of the tracked point from the centre of the load, ENU, m."""
+    """Offset of the tracked point from the centre of the load, and the correlated error, ENU, m."""
 
     offset: Vec3
+    wander: Vec3
 
 
 class LoadReading(NamedTuple):
@@ -33,8 +40,10 @@ class LoadReading(NamedTuple):
 
 @kernel
 def start(config: LoadConfig, noise: Noise) -> LoadTrackerState:
-    """The calibration error at switch-on."""
-    return LoadTrackerState(drift_start(config.position_drift, noise, 3))
+    """The errors at switch-on."""
+    return LoadTrackerState(
+        drift_start(config.position_drift, noise, 3), drift_start(config.wander, noise, 5)
+    )
 
 
 @kernel
@@ -44,8 +53,14 @@ def sample(
     """Position and velocity with white noise."""
     x = truth_state.x_load
     position = add3(x, sensor_state.offset, white(config.position_noise, noise, 0))
+    wander = sensor_state.wander
+    if config.wander.drive > 0.0:
+        position = add(position, wander)
+        wander = drift_step(wander, config.wander, noise, 4)
+    if config.room.error > 0.0:
+        position = add(position, distortion(x, config.room, noise))
     velocity = add(truth_state.v_load, white(config.velocity_noise, noise, 1))
     return (
         LoadReading(position, velocity),
-        LoadTrackerState(drift_step(sensor_state.offset, config.position_drift, noise, 2)),
+        LoadTrackerState(drift_step(sensor_state.offset, config.position_drift, noise, 2), wander),
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import cos, exp, hypot, inf, nan, radians, sin, sqrt
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from sitl.sensors.barometer import BarometerConfig
@@ -21,8 +21,11 @@ from sitl.sensors.load_tracker import LoadConfig
 from sitl.sensors.magnetometer import MagnetometerConfig
 from sitl.sensors.noise import Drift
 from sitl.sensors.pose_tracker import PoseConfig
+from sitl.sensors.room import Room
+from sitl.sensors.vibration import VibrationConfig
 
 _HIGHEST_RATE_HZ = 20_000.0
+_LONGEST_JITTER = 5.0  # times its mean: one reading of 150 would be later
 
 # a sensor states at least these deviations, so that nobody divides by the zero of a perfect one
 _LEAST_POSITION_STD = 1e-4  # m
@@ -70,12 +73,37 @@ class Sampled(Delivery):
         return 1.0 / self.rate_hz if self.rate_hz > 0.0 else tick_s
 
 
+class Stamped(Sampled):
+    """A sensor whose readings carry the time of their measurement, and come over a network or a serial line.
+
+    On top of the latency each reading is late by a time of its own, exponentially distributed: one may
+    overtake another. The clock of the sensor is off by a constant.
+    """
+
+    jitter_ms: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    jitter_max_ms: Annotated[float, Field(ge=0.0, le=10_000.0)] | None = None
+    time_offset_ms: Annotated[float, Field(ge=-1000.0, le=1000.0)] = 0.0
+
+    @property
+    def latest_ms(self) -> float:
+        """By how much a reading is late at most, beyond the latency."""
+        if self.jitter_ms == 0.0:
+            return 0.0
+        return _LONGEST_JITTER * self.jitter_ms if self.jitter_max_ms is None else self.jitter_max_ms
+
+
 def _walk(bias: float, walk: float, period_s: float) -> Drift:
     return Drift(initial=bias, decay=1.0, drive=walk * sqrt(period_s))
 
 
+def _correlated(std: float, correlation_s: float, period_s: float) -> Drift:
+    """An error of this deviation that forgets itself over a time (first-order Gauss-Markov)."""
+    decay = exp(-period_s / correlation_s) if correlation_s > 0.0 else 0.0
+    return Drift(initial=std, decay=decay, drive=std * sqrt(1.0 - decay * decay))
+
+
 class Imu(Delivery):
-    """Accelerometer and gyroscope, one reading at every tick."""
+    """Accelerometer and gyroscope, one reading at every tick; vibration is that of the airframe at hover."""
 
     accel_noise_m_s2: Deviation
     accel_bias_m_s2: Deviation = 0.0
@@ -85,6 +113,10 @@ class Imu(Delivery):
     gyro_bias_rad_s: Deviation = 0.0
     gyro_walk_rad_s: Deviation = 0.0
     gyro_range_rad_s: Positive | None = None
+    vibration_m_s2: Deviation = 0.0
+    vibration_rad_s: Deviation = 0.0
+    vibration_broadband: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    lowpass_hz: Positive | None = None
 
     def config(self, tick_s: float, gravity: float) -> ImuConfig:
         """For the kernel; gravity of the world in m/s^2."""
@@ -98,13 +130,45 @@ class Imu(Delivery):
             gravity=gravity,
         )
 
+    def vibration(self, tick_s: float) -> VibrationConfig:
+        """For the kernel."""
+        return VibrationConfig(
+            self.vibration_m_s2,
+            self.vibration_rad_s,
+            self.vibration_broadband,
+            self.lowpass_hz or 0.0,
+            tick_s,
+        )
 
-class Mocap(Sampled):
-    """Motion capture of the vehicle. A velocity noise that is not given means: velocity is not measured."""
+
+class Tracker(Stamped):
+    """What motion capture makes of a place.
+
+    The correlated error has the given deviation and forgets itself over its time; the calibration error is a
+    distortion of the room with waves of the given length.
+    """
 
     position_noise_m: Deviation
     position_bias_m: Deviation = 0.0
     position_walk_m: Deviation = 0.0
+    position_correlated_m: Deviation = 0.0
+    correlation_s: Positive = 1.0
+    calibration_error_m: Deviation = 0.0
+    calibration_length_m: Positive = 2.0
+
+    def wander(self, tick_s: float) -> Drift:
+        """The correlated error."""
+        return _correlated(self.position_correlated_m, self.correlation_s, self.period_s(tick_s))
+
+    def room(self) -> Room:
+        """The calibration error."""
+        length = self.calibration_length_m
+        return Room(self.calibration_error_m if length > 0.0 else 0.0, length)
+
+
+class Mocap(Tracker):
+    """Motion capture of the vehicle. A velocity noise that is not given means: velocity is not measured."""
+
     attitude_noise_rad: Deviation
     velocity_noise_m_s: Deviation | None = None
     rate_noise_rad_s: Deviation | None = None
@@ -117,15 +181,14 @@ class Mocap(Sampled):
             velocity_noise=nan if self.velocity_noise_m_s is None else self.velocity_noise_m_s,
             rate_noise=nan if self.rate_noise_rad_s is None else self.rate_noise_rad_s,
             position_drift=_walk(self.position_bias_m, self.position_walk_m, self.period_s(tick_s)),
+            wander=self.wander(tick_s),
+            room=self.room(),
         )
 
 
-class LoadTracker(Sampled):
+class LoadTracker(Tracker):
     """Motion capture of the load."""
 
-    position_noise_m: Deviation
-    position_bias_m: Deviation = 0.0
-    position_walk_m: Deviation = 0.0
     velocity_noise_m_s: Deviation | None = None
 
     def config(self, tick_s: float) -> LoadConfig:
@@ -134,10 +197,12 @@ class LoadTracker(Sampled):
             position_noise=self.position_noise_m,
             velocity_noise=nan if self.velocity_noise_m_s is None else self.velocity_noise_m_s,
             position_drift=_walk(self.position_bias_m, self.position_walk_m, self.period_s(tick_s)),
+            wander=self.wander(tick_s),
+            room=self.room(),
         )
 
 
-class CableSensor(Sampled):
+class CableSensor(Stamped):
     """A camera that sees the load within a cone about the body's down axis, or encoders on a taut cable."""
 
     kind: Literal["camera", "encoder"]
@@ -156,8 +221,11 @@ class CableSensor(Sampled):
         )
 
 
-class Gnss(Sampled):
-    """Satellite navigation. The correlated error has the given deviation and forgets itself over its time."""
+class Gnss(Stamped):
+    """Satellite navigation. The correlated errors have the given deviation and forget themselves in time.
+
+    Multipath is one that the receiver does not count among its own deviations. A fix that floats says so.
+    """
 
     fix: Literal["3d", "rtk"]
     horizontal_noise_m: Deviation
@@ -168,10 +236,26 @@ class Gnss(Sampled):
     horizontal_velocity_noise_m_s: Deviation
     vertical_velocity_noise_m_s: Deviation
     satellites: Annotated[int, Field(ge=4, le=60)] = 12
+    horizontal_multipath_m: Deviation = 0.0
+    vertical_multipath_m: Deviation = 0.0
+    multipath_s: Positive = 20.0
+    float_per_min: Annotated[float, Field(ge=0.0, le=6000.0)] = 0.0
+    float_s: Positive = 5.0
+    float_error_m: Positive = 0.2
+    lost_per_min: Annotated[float, Field(ge=0.0, le=6000.0)] = 0.0
+    lost_s: Positive = 2.0
+
+    @model_validator(mode="after")
+    def _floats(self) -> Gnss:
+        if self.fix != "rtk" and self.float_per_min > 0.0:
+            raise ValueError('has float_per_min without fix = "rtk": only a fix with carrier phase floats')
+        return self
 
     def config(self, tick_s: float) -> GnssConfig:
         """For the kernel."""
-        decay = exp(-self.period_s(tick_s) / self.correlation_s)
+        period_s = self.period_s(tick_s)
+        multipath = self.horizontal_multipath_m + self.vertical_multipath_m > 0.0
+        floats = self.fix == "rtk"
         horizontal, vertical = self.horizontal_noise_m, self.vertical_noise_m
         speed, climb = self.horizontal_velocity_noise_m_s, self.vertical_velocity_noise_m_s
         return GnssConfig(
@@ -182,7 +266,19 @@ class Gnss(Sampled):
                 self.vertical_correlated_m,
             ),
             velocity_noise=(speed, speed, climb),
-            correlation=Drift(initial=1.0, decay=decay, drive=sqrt(1.0 - decay * decay)),
+            correlation=_correlated(1.0, self.correlation_s, period_s),
+            multipath_error=(
+                self.horizontal_multipath_m,
+                self.horizontal_multipath_m,
+                self.vertical_multipath_m,
+            ),
+            multipath=_correlated(1.0 if multipath else 0.0, self.multipath_s, period_s),
+            float_error=self.float_error_m if floats else 0.0,
+            float_chance=self.float_per_min / 60.0 * period_s if floats else 0.0,
+            float_s=self.float_s,
+            lost_chance=self.lost_per_min / 60.0 * period_s,
+            lost_s=self.lost_s,
+            period_s=period_s,
         )
 
 
@@ -195,13 +291,12 @@ class Barometer(Sampled):
 
     def config(self, tick_s: float) -> BarometerConfig:
         """For the kernel."""
-        decay = exp(-self.period_s(tick_s) / self.correlation_s)
-        drive = self.height_drift_m * sqrt(1.0 - decay * decay)
-        return BarometerConfig(self.height_noise_m, Drift(self.height_drift_m, decay, drive))
+        drift = _correlated(self.height_drift_m, self.correlation_s, self.period_s(tick_s))
+        return BarometerConfig(self.height_noise_m, drift)
 
 
 class Magnetometer(Sampled):
-    """The earth's field at home and the error of its measurement."""
+    """The earth's field at home and the error of its measurement; the motors' field is that at hover."""
 
     strength_gauss: Positive
     inclination_deg: Annotated[float, Field(ge=-90.0, le=90.0)]
@@ -209,6 +304,7 @@ class Magnetometer(Sampled):
     noise_gauss: Deviation
     hard_iron_gauss: Deviation = 0.0
     hard_iron_walk_gauss: Deviation = 0.0
+    motor_field_gauss: Deviation = 0.0
 
     def config(self, tick_s: float) -> MagnetometerConfig:
         """For the kernel: inclination is counted down from the horizon, declination east from north."""
@@ -245,6 +341,7 @@ class Stated(NamedTuple):
     direction: float
     gnss_horizontal: float
     gnss_vertical: float
+    gnss_float: float  # of a fix that floats, horizontal and vertical
 
 
 def stated_of(profile: Profile, scale: float) -> Stated:
@@ -269,4 +366,5 @@ def stated_of(profile: Profile, scale: float) -> Stated:
         gnss_vertical=std(_LEAST_POSITION_STD, gnss.vertical_noise_m, gnss.vertical_correlated_m)
         if gnss
         else nan,
+        gnss_float=std(_LEAST_POSITION_STD, gnss.float_error_m) if gnss else nan,
     )

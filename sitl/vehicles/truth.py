@@ -6,25 +6,60 @@ from os import PathLike
 
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
-from sitl.plant.records import Truth
+from sitl.plant.records import Air, ChainModel, Drive, Truth
+
+# keys of the vehicle file that are not named as the fields, with their unit behind
+_NAMED = {
+    "known_curve": "thrust_curve_known",
+    "speed_controlled": "esc_speed_controlled",
+    "cells": "battery_cells",
+    "capacity_as": "battery_capacity_mah",
+    "resistance": "battery_resistance_ohm",
+    "hover_w": "battery_hover_w",
+    "charge": "battery_charge",
+    "density": "air_density_kg_m3",
+}
+_RECORDS = ("air", "drive")  # of numbers
+_SCALES = {"capacity_as": 3.6}  # A s of a mAh
 
 
-def _keys() -> dict[str, str]:
-    """Key of the vehicle file for each field of Truth: the field's name with its unit behind it."""
+def _keys(record: type[Truth] | type[Air] | type[Drive]) -> dict[str, str]:
+    """Key of the vehicle file for each field, as `_NAMED` says, or the field's name with its unit behind."""
     found = {}
-    for field in Truth._fields:
+    for field in record._fields:
+        if field in _RECORDS:
+            continue
         keys = [key for key in Vehicle.model_fields if key == field or key.startswith(f"{field}_")]
-        if keys:  # else it is no number of the vehicle: rotors that fail, the winch
-            found[field] = min(keys, key=len)
+        if field in _NAMED or keys:  # else it is no number of the vehicle: the winch, the voltage
+            found[field] = _NAMED.get(field) or min(keys, key=len)
     return found
 
 
-KEYS = _keys()
+KEYS, AIR_KEYS, DRIVE_KEYS = _keys(Truth), _keys(Air), _keys(Drive)
+CHAIN_KEYS = {
+    "links": "cable_links",
+    "mass": "cable_mass_kg_m",
+    "drag_coefficient": "cable_drag_coefficient",
+    "stiffness": "cable_stiffness_n",
+    "damping": "cable_damping_n_s",
+    "hook": "load_hook_m",
+    "gyration": "load_gyration_m",
+    "gyration_upright": "load_gyration_upright_m",
+    "pressure": "load_pressure_m",
+    "spin_drag": "load_spin_drag_n_m_s2",
+}
 
 
 def truth_of(vehicle: Vehicle) -> Truth:
-    """The vehicle as the plant's kernels take it: all rotors whole, the winch at rest."""
-    return Truth(**{field: getattr(vehicle, key) for field, key in KEYS.items()})
+    """The vehicle as the plant's kernels take it: all rotors whole, the winch at rest, the battery without
+    current."""
+    values = {field: getattr(vehicle, key) for field, key in KEYS.items()}
+    air = {field: float(getattr(vehicle, key)) for field, key in AIR_KEYS.items()}
+    drive = {
+        field: _SCALES.get(field, 1.0) * float(getattr(vehicle, key)) for field, key in DRIVE_KEYS.items()
+    }
+    chain = ChainModel(**{field: getattr(vehicle, key) for field, key in CHAIN_KEYS.items()})
+    return Truth(**values, air=Air(**air), drive=Drive(**drive), chain=chain)
 
 
 def load_truth(name_or_path: str | PathLike[str]) -> Truth:

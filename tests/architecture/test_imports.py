@@ -5,7 +5,8 @@ laws, estimator and guidance on those; the supervisor on guidance and services; 
 everything below. A law is known by its folder: nothing outside imports one by name. `sitl` knows of the
 autopilot its geometry and its wire, and is built like it: the plant on geometry, the sensors on the plant,
 the world's tick on both. `gcs` knows also the paths and the definitions of parameters; only
-`gcs/closed_loop.py` and `gcs/sweep` join the cores. `plumbline`, which scripts import, stands on it. What a
+`gcs/closed_loop.py`, `gcs/sweep` and `plumbline/learning` join the cores. `plumbline`, which scripts import,
+stands on it. What a
 vehicle is and how a TOML file is read are leaves that every program shares. Sockets, clocks, threads and
 logging belong to the shells alone.
 """
@@ -25,14 +26,29 @@ LAW_FILES = (ROOT / "autopilot" / "control" / "laws").glob("[!_]*.py")
 LAWS = sorted(path.stem for path in LAW_FILES if path.stem != "interface")
 
 LEAVES = ("autopilot.geometry", "missions", "autopilot.trajectory", "autopilot.wire", "autopilot.vehicle")
-VEHICLE = ("autopilot.vehicle.model", "autopilot.vehicle.file")  # the record of a vehicle, and its file
+SHAPE = ("autopilot.vehicle.layout", "autopilot.vehicle.rotors")  # where rotors are, and what they can do
+VEHICLE = (  # the record of a vehicle, its file, and where its rotors are
+    "autopilot.vehicle.model",
+    "autopilot.vehicle.file",
+    "autopilot.vehicle.layout",
+)
+PLANT = ("sitl.plant.records", "sitl.plant.rotors")  # what the sensors may know of it
 RECORDS = "autopilot.control.records"  # what the laws speak of: vehicle, state, reference, command
+OWN = (  # what somebody brings, by its name
+    "autopilot.own.brought",
+    "autopilot.own.chosen",
+    "autopilot.own.estimator",
+    "autopilot.own.law",
+    "autopilot.own.planner",
+    "autopilot.own.source",
+)
 GCS = (
     "autopilot.geometry",
     "autopilot.trajectory",
     "autopilot.wire",
     "autopilot.shell.compiling",
     "autopilot.shell.options",
+    *OWN,
     *VEHICLE,
     "autopilot.vehicle.parameters",
     "sitl.sensors.shipped",
@@ -42,20 +58,28 @@ GCS = (
 MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "missions": (),
     "autopilot.geometry": (),
-    "autopilot.vehicle.model": (),
-    "autopilot.trajectory": ("autopilot.geometry", "autopilot.vehicle.model", "missions"),
+    "autopilot.vehicle.layout": (),
+    "autopilot.vehicle.rotors": ("autopilot.vehicle.layout",),
+    "autopilot.vehicle.battery": ("autopilot.geometry",),
+    "autopilot.vehicle.model": SHAPE,
+    "autopilot.trajectory": ("autopilot.geometry", "autopilot.vehicle.model", *SHAPE, "missions"),
     "autopilot.wire": ("autopilot.geometry", "autopilot.trajectory", "missions"),
     "autopilot.vehicle": ("autopilot.geometry", "missions", "autopilot.wire"),
     "autopilot.services": LEAVES,
     "autopilot.control": LEAVES,
-    "autopilot.estimation": (*LEAVES, RECORDS),
+    "autopilot.estimation": (*LEAVES, RECORDS, "autopilot.control.drag"),
     "autopilot.guidance": (*LEAVES, RECORDS),
     "autopilot.supervisor": (*LEAVES, RECORDS, "autopilot.guidance", "autopilot.services"),
+    **{one: (*LEAVES, *(other for other in OWN if other != one)) for one in OWN},
+    "autopilot.own.interruption": (),
+    "autopilot.own.source": ("autopilot.own.interruption",),
+    "autopilot.own": (*LEAVES, "autopilot.control", "autopilot.estimation"),
     "autopilot.core": (
         *LEAVES,
         "autopilot.control",
         "autopilot.estimation",
         "autopilot.guidance",
+        "autopilot.own",
         "autopilot.services",
         "autopilot.supervisor",
     ),
@@ -65,36 +89,66 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "autopilot.core",
         "autopilot.estimation",
         "autopilot.guidance",
+        "autopilot.own",
         "autopilot.services",
         "autopilot.supervisor",
     ),
     "autopilot.shell.options": ("autopilot.wire",),
     "autopilot.shell": ("autopilot",),
     "autopilot.__main__": ("autopilot",),
-    "sitl.plant": ("autopilot.geometry",),
-    "sitl.sensors": ("autopilot.geometry", "missions.toml_files", "sitl.plant.records"),
+    "sitl.plant": ("autopilot.geometry", "autopilot.vehicle.battery", "autopilot.vehicle.layout"),
+    "sitl.sensors": ("autopilot.geometry", "missions.toml_files", *PLANT),
+    # it stands at the speed that the speed controllers tell
+    "sitl.sensors.vibration": ("autopilot.geometry", "autopilot.wire.convert", *PLANT, "sitl.sensors"),
     "sitl.vehicles": (*VEHICLE, "autopilot.wire", "sitl.plant.records"),
-    "sitl.settings": ("autopilot.geometry", "autopilot.wire"),
-    "sitl.world": ("autopilot.geometry", "sitl.plant", "sitl.sensors", "sitl.settings"),
-    "sitl.sim_core": ("autopilot.geometry", "sitl.plant", "sitl.sensors", "sitl.settings", "sitl.world"),
+    "sitl.settings": ("autopilot.geometry", "autopilot.wire", "sitl.sensors.chosen"),
+    "sitl.world": (
+        "autopilot.geometry",
+        "autopilot.vehicle.layout",
+        "sitl.plant",
+        "sitl.sensors",
+        "sitl.settings",
+    ),
+    "sitl.sim_core": (
+        "autopilot.geometry",
+        "autopilot.vehicle.layout",
+        "sitl.plant",
+        "sitl.sensors",
+        "sitl.settings",
+        "sitl.world",
+    ),
     "sitl": (
         "autopilot.geometry",
         "autopilot.wire",
         "autopilot.shell.compiling",
         "autopilot.shell.options",
+        "autopilot.vehicle.battery",
         *VEHICLE,
     ),
     "gcs": GCS,
     "gcs.workflows.flight_inputs": (
         *GCS,
         "gcs",
+        "autopilot.own",
+        "autopilot.shell.watched_calls",
+        "autopilot.vehicle.rates",
         "sitl.sensors.files",
+        "sitl.settings",
         "sitl.vehicles",
     ),
+    "gcs.workflows.own_planner": (*GCS, "gcs", "autopilot.own", "autopilot.shell.watched_calls"),
+    "gcs.workflows.flight_here": (*GCS, "gcs", "autopilot.shell.watched_calls"),
     "gcs.report.settings": (*GCS, "gcs", "sitl.vehicles"),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
-    "plumbline": ("autopilot.vehicle.parameters", "autopilot.wire", "missions", "gcs"),
+    "gcs.templates": ("plumbline",),  # files of users, which import what scripts import
+    "plumbline.estimators": ("autopilot.estimation.desk", RECORDS, "autopilot.own"),
+    "plumbline.laws": ("autopilot.control.law_desk", RECORDS, "autopilot.own"),
+    "plumbline.planners": ("autopilot.trajectory", "autopilot.own"),
+    "plumbline.vectors": ("autopilot.geometry",),
+    "plumbline": (*OWN, *VEHICLE, "autopilot.vehicle.parameters", "autopilot.wire", "missions", "gcs"),
+    "plumbline.learning": ("autopilot", "sitl", "missions", "gcs", "plumbline"),
+    "plumbline.sensors": ("missions", "plumbline", "sitl.sensors"),
 }
 # module: the only ones that may import it
 TOP: dict[str, tuple[str, ...]] = {
@@ -104,9 +158,10 @@ TOP: dict[str, tuple[str, ...]] = {
         "autopilot.__main__",
         "gcs.closed_loop",
         "gcs.sweep",
+        "plumbline.learning",
     ),
     "autopilot.onboard": ("autopilot.shell", "autopilot.__main__", "gcs.closed_loop", "gcs.sweep"),
-    "gcs.closed_loop": ("gcs",),
+    "gcs.closed_loop": ("gcs", "plumbline.learning"),
     **{f"autopilot.control.laws.{law}": ("autopilot.control.laws",) for law in LAWS},
 }
 
@@ -114,6 +169,7 @@ WORLD = {"socket", "selectors", "time", "random", "logging", "threading", "async
 SHELLS = (
     "autopilot.shell",
     "sitl.__main__",
+    "sitl.shell",
     "gcs.__main__",
     "gcs.commands",
     "gcs.shell",

@@ -1,4 +1,4 @@
-"""The programs that come with pymavlink, as they are started by hand, with the log of a flight of ours."""
+"""The programs that come with pymavlink, as docs/tools.md starts them, with the log of a flight of ours."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.tlog import read_tlog
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.processes, pytest.mark.xdist_group("tools")]  # they share a flight
 FAST = Path(__file__).with_name("fast.toml")
 MOST_LOST_PERCENT = 0.5
 COUNTED_M_S = 3.0  # mavflighttime's own threshold

@@ -7,19 +7,18 @@ Each proof takes the laws as a namespace of functions and checks them against id
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
 from math import cos, sin
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.optimize import linprog
 
 from autopilot.control.records import Reference, Vehicle
+from tests.control.closeness import EXACT, close
+from tests.control.mixer_proofs import MIXER_PROOFS
 
 # each with its reason
-EXACT = 1e-12  # a handful of roundings on numbers of order one
 DIFFERENCE = (
     2e-6  # central differences with step 1e-4 on motions of a few rad/s: h^2/6 times a third derivative
 )
@@ -27,35 +26,9 @@ STEP = 1e-4
 FILTERED = 1e-10  # two ways to the exponential of the filter, times omega_n^2
 PRINTED = 5e-7  # the oracle's moments are printed with six or more decimals
 FDCL_THRUST = 5e-5  # printed with four decimals
-SLACK = 1e-9  # what a linear programme may give up of an optimum found before: its own feasibility is 1e-7
-PROGRAMME = 2e-6  # forces found by the linear programmes
-
-# thrust (N) and moments (N m) that four rotors of Table 4-1 cannot give
-SATURATING = (
-    (4.9, 0.30, 0.0, 0.0),
-    (4.9, -0.30, 0.40, 0.0),
-    (4.9, 0.10, -0.30, 0.01),
-    (4.9, 0.20, 0.15, -0.05),
-    (7.8, 0.10, 0.05, 0.0),
-    (7.8, -0.02, -0.10, 0.02),
-    (0.3, 0.05, -0.10, 0.01),
-    (-2.0, 0.10, 0.02, -0.02),
-    (20.0, -0.05, 0.15, 0.05),
-    (5.0, 0.0, 0.0, 0.09),
-    (3.0, 0.0, 0.0, -0.09),
-    (2.0, 0.02, 0.09, 0.05),
-)
 
 E1 = np.array([1.0, 0.0, 0.0])
 E3 = np.array([0.0, 0.0, 1.0])
-
-
-def close(actual: Any, expected: Any, tolerance: float) -> None:
-    """All numbers equal within the tolerance times the size of what is expected (at least 1); NaN never
-    is."""
-    actual, expected = np.asarray(actual, float), np.asarray(expected, float)
-    error = np.max(np.abs(actual - expected))
-    assert error <= tolerance * max(1.0, float(np.max(np.abs(expected)))), f"{actual} is not {expected}"
 
 
 def motions(seed: int) -> Iterator[np.random.Generator]:
@@ -421,62 +394,6 @@ def hover_asks_for_weight_alone(laws: SimpleNamespace, model: SimpleNamespace, v
         memory = commands[0][0]
 
 
-# --- mixer
-
-
-def forces_make_the_demand(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """The inverse of (2-13) is its inverse, by the matrix as printed, with limits out of reach and with
-    none."""
-    arm, c = vehicle.arm, vehicle.torque_ratio
-    matrix = np.array([[1, 1, 1, 1], [0, -arm, 0, arm], [arm, 0, -arm, 0], [-c, c, -c, c]])
-    for limited, thrust, moment in ((1.0, 4.0, (0.01, -0.02, 0.003)), (0.0, 9.0, (-0.4, 0.3, 0.05))):
-        result = laws.mix(thrust, moment, vehicle, limited)
-        close(matrix @ np.array(result.forces), (thrust, *moment), EXACT)
-        close((result.thrust_done, *result.moment_done), (thrust, *moment), EXACT)
-        assert result.saturated == 0
-
-
-@cache
-def best_forces(vehicle: Vehicle, demand: tuple[float, ...]) -> tuple[float, ...]:
-    """Thrust and moment nearest to the demand, roll and pitch first, then thrust, then yaw: linear
-    programmes one after the other, each with the optimum of those before it as a constraint. Forces in
-    newtons, errors over l."""
-    arm, c = vehicle.arm, vehicle.torque_ratio
-    rows = np.array([[0, -1, 0, 1], [1, 0, -1, 0], [1, 1, 1, 1], [-1, 1, -1, 1]])
-    wanted = np.array([demand[1] / arm, demand[2] / arm, demand[0], demand[3] / c])
-    bounds = [(vehicle.rotor_min, vehicle.rotor_max)] * 4
-    A_ub, b_ub = np.zeros((0, 8)), np.zeros(0)
-    # |rows F - wanted| <= e, with e the variables 4 to 7
-    for i in range(4):
-        for sign in (1.0, -1.0):
-            A_ub = np.vstack([A_ub, np.concatenate([sign * rows[i], -np.eye(4)[i]])])
-            b_ub = np.append(b_ub, sign * wanted[i])
-    for costs in ((4, 5), (6,), (7,)):
-        cost = np.zeros(8)
-        cost[list(costs)] = 1.0
-        solved = linprog(cost, A_ub, b_ub, bounds=bounds + [(0.0, None)] * 4)
-        assert solved.status == 0, solved.message
-        A_ub, b_ub = np.vstack([A_ub, cost]), np.append(b_ub, solved.fun + SLACK)
-    done = rows @ solved.x[:4]
-    return (done[2], done[0] * arm, done[1] * arm, done[3] * c)
-
-
-def cuts_by_priority(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Demands beyond the limits: what is done is what the linear programmes find, and the bits name the
-    rotors."""
-    arm, c = vehicle.arm, vehicle.torque_ratio
-    inverse = np.linalg.inv(np.array([[1, 1, 1, 1], [0, -arm, 0, arm], [arm, 0, -arm, 0], [-c, c, -c, c]]))
-    for limits in ((0.0, 1.96), (0.1, 1.5)):
-        limited = vehicle._replace(rotor_min=limits[0], rotor_max=limits[1])
-        for demand in SATURATING:
-            result = laws.mix(demand[0], demand[1:], limited, 1.0)
-            plain = inverse @ np.array(demand)
-            bits = sum(1 << i for i in range(4) if not limits[0] <= plain[i] <= limits[1])
-            assert result.saturated == bits != 0
-            assert all(limits[0] <= F <= limits[1] for F in result.forces)
-            close((result.thrust_done, *result.moment_done), best_forces(limited, demand), PROGRAMME)
-
-
 def errors_reach_the_command(laws: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
     """Away from the target the modes report the errors of the state, and push back."""
     y = model.pack((0.1, -0.2, 1.3), (0.3, 0.1, -0.2), -E3, (0.2, -0.1, 0.0), np.eye(3), (0.0, 0.0, 0.0))
@@ -519,6 +436,5 @@ PROOFS: tuple[Any, ...] = (
     first_moment_of_the_oracle,
     hover_asks_for_weight_alone,
     errors_reach_the_command,
-    forces_make_the_demand,
-    cuts_by_priority,
+    *MIXER_PROOFS,
 )

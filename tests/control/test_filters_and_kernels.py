@@ -10,8 +10,9 @@ from scipy.signal import lsim
 
 from autopilot.control import command_filter, quad_position
 from autopilot.control import thesis_cascade as thesis
-from autopilot.control.actuators.mixer import mix
+from autopilot.control.actuators import mixer
 from autopilot.control.records import Reference, Vehicle
+from tests.doubles.mixing import mix
 
 SCIPY = 1e-10  # lsim's own matrix exponential, over 500 steps
 
@@ -58,7 +59,9 @@ def test_compiled_laws_are_the_plain_ones_to_the_bit(
         load_attitude=thesis.load_attitude,
         quad_attitude=thesis.quad_attitude,
         quad_position=quad_position.quad_position,
-        mix=mix,
+        mix=mixer.mix,
+        new_rotors=mixer.new_rotors,
+        FORCE=mixer.FORCE,
     )
     for _ in range(20):
         x, v, w, W, x_d, bend, phi = rng.normal(size=(7, 3))
@@ -74,6 +77,6 @@ def test_compiled_laws_are_the_plain_ones_to_the_bit(
                 memory, state, reference, 0.1, zero, position_gains, gains, filters, bebop
             )
             memories[n] = memory
-            mixed = room.mix(first.thrust, first.moment, bebop, 1.0)
+            mixed = mix(first.thrust, first.moment, bebop, 1.0, room=room)
             results.append((memory, first, second, third, fourth, mixed))
         assert repr(results[0]) == repr(results[1])

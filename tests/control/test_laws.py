@@ -26,7 +26,9 @@ import missions
 from autopilot.control.actuators import disturbance_observer as observer
 from autopilot.control.actuators.disturbance_observer import Observed
 from autopilot.control.actuators.rotor_model import Actuation, advance, rows_of, steady
+from autopilot.control.actuators.torque_observer import NO_TORQUE
 from autopilot.control.believed import believed_actuation, believed_vehicle
+from autopilot.control.drag import Drag
 from autopilot.control.laws import LAWS, build_law, chosen_law
 from autopilot.control.laws.interface import Kernels, Law, kernels_of, law_of, new_rows
 from autopilot.control.records import Cable, Command, Reference, State
@@ -271,6 +273,15 @@ def fingerprints() -> dict[str, str]:
                     10.0,
                     float(rng.choice([0.0, 3.0])),
                     float(rng.choice([-9.0, 9.0])),
+                    triple(0.2 * rng.normal(size=3)),
+                    Drag(*(0.1 * rng.random(2))),
+                    ZERO,
+                    ZERO,
+                    0.0,
+                    0.0,
+                    triple((*(0.1 * rng.normal(size=2)), 0.0)),
+                    float(0.1 * rng.random()),
+                    NO_TORQUE._replace(now=triple(0.005 * rng.normal(size=3))),
                 )
                 q_d, R_d = motion(rng, length).q_cable, motion(rng, length).R
                 followed: dict[str, tuple[Any, ...]] = {
@@ -453,7 +464,7 @@ core.change(
 )
 asked = []
 for now_us in (4000, 8000, 12000):
-    pack(Seen(state, True, 0.0, weight, 0.0, 0, 0, 0.0), core.rows.seen, 0)
+    pack(Seen(state, True, 0.0, weight, 0.0, 0, 0, 0.0, 0), core.rows.seen, 0)
     core.decide(now_us, 4000)
     control_tick(core.rows, core.law_rows, 0)
     asked.append([core.pilot.command.thrust, sum(core.forces)])

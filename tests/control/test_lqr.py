@@ -18,7 +18,6 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from autopilot.control import lqr
-from autopilot.control.actuators.mixer import mix
 from autopilot.control.linear_model import PHI_L, THETA_L, second_order, state_space
 from autopilot.control.records import Reference, State, Vehicle
 from autopilot.geometry.linear import ZERO
@@ -27,10 +26,11 @@ from autopilot.trajectory.signals import evaluate, signal_table
 from gcs.analysis.step import Step, step_response
 from missions.fileformat import load_mission
 from missions.model import Signals
+from sitl.plant.by_value import advance, initial_state
 from sitl.plant.records import PlantState, Truth
-from sitl.plant.step import advance, initial_state
 from sitl.vehicles.truth import load_truth
 from tests.control.plain_laws import plain_laws, text_of
+from tests.doubles.mixing import mix
 
 Array = NDArray[np.float64]
 PRINTED = np.array(json.loads((Path(__file__).parent / "printed_gains.json").read_text())["K"])

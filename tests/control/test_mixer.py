@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from autopilot.control.actuators.mixer import ALL_ROTORS, MixerResult, mix, thrust_and_moment
 from autopilot.control.records import Vehicle
+from autopilot.vehicle.layout import Layout, Rotor
+from tests.doubles.mixing import mix
 
 BEBOP = Vehicle(0.4, 0.1, 0.7, (2.23e-3, 2.99e-3, 4.8e-3), 9.81, 0.126, 0.016, 0.0, 1.96)
 INF = float("inf")
@@ -36,8 +37,8 @@ def test_forces_are_always_within_limits(thrust: float, moment: tuple[float, flo
 
 @given(st.tuples(*[st.floats(0.01, 1.95)] * 4))
 def test_demand_within_limits_is_done_exactly(forces: tuple[float, float, float, float]) -> None:
-    thrust, moment = thrust_and_moment(forces, BEBOP)
-    result = mix(thrust, moment, BEBOP, 1.0)
+    thrust, *moment = rotor_rows(BEBOP) @ np.array(forces)
+    result = mix(float(thrust), tuple(map(float, moment)), BEBOP, 1.0)
     np.testing.assert_allclose(result.forces, forces, atol=ROUNDING)
     assert result.saturated == 0
 
@@ -100,8 +101,61 @@ def test_no_demand_makes_nan(
     high: float, limited: float, thrust: float, moment: tuple[float, float, float]
 ) -> None:
     result = mix(thrust, moment, BEBOP._replace(rotor_max=high), limited)
-    assert isinstance(result, MixerResult)
     numbers = (*result.forces, result.thrust_done, *result.moment_done)
     assert not np.isnan(numbers).any()
     if not np.isfinite([thrust, *moment]).all():
-        assert result.saturated == ALL_ROTORS
+        assert result.saturated == 0b1111
+
+
+# ---- any rotors
+
+
+@st.composite
+def layouts(draw: st.DrawFn) -> Layout:
+    """Five to eight rotors around the vehicle, unlike each other, by which it can be held."""
+    count = draw(st.integers(5, 8))
+    near = st.floats(0.6, 1.2)
+    rotors = []
+    for i in range(count):
+        angle = 2.0 * np.pi * (i + draw(st.floats(-0.3, 0.3))) / count
+        reach, sign = draw(near), 1.0 if i % 2 else -1.0
+        rotors.append(Rotor(reach * np.cos(angle), reach * np.sin(angle), sign * draw(near), draw(near)))
+    return tuple(rotors)
+
+
+def rows_of(layout: Layout, vehicle: Vehicle) -> np.ndarray:
+    arm, ratio = vehicle.arm, vehicle.torque_ratio
+    return np.array([(1.0, arm * r.y, -arm * r.x, ratio * r.yaw) for r in layout]).T
+
+
+@settings(deadline=None)
+@given(layouts(), st.floats(-5.0, 30.0), moments, st.integers(-1, 7))
+def test_any_rotors_stay_within_limits_and_do_what_is_told(
+    layout: Layout, thrust: float, moment: tuple[float, float, float], lost: int
+) -> None:
+    """Also without one that is lost, which does nothing. Roll and pitch are cut, never turned round."""
+    gone = 1 << lost if 0 <= lost < len(layout) else 0
+    result = mix(thrust, moment, BEBOP, 1.0, layout, gone)
+    for i, (rotor, force) in enumerate(zip(layout, result.forces, strict=True)):
+        share = 0.0 if gone >> i & 1 else rotor.strength
+        assert share * BEBOP.rotor_min - ROUNDING <= force <= share * BEBOP.rotor_max + ROUNDING
+    done = rows_of(layout, BEBOP) @ np.array(result.forces)
+    np.testing.assert_allclose((result.thrust_done, *result.moment_done), done, atol=ROUNDING)
+    if result.saturated == 0:
+        np.testing.assert_allclose(done[:3], (thrust, *moment[:2]), atol=1e3 * ROUNDING)
+    for asked, given_ in zip(moment[:2], result.moment_done[:2], strict=True):
+        assert abs(given_) <= abs(asked) + 1e3 * ROUNDING
+        assert asked * given_ >= -1e3 * ROUNDING
+
+
+@settings(deadline=None)
+@given(layouts(), st.floats(0.2, 0.8), moments)
+def test_unlimited_it_is_the_least_squares_inverse(
+    layout: Layout, thrust: float, moment: tuple[float, float, float]
+) -> None:
+    """Of efforts, so that rotors of different strength are used alike; beside NumPy's."""
+    result = mix(thrust, moment, BEBOP, 0.0, layout)
+    strengths = np.array([rotor.strength for rotor in layout])
+    efforts = np.linalg.pinv(rows_of(layout, BEBOP) * strengths) @ np.array([thrust, *moment])
+    np.testing.assert_allclose(result.forces, strengths * efforts, atol=1e5 * ROUNDING)
+    assert result.moment_done == pytest.approx(moment, abs=1e5 * ROUNDING)

@@ -1,4 +1,4 @@
-"""docs/control.md names the files and functions of the control room as they are."""
+"""docs/control.md and its log name the files and functions of the control room as they are."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from pathlib import Path
 import autopilot.control
 
 ROOT = Path(__file__).parents[2]
-TEXT = (ROOT / "docs/control.md").read_text(encoding="utf-8")
+TEXT = "".join(
+    (ROOT / page).read_text(encoding="utf-8") for page in ("docs/control.md", "docs/control-log.md")
+)
 CONTROL = Path(autopilot.control.__path__[0])
 FILE = re.compile(r"`(?:python )?([\w/]+\.(?:py|toml))\b[^`]*`")
 FUNCTION = re.compile(r"`(\w+)\.(?!py`|toml`)(\w+)(?:\(|`)")

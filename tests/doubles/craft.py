@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import groupby
 from typing import Any
 
 from autopilot.estimation.records import EstimatorState
@@ -10,6 +11,7 @@ from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Hold
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.snapshot import Options
+from autopilot.own.chosen import NOTHING_OWN, Own
 from autopilot.services.identity import identity_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
@@ -17,7 +19,7 @@ from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import encode_steps
+from autopilot.wire.items import WireItem, encode_steps
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
 from missions.model import Step
 from sitl.hil import HilSimulator
@@ -40,16 +42,22 @@ class Craft:
 
     def __init__(
         self,
-        *steps: Step,
+        *steps: Step | WireItem,
         sensors: str = "lab",
         seed: int = 1,
         clock_waits: bool = True,
         lockstep: bool = True,
+        own: Own = NOTHING_OWN,
+        vehicle: str = "bebop",
         **settings_: float,
     ) -> None:
-        conditions = Conditions(sensors=sensors, seed=seed, settings=settings_)
-        items = encode_steps(steps, Home()) if steps else ()
-        mission = StoredMission(items)
+        conditions = Conditions(vehicle=vehicle, sensors=sensors, seed=seed, settings=settings_, own=own)
+        # what an item means may depend on those before it: steps in a row are encoded together
+        items: list[WireItem] = []
+        for wire, run in groupby(steps, lambda one: isinstance(one, WireItem)):
+            together = list(run)
+            items += together if wire else encode_steps(together, Home())
+        mission = StoredMission(tuple(items))
         self.onboard: Onboard = build_onboard(conditions, Home(), mission)
         if not clock_waits:
             table = self.onboard.parameters
@@ -132,6 +140,7 @@ _HEARD = {
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
     mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE,
 }
 
 

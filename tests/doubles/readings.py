@@ -17,7 +17,7 @@ from autopilot.estimation.records import (
     LoadReading,
     PoseReading,
 )
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.linear import ZERO, Vec3
 
 
 class Readings(NamedTuple):
@@ -64,4 +64,4 @@ def estimate(
         box.put_vector(inbox, count, box.FIELD, readings.field_body)
         count += 1
     cable = Cable(tuning.cable_length)
-    return estimate_from_inbox(state, history, inbox, count, 0, tuning, cable, 0.0, dt, thrust)
+    return estimate_from_inbox(state, history, inbox, count, 0, tuning, cable, 0.0, dt, thrust, ZERO)

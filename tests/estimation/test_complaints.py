@@ -78,7 +78,8 @@ def test_each_doubt_has_its_limit_and_its_words(
     source: float, load_source: float, part: str, last: float, words: str
 ) -> None:
     assert complaints(settled(source, load_source, part, 0.999 * last), OLDEST_S) == ()
-    for value in (1.001 * last, inf, nan) if words else (inf, nan):
+    beyond = (1.001 * last, nan) if words == NO_SIGHT else (1.001 * last, inf, nan)
+    for value in beyond if words else (inf, nan):
         state = settled(source, load_source, part, value)
         assert complaints(state, OLDEST_S) == ((words.format(state.doubt.horizontal),) if words else ())
         about_the_load = words in ABOUT_THE_LOAD
@@ -86,6 +87,18 @@ def test_each_doubt_has_its_limit_and_its_words(
         assert bool(vehicle_complaint(state, OLDEST_S)) == (bool(words) and not about_the_load)
         if about_the_load:
             assert complaints(state, OLDEST_S, carries=False) == ()
+
+
+@pytest.mark.parametrize(
+    ("held_s", "doubt", "words"),
+    [(9.0, 0.0999, ()), (9.0, 0.1001, (LOAD,)), (9.0, nan, (LOAD,)), (0.9, 1.0, ())],
+)
+def test_a_load_that_no_sensor_has_ever_seen_is_flown_by_its_pull(
+    held_s: float, doubt: float, words: tuple[str, ...]
+) -> None:
+    state = settled(RECEIVER, CAMERA, "load", doubt)
+    state = state._replace(load=state.load._replace(age_s=inf, held_s=held_s))
+    assert complaints(state, OLDEST_S) == words
 
 
 @pytest.mark.parametrize(("load_source", "words"), [(TRACKER, (LOAD,)), (CAMERA, ())])

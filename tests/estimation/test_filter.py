@@ -316,7 +316,7 @@ def test_covariances_stay_positive_definite_at_any_rate_age_and_precision(
     imu = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, tuning.gravity))
     zero = (0.0, 0.0, 0.0)
     for dt, who, age, std, velocity_std in script * 3:
-        state = predict(state, history, imu, tuning, dt, 0.0)
+        state = predict(state, history, imu, tuning, dt, 0.0, ZERO)
         if who in ("pose", "both"):
             pose = PoseReading(age, (0.0, 0.0, 0.7), (1.0, 0.0, 0.0, 0.0), zero, std, std, velocity_std)
             state = correct_pose(state, history, pose, tuning)
@@ -329,9 +329,9 @@ def test_looking_back_sees_the_past_and_a_correction_moves_all_of_it_that_matter
     state, history, tuning = blank_state(), new_history(), bebop_tuning()
     start = PoseReading(0.0, (1.0, 0.0, 2.0), (1.0, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0), 1e-4, 1e-4, 1e-4)
     imu = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, tuning.gravity))
-    state = correct_pose(predict(state, history, imu, tuning, 0.0, 0.0), history, start, tuning)
+    state = correct_pose(predict(state, history, imu, tuning, 0.0, 0.0, ZERO), history, start, tuning)
     for _ in range(700):  # more than the ring holds
-        state = predict(state, history, imu, tuning, TICK_S, 0.0)
+        state = predict(state, history, imu, tuning, TICK_S, 0.0, ZERO)
     now, ring = state.time_s, history.ring
 
     def x_at(age: float) -> float:

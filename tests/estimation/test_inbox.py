@@ -23,6 +23,7 @@ from autopilot.estimation.records import (
     blank_state,
     new_history,
 )
+from autopilot.geometry.linear import ZERO
 from autopilot.geometry.packed import packed
 from tests.doubles.motion import CABLE_LENGTH, GRAVITY, TICK_S, bebop_tuning
 
@@ -240,7 +241,9 @@ def begun(rows: list[Any], ticks: int = 20) -> tuple[EstimatorState, History]:
 
 def heard(state: EstimatorState, history: History, rows: list[Any]) -> EstimatorState:
     inbox = np.array(rows)
-    return estimate(state, history, inbox, len(rows), NOW_US, TUNING, Cable(CABLE_LENGTH), 0.0, TICK_S, 14.0)
+    return estimate(
+        state, history, inbox, len(rows), NOW_US, TUNING, Cable(CABLE_LENGTH), 0.0, TICK_S, 14.0, ZERO
+    )
 
 
 def bits(state: EstimatorState, history: History) -> bytes:
@@ -301,7 +304,9 @@ def test_rows_behind_the_count_are_not_read() -> None:
     inbox = np.array([*TRACKED, row_of(box.POSE, POSE._replace(x_quad=(5.0, 5.0, 5.0)))])
     alone, beside = begun(TRACKED), begun(TRACKED)
     first = heard(*alone, TRACKED)
-    second = estimate(*beside, inbox, len(TRACKED), NOW_US, TUNING, Cable(CABLE_LENGTH), 0.0, TICK_S, 14.0)
+    second = estimate(
+        *beside, inbox, len(TRACKED), NOW_US, TUNING, Cable(CABLE_LENGTH), 0.0, TICK_S, 14.0, ZERO
+    )
     assert bits(first, alone[1]) == bits(second, beside[1])
 
 

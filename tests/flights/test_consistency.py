@@ -26,6 +26,7 @@ from autopilot.estimation.records import (
     POSITION,
     PRESSURE,
     RATE,
+    SENSORS,
     SIGHT,
     VELOCITY,
 )
@@ -70,7 +71,7 @@ def error_of(craft: Craft) -> NDArray[Any]:
 def flown(sensors: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
     """NEES of each part, (seeds, instants); mean NIS of each sensor per scalar over all seeds."""
     nees: dict[str, list[list[float]]] = {name: [] for name in PARTS}
-    consistency = np.zeros((7, 2))
+    consistency = np.zeros((SENSORS, 2))
     for seed in SEEDS:
         steps = Takeoff(1.0), Waypoint(1.0, 1.0, 1.0), Waypoint(0.0, 0.0, 1.0)
         craft = Craft(*steps, sensors=sensors, seed=seed, CTL_LAW=PLUMBLINE)

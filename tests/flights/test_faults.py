@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from math import dist
+from math import acos, degrees, dist, isnan, nan
 
 import pytest
 
 from autopilot.geometry.linear import norm
+from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.supervisor.state import Phase
-from autopilot.wire.convert import Home
+from autopilot.wire.convert import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, Takeoff, Waypoint
 from sitl.hil import HilSimulator
-from tests.doubles.craft import ACCEPTED, GCS, Craft, at_phase
+from tests.doubles.craft import ACCEPTED, GCS, LOAD_WEIGHT_N, Craft, at_phase
 
 HEIGHT_M = 1.5
 ROUTE = (Takeoff(HEIGHT_M), Waypoint(3.0, 0.0, HEIGHT_M), Waypoint(0.0, 0.0, HEIGHT_M), Land())
@@ -91,6 +92,52 @@ def test_an_autopilot_that_is_started_again_in_the_air_holds_the_load(sensors: s
     assert lowest > 0.5 * HEIGHT_M
     assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
     assert landed(craft) < SOFT_M_S
+
+
+def send_load(craft: Craft, east_m: float, speed: float) -> None:
+    """As `goto` does: the load to this place on the line through home, at the height at which it hangs."""
+    lat, lon, _ = geodetic_from_enu((east_m, 0.0, 0.0), Home())
+    frame, ahead = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, (speed, 1.0, 0.0, nan)
+    go = mavlink.MAV_CMD_DO_REPOSITION
+    craft.send(mavlink.MAVLink_command_int_message(1, 1, frame, go, 0, 0, *ahead, lat, lon, HEIGHT_M))
+
+
+def test_one_that_finds_its_load_accelerating_takes_the_swing_out_before_it_holds() -> None:
+    craft = Craft(Takeoff(HEIGHT_M), Delay(60.0))
+    craft.begin()
+    craft.run(at_phase(Phase.MISSION))
+    send_load(craft, -1.0, 0.5)
+    craft.wait(1.0)
+    send_load(craft, 0.5, -1.0)
+    craft.wait(3.0)
+    slack = craft.truth.slack_events
+    restart(craft)
+    steepest, lowest = 1.0, HEIGHT_M
+    for _ in range(1500):
+        craft.tick()
+        steepest = min(steepest, rotation_from_quat(craft.truth.quat_wxyz)[2][2])
+        lowest = min(lowest, craft.truth.x_load[2])
+    assert (craft.flight.phase, craft.texts) == (Phase.HOLD, ["Restarted in flight: holding"])
+    assert craft.truth.slack_events == slack
+    assert lowest > 0.9 * HEIGHT_M
+    assert degrees(acos(steepest)) < 30.0
+    assert norm(craft.truth.v_load) < 0.1
+
+
+@pytest.mark.parametrize("phase", [Phase.LIFT, Phase.LOWER])
+def test_one_that_waits_for_its_receiver_neither_climbs_nor_sinks_meanwhile(phase: Phase) -> None:
+    craft = Craft(Takeoff(HEIGHT_M), Land(), sensors="rtk")
+    craft.begin()
+    craft.run(lambda c: c.flight.phase == phase and abs(c.truth.v_load[2]) >= 0.3)
+    found = craft.truth.x_load[2]
+    restart(craft, "rtk")
+    farthest = 0.0
+    for _ in range(1750):
+        craft.tick()
+        farthest = max(farthest, abs(craft.truth.x_load[2] - found))
+    assert (craft.flight.phase, craft.texts) == (Phase.HOLD, ["Restarted in flight: holding"])
+    assert farthest < 0.6
+    assert norm(craft.truth.v_load) < 0.2
 
 
 @pytest.mark.parametrize("sensors", ["lab", "rtk"])
@@ -233,6 +280,26 @@ def test_a_sensor_that_is_lost_leads_to_a_soft_landing(sensors: str, failed: int
     assert landed(craft) < SOFT_M_S
     assert "".join(craft.texts).startswith(ENDS[(sensors, failed)])
     assert craft.texts[-1] == "Landed, disarmed"
+
+
+def cable_told(craft: Craft) -> tuple[float, int]:
+    """Tension and tautness as the vehicle told them last."""
+    told = [m for m in craft.heard if m.get_type() == "LOAD_STATE"][-1]
+    return told.tension, told.taut
+
+
+def test_on_the_ground_nothing_is_told_of_the_cable_of_a_load_that_is_not_seen() -> None:
+    craft = under_way("lab", 0.3)
+    craft.wait(0.3)
+    assert cable_told(craft) == (pytest.approx(LOAD_WEIGHT_N, rel=0.2), 1)
+    set_parameter(craft, "SIM_SENS_FAIL", LOAD)
+    landed(craft)
+    craft.wait(1.0)
+    tension, taut = cable_told(craft)
+    assert (isnan(tension), taut) == (True, 0)
+    set_parameter(craft, "SIM_SENS_FAIL", 0)
+    craft.wait(1.0)
+    assert cable_told(craft) == (0.0, 0)
 
 
 @pytest.mark.parametrize("failed", [BAROMETER, MAGNETOMETER])

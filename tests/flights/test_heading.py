@@ -14,6 +14,8 @@ from autopilot.guidance.heading import heading_of, turn
 from autopilot.supervisor.state import Phase, setpoint
 from autopilot.wire.convert import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.items import WireItem
+from missions.model import Land, Takeoff, Waypoint
 from tests.doubles.craft import Craft
 from tests.doubles.motion import TICK_S
 from tests.doubles.sky import ACCEPTED
@@ -227,3 +229,31 @@ def test_a_vehicle_that_landed_takes_off_again_with_the_heading_it_has() -> None
     while craft.flight.phase != Phase.HOLD:
         craft.wait(0.25)
         assert abs(turn(nose(craft) - 0.5 * math.pi)) < 0.1
+
+
+def test_items_of_a_mission_turn_the_nose_and_stop_nothing() -> None:
+    def item(command: int, *p: float, frame: int = m.MAV_FRAME_MISSION, x: int = 0, y: int = 0) -> WireItem:
+        return WireItem(frame, command, 0, 1, *(*p, 0.0, 0.0, 0.0, 0.0)[:4], x, y, 0.0)
+
+    latitude, longitude, _ = geodetic_from_enu((4.0, 12.0, 0.0), Home())
+    seen = item(m.MAV_CMD_DO_SET_ROI_LOCATION, frame=m.MAV_FRAME_GLOBAL_INT, x=latitude, y=longitude)
+    craft = Craft(
+        *(
+            Takeoff(1.5),
+            Waypoint(2.0, 0.0, 1.5),
+            item(m.MAV_CMD_CONDITION_YAW, 180.0),
+            Waypoint(4.0, 0.0, 1.5),
+        ),
+        *(Waypoint(4.0, 2.0, 1.5, hold_s=6.0), seen, Waypoint(2.0, 2.0, 1.5, hold_s=6.0), Land()),
+    )
+    craft.begin()
+    craft.run(lambda craft: craft.flight.phase == Phase.MISSION)
+    assert nose(craft) == pytest.approx(0.0, abs=0.05)
+    craft.run(lambda craft: craft.flight.mission.step == 2)
+    assert norm(craft.truth.v_load) > 0.3, "flown through, as without the item"
+    craft.run(lambda craft: craft.flight.mission.step == 4)
+    assert abs(turn(nose(craft) - math.radians(-90.0))) < 0.05, "south"
+    craft.run(lambda craft: craft.flight.mission.step == 5)
+    east, north, _ = craft.truth.x_quad
+    assert abs(turn(nose(craft) - math.atan2(12.0 - north, 4.0 - east))) < 0.05, "to the place"
+    assert not any("kept" in text for text in craft.texts)

@@ -51,7 +51,7 @@ class World:
 @pytest.fixture
 def world() -> World:
     made = World(SIM_WIND_N=2.0)
-    made.run(20)
+    made.run(40)  # by which the simulator has told all its parameters
     return made
 
 

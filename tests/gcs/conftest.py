@@ -46,6 +46,8 @@ class ScriptedVehicle:
         self.silent = False
         self.silent_commands: set[int] = set()
         self.ready = True
+        self.ready_from_us = 0  # whether it is ready or not
+        self.kept_texts: list[tuple[int, str]] = []  # that it tells again
         self.armed = False
         self.started_us: int | None = None
         self.script: Callable[[ScriptedVehicle, float], None] | None = None
@@ -82,6 +84,14 @@ class ScriptedVehicle:
             )
         )
 
+    def tell_load(self, east_m: float, north_m: float, up_m: float, tension_n: float = 0.8) -> None:
+        place, rest = (north_m, east_m, -up_m), (0.0, 0.0, 0.0)
+        estimated = mavlink.PLUMBLINE_SOURCE_ESTIMATED
+        message = mavlink.MAVLink_load_state_message(
+            self.now_us, *place, *rest, *rest, *rest, 0.7, tension_n, 0, 1, estimated
+        )
+        self.out.append(self.dialect_writer.frame(message))
+
     def arm(self, armed: bool) -> None:
         self.armed = armed
         self.phase = mavlink.PLUMBLINE_PHASE_ARMED if armed else mavlink.PLUMBLINE_PHASE_DISARMED
@@ -93,9 +103,12 @@ class ScriptedVehicle:
         if now_us >= self._next_heartbeat_us:
             self._next_heartbeat_us += self.HEARTBEAT_US
             self.heartbeat()
-            health = mavlink.MAV_SYS_STATUS_PREARM_CHECK if self.ready else 0
+            present = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+            health = present if self.ready and now_us >= self.ready_from_us else 0
             self.send(
-                mavlink.MAVLink_sys_status_message(health, health, health, 0, 12600, -1, 90, 0, 0, 0, 0, 0, 0)
+                mavlink.MAVLink_sys_status_message(
+                    present, present, health, 0, 12600, -1, 90, 0, 0, 0, 0, 0, 0
+                )
             )
             self.send(
                 mavlink.MAVLink_mission_current_message(self.item, len(self.mission), self.mission_state)
@@ -142,6 +155,13 @@ class ScriptedVehicle:
                 self.arm(message.param1 == 1.0)
             if message.command == mavlink.MAV_CMD_MISSION_START:
                 self.started_us = self.now_us
+            if message.command == mavlink.MAV_CMD_RUN_PREARM_CHECKS:
+                self.say("load position not settled")
+            if message.command == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 == 253:
+                for severity, text in self.kept_texts:
+                    self.say(text, severity)
+            if message.command == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 == 49:
+                self.send(mavlink.MAVLink_gps_global_origin_message(473977420, 85455940, 0))
             if message.command == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 == 242:
                 self.send(
                     mavlink.MAVLink_home_position_message(
@@ -168,14 +188,15 @@ class ScriptedVehicle:
         elif message.param_id in self.parameters:
             self._value(message.param_id)
         else:
-            self.send(
-                mavlink.MAVLink_param_error_message(
-                    255, 190, message.param_id.encode(), -1, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
-                )
-            )
+            self._unknown(message.param_id)
+
+    def _unknown(self, name: str) -> None:
+        missing = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
+        self.send(mavlink.MAVLink_param_error_message(255, 190, name.encode(), -1, missing))
 
     def on_param_set(self, message: Any) -> None:
         if message.param_id not in self.parameters:
+            self._unknown(message.param_id)
             return
         if message.param_id not in self.fixed:
             self.parameters[message.param_id] = message.param_value

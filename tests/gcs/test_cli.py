@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import click
 import pytest
 from click.testing import CliRunner
 
-from autopilot.wire.convert import Home
+from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog
@@ -23,6 +25,7 @@ from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
 from gcs.shell.link import UdpSocket, free_port
+from gcs.workflows import readiness as readiness_module
 from gcs.workflows import status as status_module
 from missions.model import Land, Signals, Sine, Takeoff, Term
 
@@ -74,7 +77,7 @@ def test_every_command_has_help_and_stands_in_the_documentation(words, command):
     assert all(option.help for option in command.params if isinstance(option, click.Option))
     text = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
     if not isinstance(command, click.Group):
-        assert f"    gcs {' '.join(words)}" in text, "an example of it in docs/cli.md"
+        assert f"\ngcs {' '.join(words)}" in text, "an example of it in docs/cli.md"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -129,6 +132,7 @@ def test_version():
         (["fly", "hover", "--timeout", "0"], "--timeout"),
         (["mode", "backflip"], "hold"),
         (["takeoff", "--altitude", "-2"], "--altitude"),
+        (["takeoff", "-1"], "'-1'; must be a number > 0"),
         (["param", "set", "NGC_KX", "nan"], "finite"),
         (["param", "set", "NGC_KX", "x"], "float"),
         (["param", "get"], "NAMES"),
@@ -435,7 +439,11 @@ def test_parameters(live, tmp_path):
     }
     listed = json.loads(run("param", "list", "P01*", "--json", "--connect", port).stdout)
     assert list(listed) == [f"P01{digit}" for digit in range(10)]
-    assert "no such parameter" in one_line(run("param", "get", "NOPE", "--connect", port), EXIT_ERROR)
+    unknown = "NOPE: no such parameter; names begin with one of "
+    assert unknown in one_line(run("param", "get", "NOPE", "--connect", port), EXIT_ERROR)
+    assert unknown in one_line(run("param", "set", "NOPE", "1", "--connect", port), EXIT_ERROR)
+    near = "P01: no such parameter; did you mean P"
+    assert near in one_line(run("param", "get", "P01", "--connect", port), EXIT_ERROR)
     assert "matches" in one_line(run("param", "list", "X*", "--connect", port), EXIT_ERROR)
 
     file = tmp_path / "all.params"
@@ -454,12 +462,130 @@ def test_parameters(live, tmp_path):
 def test_status(live, monkeypatch):
     vehicle, port = live
     monkeypatch.setattr(status_module, "LISTEN_S", 0.3)
+    monkeypatch.setattr(status_module, "RECALL_S", 0.05)
     vehicle.started_us = 0
     record = json.loads(run("status", "--json", "--connect", port).stdout)
     assert record["mode"] == "hold"
     assert record["armed"] is False
     assert record["load_error_m"] == pytest.approx(0.005)
     assert "mode" in run("status", "--connect", port).stdout
+
+
+def test_figures_that_only_the_simulator_knows_are_missed_with_the_option_that_gives_them(live, monkeypatch):
+    _, port = live
+    monkeypatch.setattr(status_module, "LISTEN_S", 0.3)
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.1)
+    nobody = free_port()
+    result = run("status", "--json", "--connect", port, "--truth", str(nobody))
+    assert json.loads(result.stdout)["rate_hz"] is None
+    assert (
+        "no rate, lateness and missed ticks of the simulator: no simulator tells its truth at "
+        f"UDP 127.0.0.1:{nobody}; --truth PORT is where the vehicle's own tells it (sitl --truth HOST:PORT)"
+    ) in result.stderr
+    assert "--truth is that of a running simulator: add --connect" in one_line(
+        run("fly", "hover", "--truth", "14561"), EXIT_USAGE
+    )
+    with closing(UdpSocket(port=nobody)):
+        busy = one_line(run("capture", "--connect", port, "--truth", str(nobody)), EXIT_ERROR)
+    assert f"--truth: UDP 127.0.0.1:{nobody} is in use by another program" in busy
+
+
+def test_what_was_said_before_is_had_afterwards(live, monkeypatch):
+    vehicle, port = live
+    monkeypatch.setattr(status_module, "LISTEN_S", 0.3)
+    vehicle.kept_texts = [
+        (mavlink.MAV_SEVERITY_CRITICAL, "[1/3, 42.0 s ago] tilt 122 deg"),
+        (mavlink.MAV_SEVERITY_INFO, "[2/3, 7.5 s ago] Armed"),
+        (mavlink.MAV_SEVERITY_WARNING, "[3/3, 3.0 s ago] Machine busy"),
+    ]
+    shown = run("status", "--connect", port).stdout.splitlines()[-2:]
+    assert [line.split()[-3:] for line in shown] == [["tilt", "122", "deg"], ["warning", "Machine", "busy"]]
+    assert "42." in shown[0] and "critical" in shown[0]
+    texts = json.loads(run("texts", "--json", "--connect", port).stdout)
+    assert [(one["severity"], one["text"]) for one in texts] == [
+        ("critical", "tilt 122 deg"),
+        ("info", "Armed"),
+        ("warning", "Machine busy"),
+    ]
+    assert [one["age_s"] for one in texts] == pytest.approx([42.0, 7.5, 3.0], abs=1.0)
+
+
+def test_nothing_is_said_of_a_load_that_the_vehicle_does_not_see(live, monkeypatch):
+    vehicle, port = live
+    monkeypatch.setattr(status_module, "LISTEN_S", 0.3)
+    monkeypatch.setattr(status_module, "RECALL_S", 0.05)
+    vehicle.script = lambda scripted, t: scripted.tell_load(1.0, 2.0, 0.0, tension_n=math.nan)
+    vehicle.started_us = 0
+    record = json.loads(run("status", "--json", "--connect", port).stdout)
+    keys = ("load_east_m", "load_north_m", "load_up_m", "cable_tension_n", "cable_taut")
+    assert [record[key] for key in keys] == [None] * 5
+    shown = run("status", "--connect", port).stdout
+    assert [line.split() for line in shown.splitlines() if "taut" in line] == [["cable", "taut", "-"]]
+
+
+def test_of_a_vehicle_that_keeps_no_texts_those_are_shown_that_are_heard(live, monkeypatch):
+    vehicle, port = live
+    monkeypatch.setattr(status_module, "LISTEN_S", 0.3)
+    vehicle.command_results[mavlink.MAV_CMD_REQUEST_MESSAGE] = [mavlink.MAV_RESULT_UNSUPPORTED]
+    vehicle.script = lambda scripted, t: scripted.say("said just now")
+    vehicle.started_us = 0
+    record = json.loads(run("status", "--json", "--connect", port).stdout)
+    assert record["texts"][0]["text"] == "said just now"
+
+
+def test_arming_waits_for_a_vehicle_that_is_not_ready_yet_and_says_for_what(live):
+    vehicle, port = live
+    vehicle.ready_from_us = 1_000_000
+    result = run("arm", "--connect", port)
+    assert (result.exit_code, result.stdout) == (EXIT_DONE, "arm: accepted\n")
+    assert result.stderr == "gcs: waiting for the vehicle to be ready: load position not settled\n"
+    assert vehicle.armed
+    assert vehicle.now_us >= vehicle.ready_from_us
+
+
+def test_arming_waits_no_longer_than_it_says(live, monkeypatch):
+    vehicle, port = live
+    monkeypatch.setattr(readiness_module, "READY_S", 0.2)
+    vehicle.ready = False
+    vehicle.command_results[mavlink.MAV_CMD_COMPONENT_ARM_DISARM] = [mavlink.MAV_RESULT_DENIED]
+    result = run("arm", "--connect", port)
+    assert result.exit_code == EXIT_ERROR
+    assert "arm: denied" in result.stderr.splitlines()[-1]
+    forced = run("arm", "--force", "--connect", port)
+    assert (forced.exit_code, forced.stderr) == (EXIT_DONE, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "east_m", "north_m", "up_m", "speed"),
+    [
+        (("3", "-1.5"), 3.0, -1.5, None, -1.0),
+        (("-3", "1.5", "2", "--speed", "0.5"), -3.0, 1.5, 2.0, 0.5),
+        (("1", "0", "0.5", "--frame", "load"), 3.0, 1.0, 2.5, -1.0),
+    ],
+)
+def test_the_load_is_sent_to_a_place(live, arguments, east_m, north_m, up_m, speed):
+    vehicle, port = live
+    vehicle.script = lambda scripted, t: scripted.tell_load(east_m=2.0, north_m=1.0, up_m=2.0)
+    vehicle.started_us = 0
+    result = run("goto", *arguments, "--connect", port)
+    assert (result.exit_code, result.stdout) == (EXIT_DONE, "reposition: accepted\n"), result.output
+    sent = vehicle.commands[-1]
+    assert (sent.command, sent.param1) == (mavlink.MAV_CMD_DO_REPOSITION, speed)
+    east, north, _ = enu_from_geodetic(sent.x, sent.y, 0, Home())
+    assert (east, north) == pytest.approx((east_m, north_m), abs=0.02)
+    assert sent.frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+    assert sent.z == pytest.approx(up_m, abs=1e-3) if up_m is not None else math.isnan(sent.z)
+
+
+def test_a_place_that_is_none_is_wrong_usage():
+    assert "must be a number" in one_line(run("goto", "1", "north"), EXIT_USAGE)
+    assert "must be a number" in one_line(run("goto", "1", "nan"), EXIT_USAGE)
+
+
+def test_the_nearest_command_is_named():
+    line = one_line(run("fyl"), EXIT_USAGE)
+    assert line == "gcs: No such command 'fyl'; did you mean fly?; see gcs --help"
+    assert "did you mean" not in one_line(run("zzzzzz"), EXIT_USAGE)
 
 
 def test_capture(live, tmp_path):
@@ -498,3 +624,6 @@ def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):
     again = run("report", str(out), "--json")
     assert again.exit_code == EXIT_DONE, again.output
     assert json.loads(again.stdout) == record
+    sentence = "The figures that need the truth of the simulator are missing: "
+    assert record["load_error_max_m"] is None and record["estimator_error_max_m"] is None
+    assert sentence in (out / "report.html").read_text()

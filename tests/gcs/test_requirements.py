@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -100,3 +103,26 @@ def test_a_report_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(GcsError, match=r"--junit .*file/report.xml: File exists"):
         conclude("run", tmp_path / "file" / "report.xml", "completed", 1.0, [])
+
+
+@pytest.mark.parametrize(
+    ("required", "code"),
+    [(("completed_fraction >= 0.99", "load_error_max_m < 0.05"), 0), (("completed_fraction > 1",), 4)],
+)
+def test_a_sweep_is_judged_as_a_whole(
+    required: tuple[str, ...], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def here(_: int) -> Iterator[tuple[Executor, int]]:
+        with ThreadPoolExecutor(1) as executor:
+            yield executor, 1
+
+    monkeypatch.setattr("gcs.workflows.sweep.own_processes", here)
+    words = [word for text in required for word in ("--require", text)]
+    files = ["--out", str(tmp_path / "out"), "--junit", str(tmp_path / "sweep.xml")]
+    result = CliRunner().invoke(gcs, ["sweep", "hover", "--seeds", "2", *words, *files, "--quiet"])
+    assert result.exit_code == code, result.output
+    suite = ET.parse(tmp_path / "sweep.xml").getroot()[0]
+    assert (suite.get("tests"), suite.get("failures")) == (str(1 + len(required)), "1" if code else "0")
+    if code:
+        assert "required completed_fraction > 1; found 1.0" in result.stderr

@@ -59,8 +59,23 @@ def test_all_parts_run_and_are_marked(tmp_path, capsys):
     assert all((tmp_path / name).exists() for name in ("first", "second", "third"))
     assert all(one.ready for one in parts)
     said = capsys.readouterr().err.splitlines()
-    assert said[0].startswith("gcs: compiling the flight software, once; about ")
-    assert said[1].endswith("3 of 3 parts remain")
+    assert said[0].startswith("gcs: compiling the flight software, once: 3 parts, about ")
+    assert "3 of 3 parts remain after 0 s" in said[1]
+    ended = [line.split(" in ") for line in said if line.startswith("gcs: compiled ")]
+    assert sorted(title for title, _ in ended) == [
+        f"gcs: compiled the {n}" for n in ("first", "second", "third")
+    ]
+    assert [after.split("; ")[1].split(" after ")[0] for _, after in ended] == [
+        "2 of 3 parts remain",
+        "1 of 3 parts remain",
+        "that was the last part",
+    ]
+
+
+def test_a_single_part_is_named(capsys):
+    warm_up([part("world", "pass", 10.0)])
+    first = capsys.readouterr().err.splitlines()[0]
+    assert first == "gcs: compiling the flight software, once: the world, about 10 s on an idle machine"
 
 
 def test_nothing_is_said_where_nothing_is_to_be_done(capsys):
@@ -78,6 +93,6 @@ def test_a_part_that_fails_is_told_with_its_last_words_and_not_marked():
 
 def test_what_is_compiled_is_told_kernel_by_kernel(capsys):
     with CompileDisplay(quiet=False) as display:
-        display.update({"the paths": "autopilot.trajectory.splines.sample", "the report": ""}, 2, 5)
+        display.update({"the paths": "autopilot.trajectory.splines.sample", "the report": ""}, 2, 5, 9.4)
     kernels = "the paths (autopilot.trajectory.splines.sample), the report"
-    assert capsys.readouterr().err == f"gcs: compiling {kernels}; 2 of 5 parts remain\n"
+    assert capsys.readouterr().err == f"gcs: compiling {kernels}; 2 of 5 parts remain after 9 s\n"

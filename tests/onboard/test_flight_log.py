@@ -229,7 +229,7 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
     rng = np.random.default_rng(3)
     row = np.zeros(width(Instant))
     row[:] = rng.normal(size=len(row))
-    pack(unpack(Instant, row, 0)._replace(seq=9, phase=5, control_mode=2, saturated=3), row, 0)
+    pack(unpack(Instant, row, 0)._replace(seq=9, phase=5, control_mode=2, saturated=3, rotors=6), row, 0)
     said, imu = unpack(Instant, row, 0), packed(ImuReading((0.1, 0.2, 0.3), (1.0, 2.0, 3.0)))
     log = make_log()
     log.step(7, True, set, lambda: sample._replace(instant=row, imu=imu, imu_is_sane=True))
@@ -264,10 +264,12 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
     assert vector("sensor_combined", "accelerometer_m_s2") == (1.0, -2.0, -3.0)
     assert len(read.get_dataset("sensor_combined").data["timestamp"]) == 1  # one was not sane
     most = said.rotor_max if said.rotor_max > 0.0 else 1.0
-    shares = [min(max(force / most, 0.0), 1.0) for force in said.forces]
-    assert vector("actuator_motors", "control", 4) == float32(shares)
-    assert vector("actuator_outputs", "output", 5) == float32(
-        (*(1000.0 + 1000.0 * one for one in shares), 0.0)
+    shares = [min(max(force / most, 0.0), 1.0) for force in said.forces[:6]]
+    assert vector("actuator_motors", "control", 6) == float32(shares)
+    assert np.isnan(vector("actuator_motors", "control", 14)[6:]).all()  # rotors that there are not
+    assert logged("actuator_outputs", "noutputs") == (6.0,)
+    assert vector("actuator_outputs", "output", 16) == float32(
+        (*(1000.0 + 1000.0 * one for one in shares), *(0.0,) * 10)
     )
     for name, field in {
         "position": said.x_load_d,
@@ -292,7 +294,7 @@ def test_a_record_has_what_the_moment_says(flown: Flown, tmp_path: Path) -> None
         assert vector("cascade_errors", name) == float32(ned_from_enu(getattr(said, name)))
     assert vector("cascade_errors", "e_omega") == float32(frd_from_flu(said.e_Omega))
     assert vector("cascade_errors", "moment") == float32(frd_from_flu(said.moment))
-    assert vector("rotor_forces", "force", 4) == float32(said.forces)
+    assert vector("rotor_forces", "force", 14) == float32(said.forces)
     assert logged("rotor_forces", "force_min", "force_max", "saturated") == float32(
         (said.rotor_min, said.rotor_max, 3.0)
     )

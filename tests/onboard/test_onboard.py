@@ -130,7 +130,7 @@ def test_a_control_rate_that_does_not_fit_is_said_with_both_rates_and_nothing_ar
     assert craft.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == DENIED
     assert any("400 Hz" in text for text in craft.texts), craft.texts
     assert any("250 Hz" in text for text in craft.texts), craft.texts
-    assert controls(craft.answers[-1]).forces == (0.0, 0.0, 0.0, 0.0)
+    assert controls(craft.answers[-1]).forces == (0.0,) * 14
 
 
 def test_a_tick_lost_at_the_start_does_not_change_what_the_sensor_rate_is() -> None:
@@ -377,3 +377,24 @@ def test_an_ardupilot_client_flies_without_any_stream() -> None:
     assert math.dist(craft.truth.x_load, (0.5, 1.0, 1.5)) < 0.015
     assert craft.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
     craft.run(at_phase(Phase.DISARMED))
+
+
+def test_it_tells_in_which_run_of_the_simulated_world_it_flies() -> None:
+    autopilot, writer = onboard(), FrameWriter(255, 190)
+    ask = mavlink.MAVLink_command_long_message(
+        1, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, mavlink.MAVLINK_MSG_ID_SIM_BOOT, *(0.0,) * 6
+    )
+
+    def answers(time_us: int) -> list[Any]:
+        autopilot.receive_ground(writer.frame(ask), GCS)
+        autopilot.receive_sensors(sensors(time_us))
+        sent = [one for _, datagram in autopilot.ground_datagrams() for one in decode(datagram)[0]]
+        return [one for one in sent if one.message.get_type() in ("SIM_BOOT", "COMMAND_ACK")]
+
+    assert [one.message.result for one in answers(0)] == [mavlink.MAV_RESULT_UNSUPPORTED], "nobody has said"
+    boot = mavlink.MAVLink_sim_boot_message(4000, 2**63 - 1, [0.0] * 4, 0.0, 0, 0)
+    autopilot.receive_sensors(WRITER.frame(boot) + sensors(4000))
+    found = {one.message.get_type(): one for one in answers(8000)}
+    assert found["COMMAND_ACK"].message.result == ACCEPTED
+    assert found["SIM_BOOT"].message.boot_id == 2**63 - 1
+    assert found["SIM_BOOT"].component == 25, "messages of the dialect are those of a component of their own"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +13,16 @@ import pyarrow
 import pytest
 
 import plumbline
-from missions.model import Land, Mission, Takeoff, Waypoint
+from missions.model import Land, Mission, Signals, Sine, Takeoff, Term, Waypoint
 
 STEPS = (Takeoff(0.5), Waypoint(0.0, 0.0, 0.5, hold_s=1.0), Land())
+WILD = Mission(
+    "wild",
+    "Wild",
+    "",
+    (),
+    (Takeoff(8.0), Signals(20.0, (Term("z", 3.0, 0.0, 5.0, 10.0, 5.0, (Sine(1.5),)),)), Land()),
+)
 SHORT = Mission("short", "Short", "", (), STEPS)
 
 
@@ -72,17 +81,63 @@ def test_a_library_that_is_missing_is_named_before_anything_is_flown(
     for call in (lambda: flight.telemetry("polars"), lambda: plumbline.sweep("hover", kind="polars")):
         with pytest.raises(plumbline.Error, match="polars is not installed; pip install polars"):
             call()
+    for call in (flight.telemetry, lambda: plumbline.sweep("hover")):
+        with pytest.raises(plumbline.Error, match=r"pandas is not .*; pip install 'plumbline\[pandas\]', or"):
+            call()
     assert capsys.readouterr().err == ""
 
 
 WRONG: dict[str, tuple[Any, str]] = {
     "mission": (lambda: plumbline.fly("cas-b"), "did you mean case-b?"),
-    "law": (lambda: plumbline.fly("hover", law="pid"), "must be one of thesis"),
+    "law": (lambda: plumbline.fly("hover", law="pid"), "must be thesis, lqr, plumbline, or a file"),
     "sensors": (lambda: plumbline.fly("hover", sensors="laab"), "did you mean lab?"),
     "vehicle": (lambda: plumbline.fly("hover", vehicle="no.toml"), "no.toml"),
+    "rate": (lambda: plumbline.fly("hover", settings={"CTL_RATE_HZ": 333}), "settings: CTL_RATE_HZ = 333 Hz"),
     "name": (lambda: plumbline.fly("hover", settings={"SIM_WIND": 1}), "SIM_WIND: no such parameter"),
+    "set": (
+        lambda: plumbline.sweep("hover", settings={"SIM_WIND": 1}),
+        "settings: SIM_WIND: no such parameter; did you mean SIM_WIND_",
+    ),
     "value": (lambda: plumbline.fly("hover", settings={"SIM_ACT_DELAY_MS": -1}), "SIM_ACT_DELAY_MS"),
     "sweep": (lambda: plumbline.sweep("hover", vary={"SIM_WIND": [1]}), "did you mean SIM_WIND_"),
+    "seed": (lambda: plumbline.fly("hover", seed=-1), "seed = -1; must be a whole number, 0 or more"),
+    "half a seed": (lambda: plumbline.fly("hover", seed=1.5), "seed = 1.5; must be a whole number"),  # type: ignore[arg-type]
+    "word": (
+        lambda: plumbline.fly("hover", settings={"SIM_WIND_E": "fast"}),  # type: ignore[dict-item]
+        "settings['SIM_WIND_E'] = 'fast'; must be a finite number",
+    ),
+    "no number": (
+        lambda: plumbline.fly("hover", settings={"SIM_WIND_E": float("nan")}),
+        "settings['SIM_WIND_E'] = nan; must be a finite number",
+    ),
+    "timeout": (lambda: plumbline.fly("hover", timeout_s=0), "timeout_s = 0; must be greater than 0"),
+    "no law": (lambda: plumbline.fly("hover", law=3), "law = 3; must be a name"),  # type: ignore[arg-type]
+    "no vehicle": (lambda: plumbline.fly("hover", vehicle=3), "3: must be a name, the path of a file"),  # type: ignore[arg-type]
+    "infeasible": (
+        lambda: plumbline.fly(WILD),
+        "; force=True tries",
+    ),
+    "fails": (
+        lambda: plumbline.fly("hover", planner="plumbline.examples.load_pid:LoadPid"),
+        "planner plumbline.examples.load_pid:LoadPid: LoadPid has no method plan",
+    ),
+    "seeds": (lambda: plumbline.sweep("hover", seeds=0), "seeds = 0; must be a whole number, 1 or more"),
+    "jobs": (lambda: plumbline.sweep("hover", jobs=0), "jobs = 0; must be a whole number, 1 or more"),
+    "varied": (
+        lambda: plumbline.sweep("hover", vary={"SIM_WIND_E": ["fast"]}),  # type: ignore[list-item]
+        "vary['SIM_WIND_E'][0] = 'fast'; must be a finite number",
+    ),
+    "nothing varied": (
+        lambda: plumbline.sweep("hover", vary={"SIM_WIND_E": []}),
+        "vary['SIM_WIND_E'] = []; must be a list of numbers",
+    ),
+    "one law": (lambda: plumbline.sweep("hover", laws="lqr"), "must be a list of laws, as ['plumbline']"),
+    "no such law": (lambda: plumbline.sweep("hover", laws=["pid"]), "law 'pid': no control law of that name"),
+    "chosen law": (
+        lambda: plumbline.sweep("hover", settings={"CTL_LAW": 1}),
+        "CTL_LAW is what laws says; give laws instead",
+    ),
+    "out": (lambda: plumbline.sweep("hover", out="/dev/null/x"), "out /dev/null/x: Not a directory"),
     "kind": (lambda: plumbline.sweep("hover", kind="csv"), "must be pandas, polars or arrow"),
 }
 
@@ -92,9 +147,26 @@ def test_what_is_wrong_is_one_line(call: Any, says: str, capsys: pytest.CaptureF
     with pytest.raises(plumbline.Error) as told:
         call()
     assert says in str(told.value) and "\n" not in str(told.value)
+    assert "--" not in str(told.value)
     assert capsys.readouterr().err == ""
+
+
+def test_a_report_that_cannot_be_written(flight: plumbline.Flight) -> None:
+    with pytest.raises(plumbline.Error, match=r"^/dev/null/x: Not a directory$"):
+        flight.report("/dev/null/x")
 
 
 def test_a_picture_that_there_is_not(flight: plumbline.Flight) -> None:
     with pytest.raises(plumbline.Error, match="must be one of overview, track"):
         flight.plot("trak")
+
+
+def test_a_folder_of_the_same_name_beside_the_script_hides_nothing(tmp_path: Path) -> None:
+    """As of a script that lies beside the clone."""
+    (tmp_path / "plumbline").mkdir()
+    script = tmp_path / "script.py"
+    script.write_text("from importlib.util import find_spec; print(find_spec('plumbline').origin)")
+    found = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert found.stdout.strip() == plumbline.__file__

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 from collections.abc import Callable
@@ -11,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from gcs.shell.link import LOOPBACK, free_port
+from gcs.shell.link import LOOPBACK, free_port, parse_address
+from gcs.shell.session import Session
+from gcs.workflows.status import status_record
 
 if TYPE_CHECKING:
     from conftest import Program
@@ -19,7 +22,17 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.processes
 Start = Callable[..., "Program"]
 Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
-LOOKS = 120  # at a vehicle, each of which takes a while
+TRIES = 60  # to arm on a busy machine
+LONG_S = 240.0
+TOLD = (
+    "armed",
+    "phase",
+    "load_up_m",
+    "mission_items",
+    "time_s",
+)  # once it is known
+# paced as without options, the world waits for everybody, but its seconds are shorter
+QUICK = ("--speed", "4")
 
 
 class Flight:
@@ -49,17 +62,21 @@ class Flight:
         return json.loads(self.do("status", "--json"))
 
     def until(self, wanted: Callable[[Any], bool]) -> Any:
-        seen: list[Any] = []
-        for _ in range(LOOKS):
-            seen.append(self.status())
-            if wanted(seen[-1]):
-                return seen[-1]
-        raise AssertionError(seen[-3:])
+        """The first status that is as it is wanted."""
+        with Session(parse_address(self.ground)) as session:
+
+            def seen() -> bool:
+                status = status_record(session.view)
+                return all(status[key] is not None for key in TOLD) and wanted(status)
+
+            session.find()
+            assert session.watch(seen, LONG_S), status_record(session.view)
+            return status_record(session.view)
 
     def take_off(self) -> None:
         """In real time a machine that is busy at this moment refuses to arm."""
         self.do("takeoff", "2")
-        for _ in range(LOOKS):
+        for _ in range(TRIES):
             if self._gcs("arm", "--connect", self.ground).returncode == 0:
                 break
         self.until(lambda status: status["load_up_m"] > 0.5)
@@ -75,7 +92,7 @@ def fly(start: Start, gcs: Gcs, tmp_path: Path) -> Callable[..., Flight]:
     return lambda *options: Flight(start, gcs, tmp_path / "storage", *options)
 
 
-@pytest.mark.parametrize("options", [(), ("--lockstep", "--speed", "3")])
+@pytest.mark.parametrize("options", [QUICK, ("--lockstep", *QUICK)])
 def test_an_autopilot_killed_in_the_air_holds_the_load_when_it_is_back(
     fly: Callable[..., Flight], options: tuple[str, ...]
 ) -> None:
@@ -94,7 +111,7 @@ def test_an_autopilot_killed_in_the_air_holds_the_load_when_it_is_back(
 def test_a_simulator_killed_in_flight_begins_anew_with_the_vehicle_on_the_ground(
     fly: Callable[..., Flight],
 ) -> None:
-    flight = fly()
+    flight = fly(*QUICK)
     flight.into_the_mission()
     flight.sitl.kill()
     flight.autopilot.says(b"no word from the simulator")
@@ -110,7 +127,7 @@ def test_a_simulator_killed_in_flight_begins_anew_with_the_vehicle_on_the_ground
 @pytest.mark.parametrize("who", ["autopilot", "sitl"])
 def test_a_program_that_stood_still_goes_on_where_it_was(fly: Callable[..., Flight], who: str) -> None:
     """As by Ctrl-Z, or a machine that sleeps: the world waits, and nobody takes it for a restart."""
-    flight = fly()
+    flight = fly(*QUICK)
     flight.into_the_mission()
     stopped, other = flight.autopilot, flight.sitl
     if who == "sitl":
@@ -134,3 +151,22 @@ def test_an_autopilot_that_stood_still_in_real_time_gives_the_flight_up(fly: Cal
     status = flight.until(lambda status: status["phase"] == "disarmed")  # three seconds after it is given up
     assert not status["armed"]
     assert b"has started again" not in flight.autopilot.log.read_bytes()
+
+
+def test_an_autopilot_that_stands_still_is_named_where_the_flight_is_lost(
+    start: Start, tmp_path: Path
+) -> None:
+    flight = start(
+        "gcs", "fly", "hover", "--sensors", "ideal", "--speed", "4", "--out", str(tmp_path / "out")
+    )
+    flight.says(b"  (lift|hold|mission)  ")
+    task = Path(f"/proc/{flight.process.pid}/task/{flight.process.pid}/children")
+    (autopilot,) = (
+        int(child)
+        for child in task.read_text().split()
+        if b"autopilot" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
+    )
+    os.kill(autopilot, signal.SIGSTOP)
+    flight.process.wait(LONG_S)
+    assert f"lost: autopilot (process {autopilot}) stopped by a signal; ".encode() in flight.log.read_bytes()
+    assert not Path(f"/proc/{autopilot}").exists()

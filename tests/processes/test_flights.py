@@ -58,13 +58,6 @@ def test_a_quiet_flight_says_one_line(gcs: Gcs, tmp_path: Path) -> None:
     assert (flown.returncode, flown.stdout, flown.stderr) == (0, "", "gcs: hover: completed\n")
 
 
-def test_rates_that_do_not_divide_are_refused_with_both_numbers(gcs: Gcs, tmp_path: Path) -> None:
-    flown = gcs("fly", "hover", "--set", "CTL_RATE_HZ=400", "--out", str(tmp_path / "out"), "--quiet")
-    assert flown.returncode == 1
-    assert "400" in flown.stderr
-    assert "250" in flown.stderr
-
-
 def test_a_disk_that_is_full_is_one_line_and_what_was_captured_is_kept(gcs: Gcs, tmp_path: Path) -> None:
     out = tmp_path / "out"
     flown = gcs("fly", "hover", "--sensors", "ideal", "--out", str(out), "--quiet", file_bytes=500_000)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from autopilot.services.endpoint import LINK_SILENCE_US, MAX_LINKS, VehicleEndpoint
+from autopilot.services.endpoint import LINK_SILENCE_US, MAKING_ROOM_US, MAX_LINKS, VehicleEndpoint
 from autopilot.services.identity import (
     AUTO,
     AUTO_MISSION,
@@ -37,6 +37,7 @@ ALL_THERE = {
     "x_quad_d": (0.0, 0.0, 1.0),
     "wind": (1.0, 0.0, 0.0),
     "sensed": Sensed((0.0,) * 3, (0.0, 0.0, 9.81), (0.0,) * 3, 1e5, 0.0, 15.0, 0, 0),
+    "built_in": ((0.0, 0.0, 1.0), (0.1, 0.0, 0.0), (0.0, 0.0, 1.7)),
 }
 
 
@@ -76,7 +77,12 @@ def test_a_link_to_a_program_has_what_programs_expect_besides(rig, configured):
         for link, received in rig.poll().items():
             heard[link] += [r.message.get_msgId() for r in received]
     besides = {key: heard["api"].count(key) for key in set(heard["api"]) - set(heard["gcs"])}
-    assert besides == {m.MAVLINK_MSG_ID_HIGHRES_IMU: 50, m.MAVLINK_MSG_ID_ODOMETRY: 30}
+    assert besides == {
+        m.MAVLINK_MSG_ID_HIGHRES_IMU: 50,
+        m.MAVLINK_MSG_ID_ODOMETRY: 30,
+        m.MAVLINK_MSG_ID_ESC_STATUS: 5,
+        m.MAVLINK_MSG_ID_ESC_INFO: 1,
+    }
 
 
 def test_every_stream_comes_when_it_is_asked_for(rig):
@@ -200,11 +206,27 @@ def test_garbage_makes_no_link(rig):
 def test_links_are_bounded_and_the_most_silent_makes_room(rig):
     for number in range(MAX_LINKS + 3):
         rig.send(GCS_BEAT, link=f"n{number}")
-        rig.now_us += 4000
+        rig.now_us += MAKING_ROOM_US
     assert len(rig.endpoint.links) == MAX_LINKS + 1
     assert "gcs" in rig.endpoint.links
     assert "n0" not in rig.endpoint.links
     assert f"n{MAX_LINKS + 2}" in rig.endpoint.links
+
+
+def test_a_crowd_of_newcomers_makes_room_one_by_one(rig):
+    """A link costs much to begin: a flood from many ports must not begin them all at each tick."""
+    for number in range(MAX_LINKS + 100):
+        rig.send(GCS_BEAT, link=f"n{number}")
+    first, last = f"n{MAX_LINKS}", f"n{MAX_LINKS + 99}"
+    assert first in rig.endpoint.links
+    assert last not in rig.endpoint.links
+    arm = m.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+    rig.send(arm, link=last)
+    assert rig.asked == [], "nobody could be answered"
+    rig.now_us += MAKING_ROOM_US
+    rig.send(arm, link=last)
+    assert last in rig.endpoint.links
+    assert rig.asked
 
 
 def test_a_list_under_way_ends_with_its_link():

@@ -6,25 +6,16 @@ import math
 
 import pytest
 
-from autopilot.services.identity import Identity
 from autopilot.services.snapshot import Sensed, Sortie
-from autopilot.services.telemetry import GROUPS, STREAMS
-from autopilot.wire.codec import FrameWriter, decode
+from autopilot.services.telemetry import GROUPS
+from autopilot.wire.convert import padded
 from autopilot.wire.dialect import plumbline as m
+from tests.doubles.streams import sent
 
 FLOAT32_REL = 1e-6  # single-precision fields
 NOW_US = 5_000_000
 # turning left, pushed to the left and upwards
 READ = Sensed((0.1, 0.2, 0.3), (1.0, 2.0, 9.80665), (0.2, -0.1, -0.4), 101_325.0, 12.5, 21.25, NOW_US, NOW_US)
-
-
-def sent(snapshot, message_id):
-    writer = FrameWriter(1, 1)
-    received, junk = decode(
-        b"".join(writer.frame(one) for one in STREAMS[message_id].build(snapshot, Identity()))
-    )
-    assert junk == 0
-    return [r.message for r in received]
 
 
 def test_readings_are_told_in_the_axes_of_the_body_and_in_the_units_of_each_message(snap):
@@ -90,7 +81,7 @@ def test_odometry_is_the_estimate_and_says_what_it_does_not_know(snap):
 
 
 def test_outputs_are_those_of_servo_output_raw(snap):
-    snapshot = snap(NOW_US, forces=(0.0, 0.49, 0.98, 1.96), rotor_max=1.96)
+    snapshot = snap(NOW_US, forces=padded((0.0, 0.49, 0.98, 1.96)), rotor_max=1.96)
     (said,) = sent(snapshot, m.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS)
     assert said.active == 4
     assert said.actuator == [1000.0, 1250.0, 1500.0, 2000.0, *[0.0] * 28]

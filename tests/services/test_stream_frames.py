@@ -18,6 +18,7 @@ from autopilot.services.links import DATAGRAM_BYTES
 from autopilot.services.records import Verdict
 from autopilot.services.stream_frames import BITS, StreamFrames
 from autopilot.services.telemetry import STREAMS
+from autopilot.vehicle.layout import FEWEST, MOST
 from autopilot.wire.codec import FrameWriter, decode, split
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
@@ -27,6 +28,7 @@ from tests.services.conftest import make_table
 HOME = Home(-33.5, 179.9999, 120.0)  # where degrees of longitude end
 ALL = sum(BITS.values())
 KINDS = [get_type_hints(Instant)[name] for name in Instant._fields]
+ROTORS = sum(width(kind) for kind in KINDS[: Instant._fields.index("rotors")])
 
 
 def row_of(rng: np.random.Generator, hostile: bool) -> Any:
@@ -44,6 +46,7 @@ def row_of(rng: np.random.Generator, hostile: bool) -> Any:
             row[at] = rng.integers(0, 200) if kind is int else rng.integers(0, 2)
         at += width(kind)
     row[0] = rng.integers(0, 2**50)
+    row[ROTORS] = rng.integers(FEWEST, MOST + 1)
     return row
 
 

@@ -12,7 +12,7 @@ from autopilot.services.snapshot import ACCEL, GEOFENCE, GYRO, MAG, PREARM, GpsF
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, PROGRAM_INTERVALS_US, STREAMS
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert import Home, padded
 from autopilot.wire.dialect import plumbline as mavlink
 
 ALL = STREAMS | LOAD_STREAMS
@@ -44,7 +44,7 @@ FLYING = {
     "x_quad_d": (5.0, 6.0, 7.0),
     "e_x": (0.3, 0.4, 0.0),
     "tension": 0.9,
-    "forces": (0.98, 1.96, 0.0, -0.1),
+    "forces": padded((0.98, 1.96, 0.0, -0.1)),
     "rotor_max": 1.96,
     "gps": GpsFix(3_000, 3, (1.0, 2.0, 3.0), (0.0, 2.0, 0.0), 1.5, 2.5, 12),
     "battery_voltage": 11.1,
@@ -100,7 +100,7 @@ def test_every_stream_stands_any_numbers(key, vector, snap):
     fix = GpsFix(0, 3, vector, vector, scalar, scalar, 300)
     changes["sensed"] = Sensed(vector, vector, vector, scalar, scalar, scalar, 0, 0)
     snapshot = snap(
-        2**40, forces=(scalar,) * 4, quat_wxyz=(vector[0],) * 4, gps=fix, slack_events=2**20, **changes
+        2**40, forces=(scalar,) * 14, quat_wxyz=(vector[0],) * 4, gps=fix, slack_events=2**20, **changes
     )
     for message in sent(key, snapshot):
         assert message.get_type() != "BAD_DATA"
@@ -221,3 +221,12 @@ def test_every_stream_and_its_rate_stand_in_the_manual(key):
         message.msgname,
         rate,
     )
+
+
+def test_the_built_in_filter_is_told_beside_an_estimator_of_ones_own(snap):
+    message_id = mavlink.MAVLINK_MSG_ID_FILTER_STATE
+    assert not sent(message_id, snap(77))
+    (state,) = sent(message_id, snap(77, built_in=((1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0))))
+    assert (state.time_usec, state.x, state.y, state.z) == (77, 2.0, 1.0, -3.0)
+    assert (state.vx, state.vy, state.vz) == (5.0, 4.0, -6.0)
+    assert (state.vehicle_x, state.vehicle_y, state.vehicle_z) == (8.0, 7.0, -9.0)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import multiprocessing
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from autopilot.onboard.onboard import Work
+from autopilot.own.chosen import OwnSetup
 from autopilot.shell.path_worker import Aside
 from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import Prepared
@@ -63,6 +65,23 @@ def test_one_process_does_one_work_after_the_other(aside: Aside) -> None:
         attend(aside, onboard, lambda: onboard.work is None)
         assert onboard.finished[-1] == (work, work.done())
     assert multiprocessing.active_children() == [process]
+
+
+def test_a_planner_that_hangs_is_broken_off_and_named(aside: Aside, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("""
+import time
+
+class Hangs:
+    def plan(self, route):
+        time.sleep(600.0)
+""")
+    onboard = Waiting()
+    work = onboard.ask(1.0)
+    onboard.work = work = work._replace(planner=OwnSetup(f"{tmp_path}/mine.py:Hangs", {}))
+    attend(aside, onboard, lambda: onboard.work is None)
+    ((done, prepared),) = onboard.finished
+    assert done is work
+    assert "Planner Hangs failed: TooSlow: no answer for seconds (mine.py:6)" in prepared.refusal
 
 
 def test_what_is_asked_for_later_is_done_when_what_goes_on_is_over(aside: Aside) -> None:

@@ -106,7 +106,9 @@ class Answerer:
         self.writer = FrameWriter(system, 1)
 
     def answer(self, time_us: int, forces: Forces | None = None, armed: bool = True) -> bytes:
-        message = convert.hil_actuator_controls_message(time_us, forces or self.forces, armed, True)
+        message = convert.hil_actuator_controls_message(
+            time_us, convert.padded(forces or self.forces), armed, True
+        )
         return self.writer.frame(message)
 
     def fly(self, simulator: HilSimulator, ticks: int) -> list[bytes]:

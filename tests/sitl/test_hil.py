@@ -15,7 +15,8 @@ from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import COMMAND_TIMEOUT_US, HilSimulator, PacingFigures
 from sitl.messages import pressure_pa
 
-PROFILES = ["gps", "ideal", "lab", "rtk"]
+VEHICLES = "bebop, bebop-real, heavy, heavy-real, hexarotor, iris, octorotor, thesis"
+PROFILES = ["field", "gps", "ideal", "lab", "lab-blind", "lab-real", "rtk", "rtk-blind"]
 # float32 keeps 24 bits: at 4 m, half a unit in the last place is 2.4e-7 m
 FLOAT32_M = 5e-7
 FULL = (1.96,) * 4
@@ -52,8 +53,8 @@ def test_every_tick_ends_with_the_clock(sensors: str, answerer, messages) -> Non
 
 def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     simulator = HilSimulator.build(sensors="ideal")
-    answerer((1.3, 1.3, 1.3, 1.3)).fly(simulator, 200)
-    odometry, load, inertial = messages(simulator.sensor_datagram())
+    answerer((1.3, 1.31, 1.32, 1.33)).fly(simulator, 200)
+    odometry, load, speeds, inertial = messages(simulator.sensor_datagram())
     state = simulator.core.state
     pose = convert.read_odometry(odometry)
     assert pose.position == pytest.approx(state.x_quad, abs=FLOAT32_M)
@@ -65,7 +66,12 @@ def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     assert tracked.velocity == pytest.approx(state.v_load, abs=FLOAT32_M)
     assert tracked.direction_body is None
     assert tracked.velocity_std == pytest.approx(1e-3)
-    assert odometry.time_usec == load.time_usec == simulator.now_us
+    assert odometry.time_usec == load.time_usec == speeds.time_usec == simulator.now_us
+    greatest = simulator.core.truth.rotor_max
+    assert speeds.index == 0
+    told = [convert.simulator.speed_rpm(force, greatest) for force in simulator.core.rotor_force]
+    assert speeds.rpm == told
+    assert len(set(speeds.rpm)) == 4  # of one rotor each
     assert inertial.fields_updated == convert.ACCEL | convert.GYRO
 
 
@@ -141,7 +147,9 @@ def test_truth_is_the_truth(answerer, messages) -> None:
     assert convert.read_hil_state_quaternion(vehicle, Home()).position == pytest.approx(
         state.x_quad, abs=0.01
     )
-    assert convert.read_rotor_state(rotors).forces == pytest.approx(state.rotor_force, abs=FLOAT32_M)
+    assert convert.read_rotor_state(rotors).forces[:4] == pytest.approx(
+        simulator.core.rotor_force, abs=FLOAT32_M
+    )
     assert (rotors.saturated, rotors.force_max) == (0b1000, pytest.approx(1.96))
     assert status.time_usec == simulator.now_us
     assert (status.vehicle_on_ground, status.load_on_ground) == (
@@ -194,7 +202,9 @@ def test_rubbish_is_harmless(noise: bytes, place: int, value: int) -> None:
     simulator = HilSimulator.build()
     before = simulator.sensor_datagram()
     frame = bytearray(
-        FrameWriter(1, 1).frame(convert.hil_actuator_controls_message(0, (1.0,) * 4, True, True))
+        FrameWriter(1, 1).frame(
+            convert.hil_actuator_controls_message(0, convert.padded((1.0,) * 4), True, True)
+        )
     )
     frame[place % len(frame)] ^= value or 1
     for datagram in (noise, bytes(frame), bytes(frame[:place]), noise + bytes(frame)):
@@ -373,8 +383,11 @@ def test_settings_of_the_other_process_are_passed_over() -> None:
     [
         ({"settings": {"SIM_WIND": 1.0}}, "SIM_WIND: no such parameter; did you mean SIM_WIND_"),
         ({"settings": {"SIM_WIND_E": nan}}, "SIM_WIND_E = nan m/s; must be -50 ... 50"),
-        ({"sensors": "perfect"}, "unknown sensors 'perfect'; shipped: gps, ideal, lab, rtk; or the path"),
-        ({"vehicle": "saucer"}, "unknown vehicle 'saucer'; shipped: bebop, heavy, thesis; or the path"),
+        (
+            {"sensors": "perfect"},
+            f"unknown sensors 'perfect'; shipped: {', '.join(PROFILES)}; or the path",
+        ),
+        ({"vehicle": "saucer"}, f"unknown vehicle 'saucer'; shipped: {VEHICLES}; or the path"),
     ],
 )
 def test_bad_options_are_told_in_one_line(kwargs, complaint: str) -> None:
@@ -425,3 +438,71 @@ def test_who_comes_is_told_what_the_rotors_do(answerer, messages) -> None:
     assert rotors() == (mavlink.PLUMBLINE_ROTORS_UNHEARD, [0.0] * 4)
     simulator.receive(pilot.answer(simulator.now_us, armed=False))
     assert rotors()[0] == mavlink.PLUMBLINE_ROTORS_DISARMED
+
+
+def test_a_battery_is_told_five_times_a_second(answerer, messages) -> None:
+    """Beside the sensors, as a power module does; a vehicle without one says nothing."""
+    settings_ = {"SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 50.0}
+    simulator = HilSimulator.build(settings=settings_)
+    told = []
+    for tick in range(260):
+        got = [x for x in messages(simulator.sensor_datagram()) if x.get_type() == "BATTERY_STATUS"]
+        told += [(tick, convert.read_battery_status(x)) for x in got]
+        answerer((1.2,) * 4).fly(simulator, 1)
+    assert [tick for tick, _ in told] == [0, 50, 100, 150, 200, 250]
+    supply = simulator.core.world.supply
+    last = told[-1][1]
+    assert last.voltage == pytest.approx(supply.voltage, abs=0.002)
+    assert last.current == pytest.approx(supply.current, rel=0.01)
+    assert last.remaining == pytest.approx(0.5, abs=0.01)
+    assert told[0][1].voltage == pytest.approx(3 * 3.82, abs=0.001)
+    assert last.voltage < told[0][1].voltage - 0.3
+    plain = HilSimulator.build()
+    said = [name for d in answerer().fly(plain, 60) for name in names(messages(d))]
+    assert "BATTERY_STATUS" not in said
+
+
+def test_a_sagging_battery_takes_thrust(answerer) -> None:
+    """Speed controllers at full throttle: the force falls with the square of the voltage."""
+    curve = {"SIM_THR_CURVE": 1.0, "SIM_THR_KNOWN": 1.0, "SIM_BATTERY": 1.0, "SIM_BAT_CHARGE": 20.0}
+    simulator = HilSimulator.build(settings=curve)
+    answerer(FULL).fly(simulator, 100)
+    share = simulator.core.world.supply.share
+    assert 0.75 < share < 0.88
+    assert simulator.core.rotor_force == pytest.approx((1.96 * share**2,) * 4, rel=1e-3)
+
+
+def test_a_snap_beside_the_centre_turns_the_vehicle_and_tells_its_own_impulse(answerer, messages) -> None:
+    """CABLE_SNAP has the mass that the cable feels, less than that of the pair."""
+    simulator = HilSimulator.build(settings={"SIM_ATT_X": 0.05})
+    core, L = simulator.core, simulator.core.truth.cable_length
+    core.state = core.state._replace(
+        x_quad=(0.0, 0.0, 50.0),
+        x_load=(0.05, 0.0, 50.0 - L + 0.001),
+        v_load=(0.0, 0.0, -1.0),
+        q_cable=(0.0, 0.0, -1.0),
+        vehicle_on_ground=0.0,
+        load_on_ground=0.0,
+    )
+    answerer().fly(simulator, 1)
+    (snap,) = (x for x in messages(simulator.truth_datagram()) if x.get_type() == "CABLE_SNAP")
+    truth = core.truth
+    n = (0.0, 0.05, 0.0)  # rho x q
+    mu = 1.0 / (1.0 / truth.load_mass + 1.0 / truth.quad_mass + n[1] ** 2 / truth.inertia[1])
+    assert snap.impulse == pytest.approx(mu * snap.speed, rel=1e-3)
+    assert core.state.omega_body[1] == pytest.approx(0.05 * snap.impulse / truth.inertia[1], rel=0.01)
+
+
+def test_five_times_a_second_the_truth_says_whose_it_is_in_numbers_of_its_own(answerer, messages) -> None:
+    simulator, pilot = HilSimulator.build(boot_id=41), answerer()
+    told = {}
+    for tick in range(101):
+        datagram = simulator.run_datagram()
+        if datagram is not None:
+            (told[tick],) = messages(datagram)
+        pilot.fly(simulator, 1)
+    assert list(told) == [0, 50, 100]
+    assert {(boot.get_type(), boot.boot_id) for boot in told.values()} == {("SIM_BOOT", 41)}
+    simulator.begin_anew()
+    (boot,) = messages(simulator.run_datagram())
+    assert boot.boot_id == 42

@@ -53,3 +53,15 @@ def test_a_tick_before_its_time_is_not_late() -> None:
     pacing.record(1000, 0)
     pacing.record(2000, 1500)
     assert "late p50 0 p99 0 max 0 us" in pacing.summary(0)
+
+
+def test_waiting_for_somebody_else_is_not_counted() -> None:
+    pacing = Pacing(speed=1.0)
+    for tick in range(100):
+        pacing.record(tick * SECOND // 250, tick * SECOND // 250)
+    pacing.pause(20 * SECOND)
+    for tick in range(100, 500):
+        due = tick * SECOND // 250 + 20 * SECOND
+        pacing.record(due, due)
+    assert pacing.figures.rate_hz == pytest.approx(250.0, rel=0.01)
+    assert pacing.summary(0) == "250.00 ticks/s, late p50 0 p99 0 max 0 us, 0 of 500 commands missed"

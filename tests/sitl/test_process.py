@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import socket
 import subprocess
@@ -56,7 +57,7 @@ class Pilot:
                 return datagram, time_us
 
     def answer(self, time_us: int) -> None:
-        message = convert.hil_actuator_controls_message(time_us, (1.0,) * 4, True, True)
+        message = convert.hil_actuator_controls_message(time_us, convert.padded((1.0,) * 4), True, True)
         self.socket.send(self.writer.frame(message))
 
 
@@ -152,6 +153,28 @@ def test_the_clock_goes_no_faster_than_it_may_and_waits(port: int, lockstep: tup
     assert (process.returncode, errors) == (0, "")
 
 
+def test_waiting_for_the_autopilot_is_no_busy_machine(port: int) -> None:
+    process = start("--speed", "0.2", "--listen", f"127.0.0.1:{port}", "--truth", f"127.0.0.1:{free_port()}")
+    assert process.stdout is not None
+    process.stdout.readline()
+    pilot = Pilot(port)
+    pilot.greet()
+    time_us, waited = -1, False
+    while time_us < 320_000:  # 80 ticks at 50 Hz, of which those after the silence fill a second
+        time_us = pilot.sensors(after_us=time_us)[1]
+        if time_us >= 60_000 and not waited:
+            waited, silent_until = True, time.monotonic() + 1.2
+            while time.monotonic() < silent_until:
+                assert pilot.sensors()[1] == time_us
+        pilot.answer(time_us)
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, errors) == (0, "")
+    assert re.search(r"^sitl: waited 1\.\d s for the autopilot$", output, re.MULTILINE)
+    share = re.search(r"machine busy: clock at (\d\.\d\d)", output)
+    assert share is None or float(share[1]) > 0.5, output
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "complaint"),
     [
@@ -160,7 +183,12 @@ def test_the_clock_goes_no_faster_than_it_may_and_waits(port: int, lockstep: tup
             1,
             "sitl: cannot listen on 127.0.0.1:{busy}: address already in use; ",
         ),
-        (["--sensors", "nothing"], 1, "sitl: unknown sensors 'nothing'; shipped: gps, ideal, lab, rtk; or"),
+        (
+            ["--sensors", "nothing"],
+            1,
+            "sitl: unknown sensors 'nothing'; shipped: field, gps, ideal, lab, lab-blind, lab-real, "
+            "rtk, rtk-blind; or",
+        ),
         (["--set", "SIM_RATE_HZ=300"], 1, "sitl: SIM_RATE_HZ = 300 Hz; a tick must be"),
         (["--set", "SIM_RATE_HZ"], 2, "'SIM_RATE_HZ'; must be NAME=VALUE with a number"),
         (["--listen", "4560"], 2, "'4560'; must be HOST:PORT"),

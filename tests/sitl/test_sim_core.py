@@ -47,7 +47,7 @@ def test_commands_on_their_way_keep_their_order(core_in_the_air) -> None:
     in_force = []
     for command in sent:
         core.tick(command)
-        in_force.append(core.state.rotor_force)
+        in_force.append(core.rotor_force)
     # command k takes effect at 4k + 10 ms, so the end of tick k + 3 (4k + 12 ms) shows it first
     assert in_force == [(0.0,) * 4] * 2 + sent[:6]
 
@@ -65,7 +65,7 @@ def test_commands_keep_their_order_where_the_delay_changes_in_flight(
         for _ in range(60):
             sent.append((0.01 * (len(sent) + 1),) * 4)
             core.tick(sent[-1])
-            in_force.append(core.state.rotor_force)
+            in_force.append(core.rotor_force)
             # command k is sent at 4k ms and shows once its instant has passed
             newest = max(
                 newest, *(k for k in range(-1, len(sent)) if k < 0 or 4 * k + delay_ms < 4 * len(sent))
@@ -78,9 +78,9 @@ def test_rotors_stand_until_the_first_command(core_in_the_air) -> None:
     core = core_in_the_air(SIM_ACT_DELAY_MS=200.0)
     for _ in range(50):
         core.tick(FORCES)
-        assert core.state.rotor_force == (0.0, 0.0, 0.0, 0.0)
+        assert core.rotor_force == (0.0, 0.0, 0.0, 0.0)
     core.tick(FORCES)
-    assert core.state.rotor_force == FORCES
+    assert core.rotor_force == FORCES
 
 
 @pytest.mark.parametrize(("rate", "latency_ms", "extra_ms"), [(200, 4.0, 0), (30, 50.0, 0), (333.3, 0.5, 7)])

@@ -250,6 +250,13 @@ def test_a_reposition_keeps_what_is_not_given_and_holds_there() -> None:
     assert sky.view.x_load == pytest.approx((1.5, 0.0, 2.0))
 
 
+@pytest.mark.parametrize("place", [(2e5, 0.0, 2.0), (0.0, -2e5, 2.0), (0.0, 0.0, 2e5)])
+def test_a_reposition_that_is_far_off_is_a_mistake(place: tuple[float, float, float]) -> None:
+    sky = Sky().airborne()
+    verdict = sky.ask(R.Reposition(*place, True))
+    assert verdict.text == "Reposition denied: more than 100000 m away"
+
+
 def test_a_reposition_out_of_motion_goes_on_from_that_motion() -> None:
     sky = Sky().airborne()
     sky.ask(R.Reposition(5.0, 0.0, 2.0, True))

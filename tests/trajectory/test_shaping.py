@@ -14,7 +14,7 @@ from autopilot.trajectory import prepare as preparation
 from autopilot.trajectory.convex import NO_ROWS, Goal, Problem
 from autopilot.trajectory.peaks import Body
 from autopilot.trajectory.prepare import AS_ASKED, REFUSE, SLOW_DOWN, Limits, prepare, slow_down, trouble_of
-from autopilot.trajectory.rotor_demand import Bounds, commanded, demand, slopes
+from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand, slopes
 from autopilot.trajectory.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, unshaped
 from autopilot.trajectory.splines import Array, Basis
 from missions.fileformat import load_mission
@@ -55,8 +55,8 @@ def assert_within(shaped: Shaped, bounds: Bounds = BOUNDS) -> None:
     asked = commanded(found, 1e-3, bounds.rotor_tau)
     assert asked.max() <= bounds.rotor_high + BETWEEN_N
     assert asked.min() >= bounds.rotor_low - BETWEEN_N
-    assert found[:, 4].min() >= bounds.tension_low - BETWEEN_N
-    assert found[:, 5].min() >= bounds.cos_tilt - BETWEEN_N
+    assert found[:, TENSION].min() >= bounds.tension_low - BETWEEN_N
+    assert found[:, COS_TILT].min() >= bounds.cos_tilt - BETWEEN_N
 
 
 def test_what_can_be_flown_is_flown_exactly_as_asked() -> None:

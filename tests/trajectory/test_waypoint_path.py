@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from autopilot.geometry.linear import Vec3
 from autopilot.trajectory.peaks import Body, survey_transfer
 from autopilot.trajectory.prepare import REFUSE, Limits, prepare
-from autopilot.trajectory.rotor_demand import Bounds, commanded, demand
+from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand
 from autopilot.trajectory.splines import Array
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.trajectory.waypoint_path import (
@@ -48,8 +48,8 @@ def assert_within(jets: Array, spacing: float) -> None:
     asked = commanded(found, spacing, BOUNDS.rotor_tau)
     assert asked.max() <= BOUNDS.rotor_high + 0.02
     assert asked.min() >= BOUNDS.rotor_low - 0.02
-    assert found[:, 4].min() >= BOUNDS.tension_low
-    assert found[:, 5].min() >= BOUNDS.cos_tilt - 0.01
+    assert found[:, TENSION].min() >= BOUNDS.tension_low
+    assert found[:, COS_TILT].min() >= BOUNDS.cos_tilt - 0.01
 
 
 @settings(max_examples=15, deadline=None)

@@ -8,11 +8,12 @@ from importlib.resources import files
 
 import pytest
 
-from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_vehicle
+from autopilot.vehicle.file import VEHICLES, VehicleFileError, belief_of, load_belief, load_vehicle
+from autopilot.vehicle.layout import PLUS
 from autopilot.vehicle.model import SHARE_OF_ARM, Vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from sitl.vehicles.sim_parameters import sim_parameters
-from sitl.vehicles.truth import truth_of
+from sitl.vehicles.truth import AIR_KEYS, CHAIN_KEYS, DRIVE_KEYS, truth_of
 
 BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
 # a file of which the autopilot alone needs something: what it may leave out has a default
@@ -47,18 +48,47 @@ def broken(tmp_path, old, new):
 
 
 def test_the_shipped_vehicles_are_the_files_of_the_folder():
-    assert VEHICLES.names() == ("bebop", "heavy", "thesis")
+    assert VEHICLES.names() == (
+        *("bebop", "bebop-real", "heavy", "heavy-real", "hexarotor", "iris", "octorotor", "thesis"),
+    )
     for name in VEHICLES.names():
         assert load_vehicle(name).name == name
 
 
+# what a shipped vehicle leaves to its default: its cable has no links
+CABLE_OF_LINKS = {key: Vehicle.model_fields[key].default for key in CHAIN_KEYS.values()}
+# what no vehicle has unless its file says so
+EFFECTS = {
+    **dict.fromkeys(("rotor_drag_1_s", "rotor_flap_rad_s_m", "blade_stiffness_n_m_rad"), 0.0),
+    **dict.fromkeys(("ground_effect", "downwash", "cable_diameter_m", "esc_steps"), 0.0),
+    **dict.fromkeys(("thrust_curve", "thrust_curve_known"), 0.0),
+    **{"attachment_m": [0.0, 0.0, 0.0], "air_density_kg_m3": 1.225, "esc_speed_controlled": False},
+    **{"battery": False, "battery_cells": 3, "battery_capacity_mah": 1200.0, "battery_charge": 1.0},
+    **{"battery_resistance_ohm": 0.06, "battery_hover_w": 65.0},
+}
+
+
+def shipped(name):
+    """The keys of a shipped file, as they are written."""
+    text = files("autopilot.vehicle").joinpath("vehicles", f"{name}.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
 @pytest.mark.parametrize("name", VEHICLES.names())
 def test_a_shipped_file_states_every_key_and_is_read_as_written(name):
-    """Nothing of a shipped vehicle is left to a default but the number of rotors."""
-    text = files("autopilot.vehicle").joinpath("vehicles", f"{name}.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
+    """Of a shipped vehicle the number of rotors and what nobody looks at is left to a default, no more."""
+    table = shipped(name)
+    if "believed" in table:
+        table = {**shipped(table["believed"]), **table}
+        assert EFFECTS.keys() - {"air_density_kg_m3", "rotor_radius_m"} <= table.keys()
     read = load_vehicle(name).model_dump()
-    assert {key: list(v) if isinstance(v, tuple) else v for key, v in read.items()} == {"rotors": 4, **table}
+    assert {key: list(v) if isinstance(v, tuple) else v for key, v in read.items()} == {
+        **{"rotors": 4, "frame": "plus", "spin": "", "rotor": [], "believed": ""},
+        **EFFECTS,
+        "rotor_radius_m": SHARE_OF_ARM["rotor_radius_m"] * table["arm_m"],
+        **CABLE_OF_LINKS,
+        **table,
+    }
 
 
 @pytest.mark.parametrize("name", VEHICLES.names())
@@ -68,6 +98,8 @@ def test_a_vehicle_written_out_is_read_back(name, tmp_path):
     def toml(value):
         if isinstance(value, tuple):
             return str(list(value))
+        if isinstance(value, bool):
+            return str(value).lower()
         return f'"{value}"' if isinstance(value, str) else str(value)
 
     text = "\n".join(f"{key} = {toml(value)}" for key, value in vehicle.model_dump().items())
@@ -77,8 +109,12 @@ def test_a_vehicle_written_out_is_read_back(name, tmp_path):
 def test_what_may_be_left_out_has_its_default(tmp_path):
     vehicle = loaded(tmp_path, LEAST)
     assert (vehicle.name, vehicle.rotors, vehicle.rotor_tau_s, vehicle.load_radius_m) == ("foo", 4, 0.0, 0.02)
-    drags = {key: value for key, value in vehicle.model_dump().items() if "_drag_" in key}
-    assert len(drags) == 5
+    drags = {
+        key: value
+        for key, value in vehicle.model_dump().items()
+        if "_drag_" in key and key not in CHAIN_KEYS.values()
+    }
+    assert len(drags) == 6
     assert set(drags.values()) == {0.0}
     for key, share in SHARE_OF_ARM.items():
         assert getattr(vehicle, key) == share * 0.2
@@ -94,6 +130,16 @@ def test_what_must_be_there_is_missed(key, tmp_path):
 
 
 # (what stands in the file, what is put in its place, what is said)
+AT_LAST = "slip_rate_1_s = 500.0\n"
+
+
+def rotors(*places):
+    """Tables of rotors at these places, turning in turn."""
+    return "".join(
+        f'[[rotor]]\nx_m = {x}\ny_m = {y}\nspin = "{"+-"[i % 2]}"\n' for i, (x, y) in enumerate(places)
+    )
+
+
 BROKEN = [
     (
         "load_mass_kg = 0.1",
@@ -150,10 +196,40 @@ BROKEN = [
     ("slip_rate_1_s = 500.0", "slip_rate_1_s = 0.0", "slip_rate_1_s = 0.0; must be >= 0.001 and <= 600"),
     ("rotor_tau_s = 0.020", "rotor_tau_s = -0.01", "rotor_tau_s = -0.01; must be >= 0 and <= 1"),
     ('name = "bebop"', "name = 3", "name = 3; must be a text in quotes"),
+    ('name = "bebop"', "rotors = 3", "rotors = 3; must be >= 4 and <= 14 (number of rotors)"),
+    ('name = "bebop"', "rotors = 15", "rotors = 15; must be >= 4 and <= 14 (number of rotors)"),
+    ('name = "bebop"', "rotors = 6.0", "rotors = 6.0; must be a whole number (number of rotors)"),
+    ('name = "bebop"', 'frame = "h"', 'frame = "h"; must be "plus" or "x"'),
+    ('name = "bebop"', 'spin = "+-+"', 'spin = "+-+"; must be 4 signs + or -, one a rotor'),
+    ('name = "bebop"', 'spin = "+-cw"', 'spin = "+-cw"; must be 4 signs + or -, one a rotor'),
+    ('name = "bebop"', "spin = 4", "spin = 4; must be a text in quotes"),
     (
         'name = "bebop"',
-        "rotors = 6",
-        "rotors = 6; must be 4 (number of rotors; only quadrotors can be flown)",
+        'spin = "++++"',
+        "rotor places and spins: the vehicle cannot be held level with these",
+    ),
+    (
+        AT_LAST,
+        AT_LAST + rotors((1, 1), (1, -1), (-1, 1)),
+        "rotor: there must be 4 ... 14 tables [[rotor]], not 3",
+    ),
+    (
+        AT_LAST,
+        AT_LAST + rotors((0.1, 0.1), (0.1, 0.2), (0.2, 0.1), (0.2, 0.2)),
+        "rotor places and spins: the vehicle cannot be held level with these",
+    ),
+    (AT_LAST, AT_LAST + rotors((9, 1)), "rotor[0].x_m = 9; must be >= -5 and <= 5"),
+    (AT_LAST, AT_LAST + "[[rotor]]\nx_m = 1\ny_m = 1\n", "rotor[0].spin is missing"),
+    (AT_LAST, AT_LAST + '[[rotor]]\nx = 1\ny_m = 1\nspin = "+"\n', "rotor[0].x: unknown key; write x_m"),
+    (
+        AT_LAST,
+        AT_LAST + '[[rotor]]\nx_m = 1\ny_m = 1\nspin = "ccw"\n',
+        'rotor[0].spin = "ccw"; must be "+" or "-"',
+    ),
+    (
+        'name = "bebop"',
+        "rotors = 6\nrotor = [" + ", ".join(4 * ['{x_m = 1, y_m = 1, spin = "+"}']) + "]",
+        "rotors: leave it out, because [[rotor]] says where each rotor is",
     ),
     ("load_mass_kg", "load_mas_kg", "load_mas_kg: unknown key; write load_mass_kg (in kilograms)"),
     (
@@ -183,7 +259,8 @@ def test_unknown_names_and_files_that_cannot_be_read(tmp_path):
     with pytest.raises(VehicleFileError) as caught:
         load_vehicle("bepop")
     assert str(caught.value) == (
-        "unknown vehicle 'bepop'; did you mean bebop? shipped: bebop, heavy, thesis; or the path of a file"
+        "unknown vehicle 'bepop'; did you mean bebop? shipped: bebop, bebop-real, heavy, heavy-real, "
+        "hexarotor, iris, octorotor, thesis; or the path of a file"
     )
     with pytest.raises(VehicleFileError, match="cannot be read: Is a directory"):
         load_vehicle(tmp_path)
@@ -207,8 +284,10 @@ def extremes(bound):
 @pytest.mark.parametrize("forces", FORCES)
 @pytest.mark.parametrize("inertia", [1e-6, 100.0])
 def test_what_the_file_may_say_both_programs_can_take(numbers, forces, inertia):
-    assert len(numbers) == 21
+    assert len(numbers) == 48
     low, high = forces
+    if high == math.inf:
+        numbers = {**numbers, "esc_steps": 0.0}
     vehicle = Vehicle(**numbers, rotor_min_n=low, rotor_max_n=high, inertia_kg_m2=(inertia,) * 3)
     believed = autopilot_parameters(vehicle)
     assert believed["VEH_QUAD_MASS"] == vehicle.quad_mass_kg
@@ -217,7 +296,9 @@ def test_what_the_file_may_say_both_programs_can_take(numbers, forces, inertia):
 
 
 def test_every_field_of_the_truth_is_the_key_that_begins_with_its_name():
-    keys = [key for key in Vehicle.model_fields if key not in ("name", "rotors", "inertia_kg_m2")]
+    beside = ("name", "believed", "rotors", "frame", "spin", "rotor", "inertia_kg_m2")
+    elsewhere = {"attachment_m", *AIR_KEYS.values(), *DRIVE_KEYS.values(), *CHAIN_KEYS.values()}
+    keys = [key for key in Vehicle.model_fields if key not in beside and key not in elsewhere]
     numbers = {key: float(place) for place, key in enumerate(keys)}  # all different
     vehicle = load_vehicle("heavy").model_copy(update=numbers)
     truth = truth_of(vehicle)
@@ -228,3 +309,70 @@ def test_every_field_of_the_truth_is_the_key_that_begins_with_its_name():
             (key for key in Vehicle.model_fields if key.startswith(field + "_") or key == field), key=len
         )
         assert getattr(truth, field) == getattr(vehicle, key), field
+
+
+def test_every_field_of_the_cable_of_links_is_a_key():
+    numbers = {key: float(place) for place, key in enumerate(CHAIN_KEYS.values())}  # all different
+    chain = truth_of(load_vehicle("heavy").model_copy(update=numbers)).chain
+    assert chain._fields == tuple(CHAIN_KEYS)
+    assert chain == tuple(numbers.values())
+
+
+def test_a_hook_below_the_middle_of_the_cable_is_refused(tmp_path):
+    assert loaded(tmp_path, BEBOP + "load_hook_m = 0.35\n").load_hook_m == 0.35
+    with pytest.raises(VehicleFileError, match=r"load_hook_m = 0\.36; must be <= half"):
+        loaded(tmp_path, BEBOP + "load_hook_m = 0.36\n")
+
+
+def test_rotors_at_any_places_are_flown_as_they_are_given(tmp_path):
+    """The same vehicle as by its frame; and each number of a rotor reaches its layout."""
+    a = 0.126 * 0.5**0.5
+    listed = loaded(tmp_path, BEBOP + rotors((-a, a), (-a, -a), (a, -a), (a, a)))
+    named = loaded(tmp_path, 'frame = "x"\nspin = "+-+-"\n' + BEBOP)
+    for one, other in zip(listed.layout, named.layout, strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
+    own = "thrust_factor = 0.5\ntorque_factor = 2.0\nlag_factor = 3.0\n"
+    last = loaded(tmp_path, BEBOP + rotors((-a, a), (-a, -a), (a, -a), (a, a)) + own).layout[-1]
+    assert last == pytest.approx((a / 0.126, a / 0.126, -2.0, 0.5, 3.0))
+
+
+def test_a_plus_quadrotor_is_that_of_2_13():
+    assert load_vehicle("bebop").layout == PLUS
+
+
+def test_a_truth_beside_a_belief_is_flown_and_not_believed(tmp_path):
+    """What it leaves out is as in the other, which the autopilot goes by: a name, or a file beside it."""
+    (tmp_path / "believed.toml").write_text(BEBOP.replace("quad_mass_kg = 0.4", "quad_mass_kg = 0.5"))
+    truth = loaded(tmp_path, 'believed = "believed.toml"\nrotor_drag_1_s = 0.3\n')
+    assert (truth.quad_mass_kg, truth.rotor_drag_1_s, truth.name) == (0.5, 0.3, "foo")
+    assert load_belief(tmp_path / "foo.toml").rotor_drag_1_s == 0.0
+    assert load_belief(tmp_path / "believed.toml") == load_vehicle(tmp_path / "believed.toml")
+    named = loaded(tmp_path, 'believed = "bebop"\nquad_mass_kg = 0.45\n')
+    assert (named.quad_mass_kg, named.load_mass_kg) == (0.45, 0.1)
+    assert load_belief(tmp_path / "foo.toml") == load_vehicle("bebop")
+    assert belief_of("heavy-real") == "heavy"
+    assert belief_of("heavy") == "heavy"
+
+
+WRONG_BELIEFS = [
+    ('believed = "bepop"', "unknown vehicle 'bepop'; did you mean bebop?"),
+    (
+        'believed = "bebop-real"',
+        "believed: autopilot/vehicle/vehicles/bebop-real.toml has a `believed` of its own",
+    ),
+    ('believed = "mine.toml"', "mine.toml: cannot be read"),
+    ("believed = 3", "believed = 3; must be a text in quotes"),
+]
+
+
+@pytest.mark.parametrize(("line", "said"), WRONG_BELIEFS)
+def test_a_belief_that_is_none_is_told(tmp_path, line, said):
+    with pytest.raises(VehicleFileError) as caught:
+        loaded(tmp_path, BEBOP + line + "\n")
+    assert said in str(caught.value)
+
+
+def test_what_becomes_of_a_share_of_the_greatest_force_wants_one(tmp_path):
+    for line in ("battery = true", "esc_steps = 100.0", "thrust_curve = 0.5"):
+        said = broken(tmp_path, "rotor_max_n = 1.96", f"rotor_max_n = inf\n{line}")
+        assert said.startswith("rotor_max_n = inf; must be finite"), line

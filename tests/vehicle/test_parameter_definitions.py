@@ -23,7 +23,7 @@ from autopilot.vehicle.parameters import (
 from autopilot.wire.convert import ROTOR_FMAX
 from sitl.vehicles.sim_parameters import definitions as sim_definitions
 from sitl.vehicles.sim_parameters import sim_parameters
-from sitl.vehicles.truth import load_truth
+from sitl.vehicles.truth import CHAIN_KEYS, load_truth
 
 
 def test_the_laws_are_the_values_of_their_parameter():
@@ -57,11 +57,17 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
 
 
 # keys of a vehicle file of which the autopilot makes nothing: names, and what only the plant knows
+OF_THE_ROTORS = {"name", "believed", "rotors", "frame", "spin", "rotor"}  # not numbers, or told by `layout`
 OF_THE_WORLD_ALONE = {
-    *("name", "rotors"),
+    *OF_THE_ROTORS,
     *("spin_drag_n_m_s2", "load_drag_n_s_m", "load_drag_quadratic_n_s2_m2"),
     *("gear_height_m", "gear_spread_m", "rotor_reach_m", "rotor_height_m", "load_radius_m"),
     *("contact_frequency_rad_s", "contact_damping_ratio", "friction", "slip_rate_1_s"),
+    *CHAIN_KEYS.values(),
+    *("rotor_radius_m", "air_density_kg_m3", "rotor_drag_1_s", "rotor_flap_rad_s_m"),
+    *("blade_stiffness_n_m_rad", "ground_effect", "downwash", "cable_diameter_m"),
+    *("thrust_curve", "thrust_curve_known", "esc_steps", "esc_speed_controlled"),
+    *("battery", "battery_charge"),
 }
 BELIEVED = tuple(key for key in Vehicle.model_fields if key not in OF_THE_WORLD_ALONE)
 
@@ -73,16 +79,18 @@ def test_every_number_of_the_vehicle_has_a_parameter(key):
     before = autopilot_parameters(vehicle).values()
     value = getattr(vehicle, key)
     if isinstance(value, tuple):
-        moves = [tuple(v * (1.5 if i == k else 1.0) for i, v in enumerate(value)) for k in range(len(value))]
+        moves = [
+            tuple(1.5 * v + 1e-3 if i == k else v for i, v in enumerate(value)) for k in range(len(value))
+        ]
     else:
-        moves = [1.5 * value + 1e-3]
+        moves = [value + 1 if isinstance(value, int) else 1.5 * value + 1e-3]
     for moved in moves:
         assert autopilot_parameters(vehicle.model_copy(update={key: moved})).values() != before
 
 
 def test_what_only_the_plant_knows_moves_no_parameter():
     vehicle = load_vehicle("heavy")
-    numbers = {key: 1.5 * getattr(vehicle, key) + 1e-3 for key in OF_THE_WORLD_ALONE - {"name", "rotors"}}
+    numbers = {key: 1.5 * getattr(vehicle, key) + 1e-3 for key in OF_THE_WORLD_ALONE - OF_THE_ROTORS}
     moved = vehicle.model_copy(update=numbers)
     assert autopilot_parameters(moved).values() == autopilot_parameters(vehicle).values()
 

@@ -199,7 +199,7 @@ def test_a_text_is_written_as_the_numbers_of_its_bytes() -> None:
 
 @given(
     st.tuples(
-        *(st.integers(0, 2**53), st.tuples(*(st.floats(width=32, allow_nan=False),) * 4)),
+        *(st.integers(0, 2**53), st.tuples(*(st.floats(width=32, allow_nan=False),) * 14)),
         *(st.booleans(), st.booleans(), st.booleans(), st.floats(-2.0, 2.0)),
     ),
     st.integers(0, 255),
@@ -229,7 +229,7 @@ def test_what_is_no_answer_is_none(datagram: bytes) -> None:
 
 
 def test_an_answer_of_another_system_or_beside_another_frame_is_left_to_the_general_decoder() -> None:
-    frame = FrameWriter(2, 1).frame(hil_actuator_controls_message(0, (1.0,) * 4, True, True))
+    frame = FrameWriter(2, 1).frame(hil_actuator_controls_message(0, (1.0,) * 14, True, True))
     payload = np.zeros(PAYLOAD_ROOM, np.uint8)
     assert frames.answer_in(frame, 2, payload)[0]
     assert not frames.answer_in(frame, 1, payload)[0]

@@ -119,7 +119,7 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
         st.builds(
             convert.HilActuatorControls,
             times,
-            st.tuples(numbers, numbers, numbers, numbers),
+            st.tuples(*(numbers,) * 14),
             st.booleans(),
             st.booleans(),
             st.booleans(),
@@ -183,10 +183,11 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             convert.RotorState,
             times,
             st.integers(0, 2),
-            st.tuples(numbers, numbers, numbers, numbers),
+            st.tuples(*(numbers,) * 14),
             numbers,
             positive | st.just(math.inf),
-            st.integers(0, 15),
+            st.integers(0, 2**14 - 1),
+            st.integers(4, 14),
         ),
         convert.rotor_state_message,
         convert.read_rotor_state,
@@ -342,11 +343,11 @@ def test_no_state_however_wild_raises(v: Any, quat: Any) -> None:
         convert.load_sensor_message(0, v, v, v, v[0], v[0], v[0]),
         convert.hil_gps_message(0, 3, v, v, v[0], v[0], 10, home=HOME),
         convert.hil_state_quaternion_message(0, quat, v, v, v, v[0], v, home=HOME),
-        convert.hil_actuator_controls_message(0, (*v, v[0]), True, True),
+        convert.hil_actuator_controls_message(0, (v[0],) * 14, True, True),
         convert.load_state_message(0, 0, v, v, v, v, v[0], v[0], True, 10**9),
         convert.load_setpoint_message(0, 0, 0, 10**9, v, v, v, v, v[0], v[0], v, v),
         convert.cascade_errors_message(0, 0, v, v, v, v, v, v, v[0], v[0], v[0], v),
-        convert.rotor_state_message(0, 0, (*v, v[0]), v[0], v[0], 0),
+        convert.rotor_state_message(0, 0, (v[0],) * 14, v[0], v[0], 0),
         convert.wind_state_message(0, v, v),
         convert.attitude_message(0, quat, v),
         convert.attitude_quaternion_message(0, quat, v),
@@ -489,7 +490,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        convert.rotor_state_message(0, 2, (1.0, 2.0, 3.0, 4.0), 0.0, math.inf, 9),
+        convert.rotor_state_message(0, 2, convert.padded((1.0, 2.0, 3.0, 4.0)), 0.0, math.inf, 9),
         {"force": [(1.0, 2.0, 3.0, 4.0)], "force_min force_max saturated source": [0.0, math.inf, 9, 2]},
     ),
     (convert.wind_state_message(0, V, V), {"wind": [tuple(NED)], "gust": [tuple(NED)]}),
@@ -512,8 +513,10 @@ def test_every_field_has_its_axis_and_its_sign(message: Any, expected: dict[str,
 
 
 def test_full_scale_of_the_actuators() -> None:
-    message = convert.hil_actuator_controls_message(4000, (0.0, 0.98, 1.96, 3.92), True, True)
-    assert message.controls[:5] == [0.0, 0.5, 1.0, 2.0, 0.0]
+    message = convert.hil_actuator_controls_message(
+        4000, convert.padded((0.0, 0.98, 1.96, 3.92, 0.49)), True, True
+    )
+    assert message.controls[:7] == [0.0, 0.5, 1.0, 2.0, 0.0, 0.0, 0.25]
     assert len(message.controls) == 16
     assert (message.time_usec, message.mode & 128, message.flags & 1) == (4000, 128, 1)
-    assert convert.hil_actuator_controls_message(0, (0.0,) * 4, False, False).mode & 128 == 0
+    assert convert.hil_actuator_controls_message(0, convert.NO_FORCES, False, False).mode & 128 == 0

@@ -33,6 +33,7 @@ from missions.model import (
     AttitudeRun,
     Delay,
     Land,
+    LookAt,
     ReturnHome,
     Signals,
     Sine,
@@ -40,6 +41,7 @@ from missions.model import (
     Step,
     Takeoff,
     Term,
+    TurnNose,
     Waypoint,
     Winch,
 )
@@ -253,6 +255,13 @@ REFUSALS = [
     ([item(31013, 1.0, 1.6, x=1000)], 0, "INVALID_PARAM2", "tilt north = 1.6 rad"),
     ([item(31013, 1.0, 0.0, math.nan, x=1000)], 0, "INVALID_PARAM3", "tilt east = nan rad"),
     ([item(31013, 1.0, 0.1, x=0)], 0, "INVALID_PARAM5_X", "duration = 0 s"),
+    ([item(115, math.nan)], 0, "INVALID_PARAM1", "angle = nan deg"),
+    ([item(115, 400.0)], 0, "INVALID_PARAM1", "angle = 400 deg"),
+    ([item(115, 90.0, 0.0, 2.0)], 0, "INVALID_PARAM3", "sense = 2"),
+    ([item(115, 90.0, 0.0, 0.0, 7.0)], 0, "INVALID_PARAM4", "from = 7"),
+    ([item(195)], 0, "UNSUPPORTED_FRAME", "frame 2"),
+    ([item(195, frame=6)], 0, "INVALID_PARAM5_X", "north of home"),
+    ([item(201, 1.0, frame=6)], 0, "INVALID_PARAM1", "mode = 1"),
 ]
 
 
@@ -375,22 +384,58 @@ def test_after_what_leaves_no_known_place_a_height_alone_is_refused(unknown: Wir
 def test_commands_for_other_things_are_kept_and_not_flown() -> None:
     assert (
         decode_items(
-            [item(command) for command in (1000, 203, 195, 201, 80, 206, 115, 189, 31000, 31014, 43000)], HOME
+            [item(command) for command in (1000, 203, 196, 198, 206, 189, 31000, 31014, 43000)], HOME
         )
         == ()
     )
 
 
 def test_what_is_not_flown_is_known() -> None:
-    assert unflown([item(93, 1.0), item(201), item(177, 0.0, 1.0), item(206), TERM, RUN]) == (1, 3)
+    assert unflown([item(93, 1.0), item(203), item(177, 0.0, 1.0), item(206), TERM, RUN]) == (1, 3)
 
 
 def test_a_jump_without_end_says_which_step_comes_after_the_last() -> None:
-    items = [item(93, 1.0), item(201), item(93, 2.0), TERM, RUN, item(177, 1.0, -1.0), item(93, 9.0)]
+    items = [item(93, 1.0), item(203), item(93, 2.0), TERM, RUN, item(177, 1.0, -1.0), item(93, 9.0)]
     located = located_steps(items, HOME)
     assert [one.last for one in located] == [0, 2, 4], "what stands behind it is never flown"
     assert endless_from(items, located) == 1
     assert endless_from(items[:-2], located) is None
+
+
+def test_items_that_turn_the_nose_belong_to_the_step_behind_them() -> None:
+    latitude, longitude, _ = geodetic_from_enu((12.0, -7.0, 0.0), HOME)
+    there = item(195, frame=6, x=latitude, y=longitude)
+    items = [
+        *(item(115, 90.0), item(22, frame=6, z=4.0), item(93, 1.0), there, item(93, 2.0), item(197)),
+        *(item(115, 30.0, 20.0, -1.0, 1.0), item(93, 3.0), item(201, 3.0, frame=6, x=latitude, y=longitude)),
+        *(item(93, 4.0), item(80)),
+    ]
+    steps = located_steps(items, HOME)
+    assert [one.last for one in steps] == [1, 2, 4, 7, 9, 10]
+    assert steps[0].aims == (), "on the ground no nose turns"
+    assert steps[1].aims == (TurnNose(0.0),), "from north, clockwise: to the east"
+    (seen,) = steps[2].aims
+    assert isinstance(seen, LookAt) and seen.east_m is not None and seen.north_m is not None
+    assert (seen.east_m, seen.north_m) == pytest.approx((12.0, -7.0), abs=PLACE_M)
+    turned = TurnNose(math.radians(30.0), relative=True, rate_rad_s=math.radians(20.0))
+    assert steps[3].aims == (LookAt(None, None), turned)
+    assert steps[4].aims == (seen,)
+    assert (steps[5].step, steps[5].aims) == (Delay(0.0), (LookAt(None, None),)), "held as it turns"
+
+
+@pytest.mark.parametrize("last", [item(21), item(20)])
+def test_behind_what_lands_the_nose_is_not_turned(last: WireItem) -> None:
+    items = [item(22, frame=6, z=4.0), item(115, 90.0), last, item(197)]
+    steps = located_steps(items, HOME)
+    assert [one.last for one in steps] == [0, 2]
+    assert steps[1].aims == (TurnNose(0.0),)
+
+
+def test_jumps_without_end_turn_the_nose_each_time() -> None:
+    items = [item(22, frame=6, z=4.0), item(93, 2.0), item(115, 90.0), item(177, 1.0, -1.0)]
+    steps = located_steps(items, HOME)
+    assert [one.aims for one in steps] == [(), (), (TurnNose(0.0),)]
+    assert endless_from(items, steps) == 1
 
 
 def test_jumps_fly_their_items_again() -> None:

@@ -8,43 +8,71 @@
 | r | rest | I | N | m_Q (x_Q'' + g e_3) - f R e_3 - D |
 | w | pull | | m/s^2 | L q'.q' - q . (x_Q'' + g e_3) |
 | m_L | load_mass | | kg | (r . q) / w |
-| P | push | I | N | r - (r . q) q |
+| P | push | I | N | p + k s |
+| p | steady | I | N | r - k s, across the cable |
+| s | shaped | I | N | drag as `shape` has it |
+| k | factor | | | of that, beyond the believed drag |
 
 r is all that acts on the vehicle besides weight, rotors and drag in still air: the pull T q of the cable
 and the wind's push. Across the cable it is the push alone. Along it the push is taken for none, so that r .
 q = T; and the load, on a cable that turns as a pendulum whose pivot moves with x_Q'', has x_L'' + g e_3 =
 -w q whatever its mass, hence T = m_L w. The mass is the least-squares fit of T to w with exponential
 forgetting. It is learned while the load hangs free: cable taut, load higher than where it lay while the
-cable was slack. The push is learned while the vehicle is off the ground.
+cable was slack. The push is learned while the vehicle is off the ground. What of it follows the speed
+while the load hangs free is drag: k is the least-squares fit of the push to drag of the believed shape, of
+both what differs from their means of some seconds, and is known without the delay in which the rest is
+learned.
+
+What turns the vehicle besides is `torque_observer`'s.
 """
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 from typing import NamedTuple
 
-from autopilot.control.load_motion import Drag, air_force
+from autopilot.control.actuators.torque_observer import (
+    NO_TORQUE,
+    Torque,
+    TorqueConstants,
+    observe_torque,
+    torque_constants,
+    unheeded,
+)
+from autopilot.control.drag import Drag, air_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import ZERO, Vec3, add, axpy, column, dot, norm, scale, sub
+from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale, sub
+from autopilot.geometry.packed import with_field
+from autopilot.geometry.s2 import tangent
 
 # m: so much higher than where it stood or lay is in the air
 _OFF_GROUND = 0.03
 # share of the vehicle's weight that the ground carries while the vehicle counts as standing
 _STANDING = 0.2
 _CONTACT_TIME = 0.02  # s, in which the ground's force is believed
+# drag is learned by motion faster than this, m/s, and is at most so many times its shape
+_DRAG_SPEED, _GREATEST_FACTOR = 0.2, 50.0
+# 1/s, by the mass: linear drag, the shape where none is believed
+_ASSUMED_SHAPE = 0.05
+# m/s^2, deviation of a sample of the accelerometer up to which the push is learned as fast as told
+_QUIET = 0.06
 # of the nominal mass of the load
 _LEAST_MASS = 0.25
 _GREATEST_MASS = 4.0
 
 
 class ObserverConstants(NamedTuple):
-    """Shares of a period in the memory of mass and push, and the most the push is believed to be."""
+    """Shares of a period in the memory of mass, push and drag, and the most the push is believed to be."""
 
     mass: float
     push: float
+    drag: float
     contact: float
     greatest_push: float  # N
+    shape: Drag
+    least_factor: float
+    torque: TorqueConstants
 
 
 class Observed(NamedTuple):
@@ -56,24 +84,72 @@ class Observed(NamedTuple):
     square: float  # of w, m^2/s^4
     support: float  # N, what holds the vehicle up besides its rotors while the cable is slack
     load_ground: float  # m, height at which the load lay
+    steady: Vec3  # N, of the push what does not follow the speed
+    drag: Drag  # what was learned of it, beyond the believed
+    mean_shaped: Vec3  # N
+    mean_rest: Vec3  # N
+    drag_correlation: float  # of s and r, N^2
+    drag_square: float  # of s, N^2
+    load_air: Vec3  # m/s^2, world, by which the air moves the load beside its drag
+    load_drag: float  # 1/s, by the load's mass
+    torque: Torque  # on the vehicle besides that of rotors and cable
 
 
 def observer_constants(
-    mass_time: float, push_time: float, greatest_push: float, period: float
+    mass_time: float,
+    push_time: float,
+    drag_time: float,
+    torque_time: float,
+    greatest_push: float,
+    period: float,
+    drag: Drag,
+    vehicle: Vehicle,
 ) -> ObserverConstants:
-    """For memories that fade with these time constants (s); 0 learns nothing."""
+    """For memories that fade with these time constants (s); 0 learns nothing. Drag is the believed one."""
 
     def share(time: float) -> float:
         return min(1.0, period / time) if time > 0.0 else 0.0
 
-    return ObserverConstants(share(mass_time), share(push_time), share(_CONTACT_TIME), greatest_push)
+    believed = max(drag.linear, drag.quadratic) > 0.0
+    return ObserverConstants(
+        share(mass_time),
+        share(push_time),
+        share(drag_time),
+        share(_CONTACT_TIME),
+        greatest_push,
+        drag if believed else Drag(_ASSUMED_SHAPE * vehicle.quad_mass, 0.0),
+        -1.0 if believed else 0.0,
+        torque_constants(share(torque_time), share(drag_time), period, vehicle),
+    )
+
+
+@kernel
+def rested(constants: ObserverConstants, accel_var: float) -> ObserverConstants:
+    """The push learned the slower, the noisier the accelerometer is; `accel_var` (m/s^2)^2 of a sample."""
+    return with_field(constants, "push", constants.push / max(1.0, sqrt(accel_var) / _QUIET))
 
 
 @kernel
 def nominal(vehicle: Vehicle) -> Observed:
     """Nothing observed: the load's mass as told, still air, standing on the ground, the load at home."""
     g = vehicle.gravity
-    return Observed(vehicle.load_mass, ZERO, vehicle.load_mass * g * g, g * g, vehicle.quad_mass * g, 0.0)
+    return Observed(
+        vehicle.load_mass,
+        ZERO,
+        vehicle.load_mass * g * g,
+        g * g,
+        vehicle.quad_mass * g,
+        0.0,
+        ZERO,
+        Drag(0.0, 0.0),
+        ZERO,
+        ZERO,
+        0.0,
+        0.0,
+        ZERO,
+        0.0,
+        NO_TORQUE,
+    )
 
 
 def aloft(vehicle: Vehicle) -> Observed:
@@ -96,17 +172,7 @@ def lying(observed: Observed, state: State) -> bool:
 @kernel
 def loaded(vehicle: Vehicle, load_mass: float) -> Vehicle:
     """The vehicle with a load of this mass."""
-    return Vehicle(
-        vehicle.quad_mass,
-        load_mass,
-        vehicle.cable_length,
-        vehicle.inertia,
-        vehicle.gravity,
-        vehicle.arm,
-        vehicle.torque_ratio,
-        vehicle.rotor_min,
-        vehicle.rotor_max,
-    )
+    return with_field(vehicle, "load_mass", load_mass)
 
 
 @kernel
@@ -115,13 +181,17 @@ def observe(
     state: State,
     taut: float,
     thrust: float,
+    moment: Vec3,
     constants: ObserverConstants,
     drag: Drag,
     vehicle: Vehicle,
 ) -> Observed:
-    """The belief a period later; `thrust`, N, is what the rotors give now, `vehicle` the nominal one."""
+    """The belief a period later; `thrust`, N, is what the rotors give now, `moment`, N m, that of rotors and
+    cable, `vehicle` the nominal one."""
     q, a = state.q_cable, state.a_quad
-    load_mass, push = observed.load_mass, observed.push
+    load_mass, steady, learned = observed.load_mass, observed.steady, observed.drag
+    mean_shaped, mean_rest = observed.mean_shaped, observed.mean_rest
+    together, alone = observed.drag_correlation, observed.drag_square
     correlation, square = observed.correlation, observed.square
     support, load_ground = observed.support, observed.load_ground
     if not taut > 0.0:
@@ -130,11 +200,14 @@ def observe(
     felt: Vec3 = (a[0], a[1], a[2] + vehicle.gravity)
     known = axpy(thrust, column(state.R, 2), air_force(state.v_quad, drag))
     rest = sub(scale(vehicle.quad_mass, felt), known)
+    shape = constants.shape
+    shaped = air_force(state.v_quad, shape)
     support += constants.contact * ((0.0 if taut > 0.0 else rest[2]) - support)
     if taut > 0.0:
         tension = dot(rest, q)
         pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, felt)
         rest = axpy(-tension, q, rest)
+        shaped = tangent(q, shaped)
         if not lying(observed, state) and pull > 0.0:
             correlation += constants.mass * (tension * pull - correlation)
             square += constants.mass * (pull * pull - square)
@@ -142,10 +215,42 @@ def observe(
             load_mass = min(_GREATEST_MASS * vehicle.load_mass, max(_LEAST_MASS * vehicle.load_mass, found))
     else:
         # up and down it cannot be told from the ground
-        rest = (rest[0], rest[1], 0.0)
+        rest, shaped = (rest[0], rest[1], 0.0), (shaped[0], shaped[1], 0.0)
+    factor = learned.linear / shape.linear if shape.linear > 0.0 else learned.quadratic / shape.quadratic
+    # where neither vehicle nor load can touch the ground, whose forces are no drag
+    hangs = taut > 0.0 and not lying(observed, state)
+    if hangs:
+        mean_shaped = axpy(constants.drag, sub(shaped, mean_shaped), mean_shaped)
+        mean_rest = axpy(constants.drag, sub(rest, mean_rest), mean_rest)
+        moving = sub(shaped, mean_shaped)
+        together += constants.drag * (dot(moving, sub(rest, mean_rest)) - together)
+        alone += constants.drag * (dot(moving, moving) - alone)
+        slow = (shape.linear + shape.quadratic * _DRAG_SPEED) * _DRAG_SPEED
+        factor = min(_GREATEST_FACTOR, max(constants.least_factor, together / (alone + slow * slow)))
+        learned = Drag(factor * shape.linear, factor * shape.quadratic)
+    if hangs:
+        torque = observe_torque(observed.torque, state, moment, constants.torque, vehicle)
+    else:
+        torque = unheeded(observed.torque, state)
     if not support > _STANDING * vehicle.quad_mass * vehicle.gravity:
-        push = add(push, scale(constants.push, sub(rest, push)))
-        size = norm(push)
+        steady = axpy(constants.push, sub(axpy(-factor, shaped, rest), steady), steady)
+        size = norm(steady)
         if size > constants.greatest_push:
-            push = scale(constants.greatest_push / size, push)
-    return Observed(load_mass, push, correlation, square, support, load_ground)
+            steady = scale(constants.greatest_push / size, steady)
+    return Observed(
+        load_mass,
+        axpy(factor, shaped, steady),
+        correlation,
+        square,
+        support,
+        load_ground,
+        steady,
+        learned,
+        mean_shaped,
+        mean_rest,
+        together,
+        alone,
+        observed.load_air,
+        observed.load_drag,
+        torque,
+    )

@@ -1,25 +1,33 @@
-"""Rotor forces from thrust and moment: the inverse of (2-13) within true limits, by stated priority.
+"""Rotor forces from thrust and moment: the inverse of (2-13) within true limits, by stated priority, for any
+number of rotors at any places.
 
-| symbol         | code name    | frame | unit | equation |
-|----------------|--------------|-------|------|----------|
-| F_1 .. F_4     | forces       | B     | N    | (2-13)   |
-| f              | thrust       | B     | N    | (2-13)   |
-| M              | moment       | B     | N m  | (2-13)   |
-| l              | vehicle.arm  |       | m    | (2-13)   |
-| c = d/b        | torque_ratio |       | m    | (2-13)   |
+| symbol         | code name       | frame | unit | equation |
+|----------------|-----------------|-------|------|----------|
+| F_i            | rotors[FORCE]   | B     | N    | (2-13)   |
+| u_i = F_i / s_i |                | B     | N    | of a rotor of strength 1 |
+| f              | thrust          | B     | N    | (2-13)   |
+| M              | moment          | B     | N m  | (2-13)   |
+| l              | vehicle.arm     |       | m    | (2-13)   |
+| c = d/b        | torque_ratio    |       | m    | (2-13)   |
+| x_i, y_i, c_i  | table           |       | l, l, c | place and drag torque of a rotor |
 
-    f = F1 + F2 + F3 + F4     M_x = l (F4 - F2)     M_y = l (F1 - F3)     M_z = c (-F1 + F2 - F3 + F4)
+    f = sum F_i     M_x = l sum y_i F_i     M_y = -l sum x_i F_i     M_z = c sum c_i F_i
 
-In a plus frame roll belongs to the pair (2, 4) and pitch to the pair (1, 3). With s24, s13 the mean forces of
-the pairs: F4, F2 = s24 +- M_x / 2l, F1, F3 = s13 +- M_y / 2l, f = 2 (s13 + s24), M_z = 2c (s24 - s13). So the
-priorities are met one after the other, each exactly, with no search:
+`vehicle.rotors.allocate` prepares, outside of the loop, four columns over the rotors that can be used: three
+for thrust, roll and pitch, each of which leaves the other two alone and asks for as little as possible (the
+pseudo-inverse of these three rows; what it does to yaw is counted), and one for yaw, the part of the row c_i
+that the other three do not see. Unlimited, the sum of the four is the least-squares inverse of all four rows.
+For the plus quadrotor of (2-13) they are 1/4, -+1/2, +-1/2 and -+1/4.
 
-1. roll and pitch: each is possible alone and both together whenever its difference of forces fits between the
-   limits; what does not fit is cut, the other axis is not touched;
-2. thrust: cut to what the two pairs can give beside their differences (the collective is moved to make room);
-3. yaw: cut to what is left. At an end of the thrust's range nothing is left, and yaw takes what it gets.
+Within limits low <= u_i <= high the priorities are met one after the other, by moving along these columns,
+each as far as the rotors allow (`_room`):
 
-A demand that is no number counts as zero and sets every bit of `saturated`.
+1. roll and pitch, together: shortened as far as no thrust makes room for both; then each by itself up to what
+   is asked, as far as that still goes;
+2. thrust: cut to what is left beside them, yaw moved to make room;
+3. yaw: cut to what is left.
+
+A demand that is no number counts as zero and sets the bit of every rotor in `saturated`.
 """
 
 from __future__ import annotations
@@ -27,33 +35,34 @@ from __future__ import annotations
 from math import isfinite
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from autopilot.control.records import Vehicle
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import Vec3
+from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.rotors import LIFT_BY, PITCH, PITCH_BY, ROLL, ROLL_BY, STRENGTH, YAW, YAW_BY
 
-Rotors = tuple[float, float, float, float]
-ALL_ROTORS = 15
+Array = NDArray[np.float64]
+
+# rows of the rotors' memory, one column a rotor
+FORCE, EFFORT, ALONG, EXPECTED, MISSED, GIVES, TOLD = range(7)
+_LEAST = 1e-9  # N: a bound on less than this is rounding
 
 
 class MixerResult(NamedTuple):
-    """Forces for the rotors, and what of the demand they carry out."""
+    """What of a demand the rotors carry out; their forces are in the row FORCE."""
 
-    forces: Rotors  # N, rotors 1 to 4
     saturated: int  # bit i: the plain inverse of (2-13) asked rotor i+1 for more or less than it can give
     thrust_done: float  # N
     moment_done: Vec3  # N m, body
 
 
-@kernel
-def thrust_and_moment(forces: Rotors, vehicle: Vehicle) -> tuple[float, Vec3]:
-    """(2-13): what four rotor forces (N) do to the body: thrust in N, moment in N m, body frame."""
-    F1, F2, F3, F4 = forces
-    moment: Vec3 = (
-        vehicle.arm * (F4 - F2),
-        vehicle.arm * (F1 - F3),
-        vehicle.torque_ratio * (-F1 + F2 - F3 + F4),
-    )
-    return F1 + F2 + F3 + F4, moment
+def new_rotors() -> Array:
+    """The memory of rotors that stand still."""
+    return np.zeros((7, MOST))
 
 
 @kernel
@@ -63,51 +72,138 @@ def clamp(value: float, low: float, high: float) -> float:
 
 
 @kernel
-def mix(thrust: float, moment: Vec3, vehicle: Vehicle, limited: float) -> MixerResult:
-    """Forces for the demanded thrust (N) and moment (N m, body). limited = 0.0 lets any demand through."""
+def _room(rotors: Array, table: Array, beside: int, low: float, high: float) -> tuple[float, float]:
+    """Least and greatest s for which some m keeps EFFORT + s ALONG + m times the column `beside` (STRENGTH:
+    none) of every rotor in low ... high.
+
+    Each rotor gives two bounds w s + v m <= b; each two bounds whose v differ in sign give one of s alone,
+    and so does each bound in which m does not occur.
+    """
+    count = table.shape[0] - 1
+    free = 0.0 if beside == STRENGTH else 1.0
+    least, greatest = -np.inf, np.inf
+    for i in range(2 * count):
+        sign, rotor = (1.0, i) if i < count else (-1.0, i - count)
+        v = sign * free * table[rotor, beside]
+        if v < 0.0:
+            continue
+        w = sign * rotors[ALONG, rotor]
+        b = (high if i < count else -low) - sign * rotors[EFFORT, rotor]
+        if v == 0.0:
+            end = b / if_above(abs(w), _LEAST, w, 1.0)
+            least = max(least, if_above(-w, _LEAST, end, -np.inf))
+            greatest = min(greatest, if_above(w, _LEAST, end, np.inf))
+            continue
+        for j in range(2 * count):
+            sign, rotor = (1.0, j) if j < count else (-1.0, j - count)
+            other = sign * table[rotor, beside]
+            if other < 0.0:
+                bound = (high if j < count else -low) - sign * rotors[EFFORT, rotor]
+                slope = v * sign * rotors[ALONG, rotor] - other * w
+                bound = v * bound - other * b
+                end = bound / if_above(abs(slope), _LEAST, slope, 1.0)
+                least = max(least, if_above(-slope, _LEAST, end, -np.inf))
+                greatest = min(greatest, if_above(slope, _LEAST, end, np.inf))
+    return least, greatest
+
+
+@kernel
+def _blend(
+    rotors: Array, table: Array, row: int, thrust: float, roll: float, pitch: float, yaw: float
+) -> None:
+    """So much of each column, added up into a row."""
+    for i in range(table.shape[0] - 1):
+        level = thrust * table[i, LIFT_BY] + yaw * table[i, YAW_BY]
+        rotors[row, i] = level + roll * table[i, ROLL_BY] + pitch * table[i, PITCH_BY]
+
+
+@kernel
+def _turns(table: Array, thrust: float, roll: float, pitch: float) -> float:
+    """What the columns for thrust, roll and pitch do to yaw."""
+    last = table.shape[0] - 1
+    lift, roll_by, pitch_by = table[last, LIFT_BY], table[last, ROLL_BY], table[last, PITCH_BY]
+    turns: float = thrust * lift + roll * roll_by + pitch * pitch_by
+    return turns
+
+
+@kernel
+def _fit(
+    rotors: Array, table: Array, thrust: float, roll: float, pitch: float, yaw: float, low: float, high: float
+) -> None:
+    """The efforts within their limits, by priority."""
+    _blend(rotors, table, EFFORT, 0.0, 0.0, 0.0, 0.0)
+    _blend(rotors, table, ALONG, 0.0, roll, pitch, 0.0)
+    share = clamp(_room(rotors, table, LIFT_BY, low, high)[1], 0.0, 1.0)
+    if share < 1.0:
+        rest_roll, rest_pitch = (1.0 - share) * roll, (1.0 - share) * pitch
+        roll, pitch = share * roll, share * pitch
+        _blend(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+        _blend(rotors, table, ALONG, 0.0, rest_roll, 0.0, 0.0)
+        roll = roll + rest_roll * clamp(_room(rotors, table, LIFT_BY, low, high)[1], 0.0, 1.0)
+        _blend(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+        _blend(rotors, table, ALONG, 0.0, 0.0, rest_pitch, 0.0)
+        pitch = pitch + rest_pitch * clamp(_room(rotors, table, LIFT_BY, low, high)[1], 0.0, 1.0)
+    _blend(rotors, table, EFFORT, 0.0, roll, pitch, 0.0)
+    _blend(rotors, table, ALONG, 1.0, 0.0, 0.0, 0.0)
+    least, greatest = _room(rotors, table, YAW_BY, low, high)
+    thrust = clamp(thrust, least, greatest)
+    _blend(rotors, table, EFFORT, thrust, roll, pitch, 0.0)
+    _blend(rotors, table, ALONG, 0.0, 0.0, 0.0, 1.0)
+    least, greatest = _room(rotors, table, STRENGTH, low, high)
+    yaw = clamp(yaw - _turns(table, thrust, roll, pitch), least, greatest)
+    _blend(rotors, table, EFFORT, thrust, roll, pitch, yaw)
+    for i in range(table.shape[0] - 1):
+        # it takes off no more than rounding
+        rotors[EFFORT, i] = clamp(rotors[EFFORT, i], low, high)
+
+
+@kernel
+def mix(
+    thrust: float, moment: Vec3, vehicle: Vehicle, limited: float, table: Array, rotors: Array
+) -> MixerResult:
+    """Put the forces for the demanded thrust (N) and moment (N m, body) into the row FORCE. limited = 0.0
+    lets any demand through."""
     valid = isfinite(thrust) and isfinite(moment[0]) and isfinite(moment[1]) and isfinite(moment[2])
     if not valid:
         thrust = 0.0
         moment = (0.0, 0.0, 0.0)
-    low = vehicle.rotor_min
-    high = vehicle.rotor_max
-
-    roll = moment[0] / (2.0 * vehicle.arm)
-    pitch = moment[1] / (2.0 * vehicle.arm)
-    mean = 0.25 * thrust
-    yaw = moment[2] / (4.0 * vehicle.torque_ratio)
-    F1 = mean - yaw + pitch
-    F2 = mean + yaw - roll
-    F3 = mean - yaw - pitch
-    F4 = mean + yaw + roll
-
+    low, high = vehicle.rotor_min, vehicle.rotor_max
+    count = table.shape[0] - 1
+    roll, pitch, yaw = moment[0] / vehicle.arm, moment[1] / vehicle.arm, moment[2] / vehicle.torque_ratio
+    _blend(rotors, table, EFFORT, thrust, roll, pitch, yaw - _turns(table, thrust, roll, pitch))
     saturated = 0
-    if limited != 0.0:
-        if low > F1 or high < F1:
-            saturated += 1
-        if low > F2 or high < F2:
-            saturated += 2
-        if low > F3 or high < F3:
-            saturated += 4
-        if low > F4 or high < F4:
-            saturated += 8
+    for i in range(count):
+        effort = rotors[EFFORT, i]
+        if limited != 0.0 and table[i, STRENGTH] > 0.0 and (low > effort or high < effort):
+            saturated |= 1 << i
     if not valid:
-        saturated = ALL_ROTORS
-
+        saturated = (1 << count) - 1
     if saturated != 0 and limited != 0.0:
-        half_range = 0.5 * (high - low)
-        roll = clamp(roll, -half_range, half_range)
-        pitch = clamp(pitch, -half_range, half_range)
-        low_24, high_24 = low + abs(roll), high - abs(roll)
-        low_13, high_13 = low + abs(pitch), high - abs(pitch)
-        mean = clamp(mean, 0.5 * (low_13 + low_24), 0.5 * (high_13 + high_24))
-        yaw = clamp(yaw, max(low_24 - mean, mean - high_13), min(high_24 - mean, mean - low_13))
-        # the outer clamp takes off no more than rounding
-        F1 = clamp(mean - yaw + pitch, low, high)
-        F2 = clamp(mean + yaw - roll, low, high)
-        F3 = clamp(mean - yaw - pitch, low, high)
-        F4 = clamp(mean + yaw + roll, low, high)
+        _fit(rotors, table, thrust, roll, pitch, yaw, low, high)
+    for i in range(count):
+        rotors[FORCE, i] = table[i, STRENGTH] * rotors[EFFORT, i]
+    thrust_done, moment_done = thrust_and_moment(rotors, vehicle, table)
+    return MixerResult(saturated, thrust_done, moment_done)
 
-    forces = (F1, F2, F3, F4)
-    thrust_done, moment_done = thrust_and_moment(forces, vehicle)
-    return MixerResult(forces, saturated, thrust_done, moment_done)
+
+@kernel
+def thrust_and_moment(rotors: Array, vehicle: Vehicle, table: Array) -> tuple[float, Vec3]:
+    """(2-13): what the forces in the row FORCE do to the body: thrust in N, moment in N m, body frame."""
+    f = x = y = z = 0.0
+    for i in range(table.shape[0] - 1):
+        force = rotors[FORCE, i]
+        f = f + force
+        x = x + table[i, ROLL] * force
+        y = y + table[i, PITCH] * force
+        z = z + table[i, YAW] * force
+    return f, (vehicle.arm * x, vehicle.arm * y, vehicle.torque_ratio * z)
+
+
+@kernel
+def spread(force: float, table: Array, rotors: Array) -> MixerResult:
+    """The same force (N) from every rotor that can be used, without regard to their places."""
+    total = 0.0
+    for i in range(table.shape[0] - 1):
+        rotors[FORCE, i] = force if table[i, STRENGTH] > 0.0 else 0.0
+        total = total + rotors[FORCE, i]
+    return MixerResult(0, total, (0.0, 0.0, 0.0))

@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants, after_delay, lagged
-from autopilot.control.load_motion import Drag, air_force
+from autopilot.control.drag import Drag, air_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, column, cross, dot, scale, sub, times
@@ -66,7 +66,14 @@ def _shifted(m: _Motion, h: float, rate: _Motion) -> _Motion:
 
 @kernel
 def _rates(
-    m: _Motion, thrust: float, moment: Vec3, taut: float, push: Vec3, drag: Drag, vehicle: Vehicle
+    m: _Motion,
+    thrust: float,
+    moment: Vec3,
+    taut: float,
+    push: Vec3,
+    torque: Vec3,
+    drag: Drag,
+    vehicle: Vehicle,
 ) -> _Motion:
     """Time derivative; the motion of `load_motion`, but the cable does not push."""
     J, q = vehicle.inertia, m.q
@@ -85,7 +92,7 @@ def _rates(
     else:
         a = scale(1.0 / vehicle.quad_mass, F)
         q_ddot = (0.0, 0.0, 0.0)
-    turning = sub(moment, cross(m.omega, times(J, m.omega)))
+    turning = sub(add(moment, torque), cross(m.omega, times(J, m.omega)))
     return _Motion(
         m.v,
         (a[0], a[1], a[2] - vehicle.gravity),
@@ -105,14 +112,15 @@ def _glide(
     h: float,
     taut: float,
     push: Vec3,
+    torque: Vec3,
     drag: Drag,
     vehicle: Vehicle,
 ) -> _Motion:
     """h seconds under command `row`, of whose approach `half` is left after h/2."""
-    begin = _rates(m, actuation.thrust, actuation.moment, taut, push, drag, vehicle)
+    begin = _rates(m, actuation.thrust, actuation.moment, taut, push, torque, drag, vehicle)
     thrust, moment = lagged(actuation.thrust, actuation.moment, actuation.queue, row, half)
     middle = _shifted(m, 0.5 * h, begin)
-    return _shifted(m, h, _rates(middle, thrust, moment, taut, push, drag, vehicle))
+    return _shifted(m, h, _rates(middle, thrust, moment, taut, push, torque, drag, vehicle))
 
 
 @kernel
@@ -130,10 +138,12 @@ def predict(
     constants: ActuationConstants,
     period: float,
     push: Vec3,
+    torque: Vec3,
     drag: Drag,
     vehicle: Vehicle,
 ) -> Ahead:
-    """The state after the delay of `constants`, under the commands on their way and a steady `push` (N).
+    """The state after the delay of `constants`, under the commands on their way, a steady `push` (N) and
+    a steady `torque` (N m, body) besides.
 
     taut = 0.0: of the vehicle alone; load and cable stay as they are.
     """
@@ -146,12 +156,14 @@ def predict(
     thrust, moment = actuation.thrust, actuation.moment
     if constants.late > 0.0:
         row = constants.whole
-        m = _glide(m, actuation, row, constants.kept_half_late, constants.late, taut, push, drag, vehicle)
+        m = _glide(
+            m, actuation, row, constants.kept_half_late, constants.late, taut, push, torque, drag, vehicle
+        )
         thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept_late)
     for i in range(constants.whole):
         row = constants.whole - 1 - i
         at = Actuation(actuation.queue, thrust, moment)
-        m = _glide(m, at, row, constants.kept_half, period, taut, push, drag, vehicle)
+        m = _glide(m, at, row, constants.kept_half, period, taut, push, torque, drag, vehicle)
         thrust, moment = lagged(thrust, moment, actuation.queue, row, constants.kept)
     x_load, v_load, x_quad, v_quad = state.x_load, state.v_load, m.x, m.v
     q, q_dot = state.q_cable, state.q_cable_dot

@@ -7,8 +7,12 @@ from pkgutil import iter_modules
 from typing import Any
 
 from autopilot.control.believed import believed_vehicle
+from autopilot.control.law_desk import Link
 from autopilot.control.laws.interface import Law, register
+from autopilot.control.laws.own import OWN
+from autopilot.geometry.packed import pack, place_of
 from autopilot.vehicle.law_files import law_files
+from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.parameter_table import ParameterTable
 
 
@@ -25,13 +29,25 @@ def _found() -> dict[int, Law]:
 
 
 LAWS = _found()  # by the number of CTL_LAW
+register(OWN)
 
 
 def chosen_law(table: ParameterTable) -> Law:
     """The law that CTL_LAW selects."""
-    return LAWS[int(table["CTL_LAW"])]
+    number = int(table["CTL_LAW"])
+    return OWN if number == OWN.number else LAWS[number]
 
 
-def build_law(table: ParameterTable) -> Any:
+def build_law(table: AutopilotParameters) -> Any:
     """Constants of the law that CTL_LAW selects, for the vehicle that the parameters describe."""
     return chosen_law(table).build(table, believed_vehicle(table))
+
+
+def is_own(constants: Any) -> bool:
+    """Whether these are the constants of a law that somebody has brought."""
+    return isinstance(constants, OWN.constants)
+
+
+def link_own(rows: Any, link: Link) -> None:
+    """Let the rows of a law that somebody has brought call its functions."""
+    pack(link, rows.constants, place_of(OWN.constants, "link"))

@@ -19,13 +19,13 @@ from autopilot.control.actuators.lag_compensation import hasten, lag_gain
 from autopilot.control.actuators.predictor import Ahead, predict, stay
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.believed import believed_actuation, believed_design, believed_drag
+from autopilot.control.drag import Drag, air_force
 from autopilot.control.laws import thesis
 from autopilot.control.laws.interface import Kernels, Law
-from autopilot.control.load_motion import Drag
-from autopilot.control.records import Cable, Command, Reference, State, Vehicle, with_length
+from autopilot.control.records import Cable, Command, Jet, Reference, State, Vehicle, with_length
 from autopilot.control.thesis_cascade import ThesisMemory
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Mat3, Vec3
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, scale, sub
 from autopilot.geometry.packed import Row, with_field
 from autopilot.wire.parameter_table import ParameterTable
 
@@ -97,6 +97,40 @@ def with_cable(law: PlumblineLaw, cable: Cable) -> PlumblineLaw:
 
 
 @kernel
+def air_of(state: State, taut: float, observed: Observed, constants: PlumblineConstants) -> tuple[Drag, Vec3]:
+    """Drag of the vehicle, with what was learned of it, and the push (N) besides.
+
+    The motion of load and vehicle is told as seen from a frame that falls with what the air does to the load:
+    there nothing but the cable holds the load, and the push on the vehicle is less by its mass times that.
+    """
+    linear = constants.drag.linear + observed.drag.linear
+    push = sub(observed.push, air_force(state.v_quad, observed.drag))
+    if taut > 0.0:
+        mass, c = constants.vehicle.quad_mass, observed.load_drag
+        linear -= mass * c
+        apart = scale(c, sub(state.v_load, state.v_quad))
+        push = axpy(-mass, sub(observed.load_air, (apart[0], apart[1], 0.0)), push)
+    return Drag(linear, constants.drag.quadratic + observed.drag.quadratic), push
+
+
+@kernel
+def falling(jet: Jet, observed: Observed) -> Jet:
+    """The reference as it is seen from that frame, in which the load's drag moves with the load."""
+    x, v, a, j, s, p, o = jet
+    c = observed.load_drag
+    drift = axpy(c, v, scale(-1.0, observed.load_air))
+    return (
+        x,
+        v,
+        add(a, (drift[0], drift[1], 0.0)),
+        add(j, (c * a[0], c * a[1], 0.0)),
+        add(s, (c * j[0], c * j[1], 0.0)),
+        add(p, (c * s[0], c * s[1], 0.0)),
+        add(o, (c * p[0], c * p[1], 0.0)),
+    )
+
+
+@kernel
 def ahead_of(
     state: State,
     taut: float,
@@ -107,22 +141,29 @@ def ahead_of(
     """State and rotors at the instant at which the command of this tick comes into force."""
     if standing(observed, constants.vehicle):
         return stay(state, actuation, constants.actuation)
+    drag, push = air_of(state, taut, observed, constants)
     return predict(
         state,
         taut,
         actuation,
         constants.actuation,
         constants.period,
-        observed.push,
-        constants.drag,
+        push,
+        observed.torque.now,
+        drag,
         loaded(constants.vehicle, observed.load_mass),
     )
 
 
 @kernel
-def hastened(wanted: Command, ahead: Ahead, constants: PlumblineConstants) -> Command:
-    """The command that makes the rotors give what is wanted as fast as they shall."""
-    thrust, moment = hasten(ahead.thrust, ahead.moment, wanted.thrust, wanted.moment, constants.lag_gain)
+def hastened(wanted: Command, ahead: Ahead, observed: Observed, constants: PlumblineConstants) -> Command:
+    """The command that makes the rotors give, as fast as they shall, what is wanted and what the air does not
+    give. The ground holds the attitude of a vehicle that stands: what is felt of it late would only rock it.
+    """
+    if standing(observed, constants.vehicle):
+        return with_field(wanted, "moment", ZERO)
+    moment = sub(wanted.moment, observed.torque.now)
+    thrust, moment = hasten(ahead.thrust, ahead.moment, wanted.thrust, moment, constants.lag_gain)
     return with_field(with_field(wanted, "thrust", thrust), "moment", moment)
 
 
@@ -153,19 +194,20 @@ def load_position(
         thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
         position = cascade.PlumblineMemory(0.0, position.integral)
         then = with_field(with_field(then, "x_load", state.x_load), "v_load", state.v_load)
+    drag, push = air_of(state, 1.0, observed, constants)
     position, wanted = cascade.load_position(
         position,
         then,
-        reference,
+        with_field(reference, "jet", falling(reference.jet, observed)),
         thrust,
-        ahead.moment,
+        add(ahead.moment, observed.torque.now),
         constants.gains,
-        constants.drag,
-        observed.push,
+        drag,
+        push,
         constants.period,
         loaded(constants.vehicle, observed.load_mass),
     )
-    return PlumblineMemory(position, memory.other_modes), hastened(wanted, ahead, constants)
+    return PlumblineMemory(position, memory.other_modes), hastened(wanted, ahead, observed, constants)
 
 
 @kernel
@@ -193,7 +235,7 @@ def quad_position(
         others.filters,
         constants.vehicle,
     )
-    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, constants)
+    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, observed, constants)
 
 
 @kernel
@@ -214,7 +256,7 @@ def load_attitude(
     other, wanted = thesis.load_attitude(
         law.other_modes, memory.other_modes, ahead.state, q_d, b1_d, pull, actuation, observed, cable
     )
-    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, constants)
+    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, observed, constants)
 
 
 @kernel
@@ -234,7 +276,7 @@ def quad_attitude(
     other, wanted = thesis.quad_attitude(
         law.other_modes, memory.other_modes, ahead.state, R_d, thrust, actuation, observed, cable
     )
-    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, constants)
+    return PlumblineMemory(memory.position, other), hastened(wanted, ahead, observed, constants)
 
 
 LAW = Law(

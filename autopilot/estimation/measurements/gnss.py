@@ -50,6 +50,7 @@ from autopilot.estimation.records import (
 from autopilot.estimation.tautness import tauten
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, add, apply_transposed, cross, from_columns, norm, sub
+from autopilot.geometry.packed import with_field
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
 
@@ -59,6 +60,7 @@ STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
 # of a vehicle that is found in the air
 CARRIED_SHARE = 0.5  # of its weight, from which the rotors carry it
+LOADED_SHARE = 0.5  # of the load's weight that must pull at the vehicle for the load to hang from it
 FLYING_SPEED_STD, FLYING_TILT_STD = 1.0, 0.15  # m/s; rad, by which its acceleration tilts the vertical
 HANGING_STD, SWINGING_STD = 0.3, 1.0  # of the cable's length, level; m/s
 ANYWHERE_STD = 100.0  # m: the first fix says where
@@ -166,6 +168,28 @@ def hanging(state: EstimatorState, history: History, tuning: EstimatorTuning) ->
 
 
 @kernel
+def below(state: EstimatorState, tuning: EstimatorTuning) -> LoadEstimate:
+    """The load on the ground, somewhere below a vehicle that flies without it."""
+    load, x = laid(state, tuning), state.vehicle.x_quad
+    x_load = (x[0], x[1], min(tuning.load_height, x[2]))
+    return with_field(load, "x_load", x_load)
+
+
+@kernel
+def found_load(
+    state: EstimatorState, history: History, tuning: EstimatorTuning, thrust: float
+) -> LoadEstimate:
+    """The load of a vehicle that is found with its rotors giving `thrust` (N): it was laid before a standing
+    vehicle, hangs from one that accelerates by less than its rotors would make it, and else lies below it."""
+    if not thrust > CARRIED_SHARE * tuning.quad_mass * tuning.gravity:
+        return laid(state, tuning)
+    pull = thrust - tuning.quad_mass * state.last_imu.accel[2]
+    if pull > LOADED_SHARE * tuning.load_mass * tuning.gravity:
+        return hanging(state, history, tuning)
+    return below(state, tuning)
+
+
+@kernel
 def start_by_fix(
     state: EstimatorState, history: History, fix: GnssReading, tuning: EstimatorTuning, thrust: float
 ) -> EstimatorState:
@@ -213,8 +237,7 @@ def start_by_fix(
     state = with_vehicle(state, vehicle, state.resets + 1.0)
     state = correct_magnetic(state, history, state.aids.field, 0.0, tuning)
     if state.load.source != TRACKER:
-        load = hanging(state, history, tuning) if flies else laid(state, tuning)
-        state = with_load(state, load, state.resets)
+        state = with_load(state, found_load(state, history, tuning, thrust), state.resets)
     return state
 
 

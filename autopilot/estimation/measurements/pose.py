@@ -18,6 +18,7 @@ from autopilot.estimation.covariance import absorb, begin, farness, forget, gath
 from autopilot.estimation.history import renew
 from autopilot.estimation.records import (
     ACCEL_BIAS,
+    AIR,
     ATTITUDE,
     BAROMETER,
     GNSS,
@@ -26,6 +27,7 @@ from autopilot.estimation.records import (
     MOUNTING,
     POSE,
     POSITION,
+    PUSH,
     QUAT,
     TRACKED_SIZE,
     TRACKER,
@@ -68,6 +70,9 @@ def spread_out(
         P[GYRO_BIAS + i, GYRO_BIAS + i] = tuning.gyro_bias_std * tuning.gyro_bias_std
         P[ACCEL_BIAS + i, ACCEL_BIAS + i] = tuning.accel_bias_std * tuning.accel_bias_std
     if P[MOUNTING, MOUNTING] == 0.0:
+        for i in range(2):
+            P[AIR + i, AIR + i] = tuning.air_std * tuning.air_std
+            P[PUSH + i, PUSH + i] = tuning.push_std * tuning.push_std
         P[MOUNTING, MOUNTING] = tuning.mounting_std * tuning.mounting_std
         P[MOUNTING + 1, MOUNTING + 1] = P[MOUNTING, MOUNTING]
         P[HEADING, HEADING] = tuning.magnetic_bias * tuning.magnetic_bias
@@ -167,7 +172,14 @@ def correct_pose(
         scalar(history, 6 + i, difference[i], velocity_var)
         enter_velocity(history, 6 + i, past, i)
     gather(history, 3, count, n)
+    # the reading tells nothing of the gyroscope's noise since then, which the attitude of now has: what the
+    # filter takes for told of its variance Q by a gain K is Q (1 - (1 - K)^2)
+    P, since = history.covariance, state.vibration.turning * pose.age_s
+    turned = (P[ATTITUDE, ATTITUDE], P[ATTITUDE + 1, ATTITUDE + 1], P[ATTITUDE + 2, ATTITUDE + 2])
     nis = absorb(history, count, n)
+    for i in range(3):
+        left = attitude_var / (turned[i] + attitude_var)
+        P[ATTITUDE + i, ATTITUDE + i] += since * (1.0 - left * left)
     history.consistency[POSE, 0] += 1.0
     history.consistency[POSE, 1] += nis
     state = inject(state, history)

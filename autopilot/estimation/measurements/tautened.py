@@ -58,7 +58,7 @@ def correct_tautened(
         return state
     tied = before.taut == 0.0
     pulls = load.pull > PULL_SLACK * tuning.load_mass * tuning.gravity
-    if not tied and not (pulls and loosely_tied(load, state.memory_s)):
+    if not tied and not (pulls and loosely_tied(load, state.memory_s, state.unfelt)):
         return state
     n, debt = state.size, state.aids.debt
     past = look_back(state, history, tuning, 0.0)

@@ -17,7 +17,6 @@ from autopilot.services.requests import (
     FollowStick,
     Grab,
     Land,
-    LookAt,
     Orbit,
     Pause,
     Release,
@@ -31,7 +30,6 @@ from autopilot.services.requests import (
     StartMission,
     Takeoff,
     Terminate,
-    TurnNose,
     Winch,
 )
 from autopilot.supervisor.requests.arming import arm, run_checks, terminate
@@ -52,6 +50,7 @@ from autopilot.supervisor.requests.verdicts import Decision, Handler
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, View
 from autopilot.wire.dialect import plumbline as mavlink
+from missions.model import LookAt, TurnNose
 
 
 def decide(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:

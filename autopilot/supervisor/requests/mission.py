@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from autopilot.services.requests import ReplaceMission, SetCurrent, StartMission
+from autopilot.supervisor.heading import heading_of_step
 from autopilot.supervisor.machine import must_happen
 from autopilot.supervisor.mission import at_step, begin_step, step_event
 from autopilot.supervisor.requests.mission_checks import lift_altitude_m, mission_trouble, upload_trouble
@@ -44,6 +45,8 @@ def begin_mission(flight: Flight, view: View, settings: Settings) -> Decision:
         altitude = lift_altitude_m(plan, settings)
         flight = replace(flight, mission=replace(flight.mission, takeoff_altitude_m=altitude))
         return take_off(flight, view, settings), ACCEPTED
+    if flight.mission.step_anchor is None:  # it is begun, not taken up again
+        flight = heading_of_step(flight, view, settings)
     return begin_step(flight, event, view, settings), ACCEPTED
 
 
@@ -91,6 +94,7 @@ def set_current(flight: Flight, request: SetCurrent, view: View, settings: Setti
         trouble = mission_trouble(moved, view, settings)
         if trouble:
             return flight, denied(f"Mission item {request.seq} denied: {trouble}")
+        moved = heading_of_step(moved, view, settings)
         return begin_step(moved, step_event(moved), view, settings), ACCEPTED
     return moved, ACCEPTED
 

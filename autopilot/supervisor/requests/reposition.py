@@ -11,7 +11,7 @@ from autopilot.guidance.legs import Hold, carry_leg
 from autopilot.services.requests import ChangeAltitude, ChangeSpeed, Reposition
 from autopilot.supervisor.heading import pointed
 from autopilot.supervisor.motion import as_flown
-from autopilot.supervisor.requests.limits import FASTEST_M_S, LEAST_ALTITUDE_M, SLOWEST_M_S
+from autopilot.supervisor.requests.limits import FARTHEST_M, FASTEST_M_S, LEAST_ALTITUDE_M, SLOWEST_M_S
 from autopilot.supervisor.requests.modes import hold
 from autopilot.supervisor.requests.verdicts import ACCEPTED, Decision, denied, later, wrong_phase
 from autopilot.supervisor.settings import Settings
@@ -48,6 +48,8 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     )
     if not all(map(math.isfinite, there)):
         return flight, denied("Reposition denied: not a place")
+    if max(map(abs, there)) > FARTHEST_M:
+        return flight, denied(f"Reposition denied: more than {FARTHEST_M:g} m away")
     if there[2] < LEAST_ALTITUDE_M:
         return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
     place = below(there, settings) if flight.cable.released else there

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from autopilot.geometry.linear import norm, sub
 from autopilot.guidance.legs import Steady
+from autopilot.supervisor.motion import calm
 from autopilot.supervisor.phase_legs import TOUCH_HEIGHT
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import WARNING, Event, Flight, View, leg_time_s
@@ -17,6 +18,10 @@ TRACKED_S = 0.2  # until velocities are known by a tracker
 RECEIVED_S = 2.0  # until attitude and heading are known by a receiver
 MOST_S = 4.0  # in which the sensors must have told all that
 SLACK_SHARE = 0.965  # of the cable's length: a load that is nearer does not hang on it
+HANGING_SHARE = 0.5  # of the load's weight: with so much less than all weighs the load was not carried
+STOP_GAIN = 4.0  # 1/s: deceleration over the speed at which a level vehicle climbs or sinks
+STOP_ACCEL = 2.0  # m/s^2, of that at most
+LEAST_UPRIGHT = 0.7  # cosine of the tilt for which the thrust makes up
 HOLDING_TEXT = "Restarted in flight: holding"
 LANDING_TEXT = "Restarted in flight: landing"
 
@@ -28,8 +33,10 @@ def watch_recovery(flight: Flight, view: View, settings: Settings) -> Watched:
     t = leg_time_s(flight, view.now_us)
     if view.complaints and t >= MOST_S:
         return given_up(flight, f"restarted in flight, {view.complaints[0]}")
-    if view.complaints or t < (RECEIVED_S if view.height_std > 0.0 else TRACKED_S):
+    if view.complaints or t < TRACKED_S:
         return Watched(flight)
+    if view.height_std > 0.0 and t < RECEIVED_S:
+        return Watched(_stopping(flight, flight.legs[0], view, settings))
     distance = norm(sub(view.x_quad, view.x_load))
     hangs = view.taut or flight.cable.released
     if not hangs and distance > SLACK_SHARE * settings.cable_length_m and t < MOST_S:
@@ -38,4 +45,22 @@ def watch_recovery(flight: Flight, view: View, settings: Settings) -> Watched:
         return Watched(flight, Event.LOAD_DOWN, ((WARNING, LANDING_TEXT),))
     length = distance if view.taut else settings.cable_length_m
     flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
-    return Watched(flight, Event.HOLD, ((WARNING, HOLDING_TEXT),))
+    if not view.taut or flight.cable.released:
+        return Watched(flight, Event.HOLD, ((WARNING, HOLDING_TEXT),))
+    # beneath a vehicle that was kept level the load swings: a hold that begins at rest would ask for more
+    # than the rotors give to stop that at once
+    calming = calm(flight.legs[0], view, settings, ends_step=False)
+    flight = replace(flight, legs=(calming,), leg_start_us=view.now_us)
+    return Watched(flight, None, ((WARNING, HOLDING_TEXT),))
+
+
+def _stopping(flight: Flight, leg: Steady, view: View, settings: Settings) -> Flight:
+    """The flight with a thrust that stops climbing or sinking: what was asked for last may have been for a
+    climb that begins. With less than carries the load, that lies, and what is believed of it may be wrong."""
+    weight = least = settings.weight_n - (settings.load_weight_n if flight.cable.released else 0.0)
+    least -= HANGING_SHARE * settings.load_weight_n
+    if leg.thrust_n < least:
+        return flight
+    accel = min(STOP_ACCEL, max(-STOP_ACCEL, -STOP_GAIN * view.v_quad[2]))
+    thrust = weight * (1.0 + accel / settings.gravity_m_s2) / max(view.attitude[2][2], LEAST_UPRIGHT)
+    return replace(flight, legs=(Steady(max(thrust, least)),))

@@ -22,6 +22,8 @@ from autopilot.supervisor.watches.cable_pull import PULL_US, PULLED, share_pulle
 from autopilot.supervisor.watches.watched import Watched
 
 ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable taut is moved over it
+LIFTING = "Cable taut, lifting the load"
+LIFTING_UNSEEN = "Cable taut, lifting the load; no load sensor"
 TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have come taut
 
 
@@ -33,7 +35,7 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
     if flight.still_since_us >= 0 and view.now_us - flight.still_since_us >= PULL_US:
         length = norm(sub(view.x_quad, view.x_load))
         flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
-        return Watched(flight, Event.TAUT, ((INFO, "Cable taut, lifting the load"),))
+        return Watched(flight, Event.TAUT, ((INFO, LIFTING_UNSEEN if view.unseen else LIFTING),))
     flight = _over_load(flight, view)
     creeps = len(flight.legs) == 1 and flight.still_since_us < 0
     if creeps and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(

@@ -14,10 +14,11 @@ from autopilot.geometry.linear import Vec3
 from autopilot.wire.codec import Fields, layout_of
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
 from autopilot.wire.convert.scaling import uint16
-from autopilot.wire.convert.simulator import Forces
+from autopilot.wire.convert.simulator import Forces, padded
 from autopilot.wire.dialect import plumbline as mavlink
 
 _LOAD_STATE = layout_of(mavlink.MAVLink_load_state_message)
+_FILTER_STATE = layout_of(mavlink.MAVLink_filter_state_message)
 _LOAD_SETPOINT = layout_of(mavlink.MAVLink_load_setpoint_message)
 _CASCADE_ERRORS = layout_of(mavlink.MAVLink_cascade_errors_message)
 _WIND_STATE = layout_of(mavlink.MAVLink_wind_state_message)
@@ -71,6 +72,12 @@ def load_state_values(
 def load_state_message(*record: Any) -> Fields:
     """LOAD_STATE, see `LoadState`."""
     return _LOAD_STATE, load_state_values(*record)
+
+
+def filter_state_message(time_us: int, x_load: Vec3, v_load: Vec3, x_quad: Vec3) -> Fields:
+    """FILTER_STATE: what the built-in filter estimates beside an estimator of somebody's own."""
+    places = (*ned_from_enu(x_load), *ned_from_enu(v_load), *ned_from_enu(x_quad))
+    return _FILTER_STATE, (time_us, *places)
 
 
 def read_load_state(m: Any) -> LoadState:
@@ -260,14 +267,24 @@ class RotorState(NamedTuple):
     force_min: float  # N
     force_max: float  # N, inf if unlimited
     saturated: int
+    rotors: int = 4  # how many there are
 
 
 @register_jitable
 def rotor_state_values(
-    time_us: int, source: int, forces: Forces, force_min: float, force_max: float, saturated: int
+    time_us: int,
+    source: int,
+    forces: Forces,
+    force_min: float,
+    force_max: float,
+    saturated: int,
+    rotors: int = 4,
 ) -> tuple[float, ...]:
     """ROTOR_STATE, see `RotorState`: the numbers in the order of the wire."""
-    return (time_us, *forces, force_min, force_max, saturated, source)
+    first, more = saturated & 255, saturated >> 8
+    # as it was when there were quadrotors only, so that their logs stay as they are
+    count = 0 if rotors == 4 else rotors
+    return (time_us, *forces[:4], force_min, force_max, first, source, *forces[4:], more, count)
 
 
 def rotor_state_message(*record: Any) -> Fields:
@@ -275,7 +292,14 @@ def rotor_state_message(*record: Any) -> Fields:
     return _ROTOR_STATE, rotor_state_values(*record)
 
 
+def rotor_forces(m: Any) -> tuple[float, ...]:
+    """The forces of a ROTOR_STATE, N, one of each rotor that there is."""
+    forces: tuple[float, ...] = (*m.force, *m.more_force)
+    return forces[: m.rotors or 4]
+
+
 def read_rotor_state(m: Any) -> RotorState:
     """Inverse of `rotor_state_message`."""
-    f1, f2, f3, f4 = m.force
-    return RotorState(m.time_usec, m.source, (f1, f2, f3, f4), m.force_min, m.force_max, m.saturated)
+    forces = padded((*m.force, *m.more_force))
+    saturated = m.saturated | m.more_saturated << 8
+    return RotorState(m.time_usec, m.source, forces, m.force_min, m.force_max, saturated, m.rotors or 4)

@@ -8,9 +8,11 @@ its records as well as pymavlink's objects. There a vector that was not measured
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import islice
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba.extending import register_jitable
 
 from autopilot.geometry.frames import (
@@ -21,14 +23,21 @@ from autopilot.geometry.frames import (
     quat_enu_flu_from_ned_frd,
     quat_ned_frd_from_enu_flu,
 )
+from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import Vec3
+from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.convert.scaling import course_cdeg, int16, saturated, uint16
 from autopilot.wire.dialect import plumbline as mavlink
 
-Forces = tuple[float, float, float, float]
+# of each rotor, in N; rotors that a vehicle does not have: 0
+Forces = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float, float
+]
 
+NO_FORCES: Forces = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+FULL_SPEED_RPM = 10_000.0  # of a rotor that gives its greatest force, whatever its size
 ROTOR_FMAX = 1.96  # N, force of one rotor at full scale of HIL_ACTUATOR_CONTROLS (Table 4-1)
 STANDARD_GRAVITY = 9.80665  # m/s^2, the g of HIL_STATE_QUATERNION's accelerations
 
@@ -39,8 +48,7 @@ _ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 _NAN3: Vec3 = (math.nan, math.nan, math.nan)
-_GRIPPER, _WINCH = 4, 5  # HIL_ACTUATOR_CONTROLS has room for sixteen: behind the rotors
-_NO_CONTROLS = (0.0,) * 10
+_GRIPPER, _WINCH = 4, 5  # of HIL_ACTUATOR_CONTROLS: between the first four rotors and the others
 REEL_MAX = 2.0  # m/s, of a winch whose control is 1
 
 
@@ -50,6 +58,33 @@ def _message(message_type: Any, values: tuple[float, ...]) -> Any:
     lengths: list[int] = message_type.array_lengths
     fields = [list(islice(numbers, length)) if length else next(numbers) for length in lengths]
     return message_type(*(fields[place] for place in message_type.orders))
+
+
+def padded(forces: Sequence[float]) -> Forces:
+    """The forces of a vehicle, with zeros for the rotors that it does not have."""
+    f = (*forces, *NO_FORCES[len(forces) :])
+    return (f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], f[12], f[13])
+
+
+@register_jitable
+def forces_in(row: Row, at: int) -> Forces:
+    """Fourteen numbers of a row."""
+    return (
+        row[at],
+        row[at + 1],
+        row[at + 2],
+        row[at + 3],
+        row[at + 4],
+        row[at + 5],
+        row[at + 6],
+        row[at + 7],
+        row[at + 8],
+        row[at + 9],
+        row[at + 10],
+        row[at + 11],
+        row[at + 12],
+        row[at + 13],
+    )
 
 
 def _or_nan(v: Vec3 | None) -> Vec3:
@@ -430,7 +465,7 @@ class HilActuatorControls(NamedTuple):
     """HIL_ACTUATOR_CONTROLS: the answer to the HIL_SENSOR of `time_us`."""
 
     time_us: int
-    forces: Forces  # N, of rotors 1 ... 4
+    forces: Forces  # N
     armed: bool
     lockstep: bool
     gripper_open: bool = False
@@ -446,8 +481,9 @@ def hil_actuator_controls_values(
     gripper_open: bool = False,
     reel_rate: float = 0.0,
 ) -> tuple[float, ...]:
-    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`: controls[i] = force of rotor i+1 / ROTOR_FMAX,
-    controls[4] = 1 while the gripper that holds the cable is open, controls[5] = winch rate / REEL_MAX.
+    """HIL_ACTUATOR_CONTROLS, see `HilActuatorControls`: controls[i] = force of rotor i+1 / ROTOR_FMAX for the
+    first four, controls[4] = 1 while the gripper that holds the cable is open, controls[5] = winch rate /
+    REEL_MAX, controls[6 + i] = force of rotor i+5 / ROTOR_FMAX.
     """
     flags = _LOCKSTEP if lockstep else 0
     mode = _ARMED | _CUSTOM if armed else _CUSTOM
@@ -461,7 +497,16 @@ def hil_actuator_controls_values(
         forces[3] / ROTOR_FMAX,
         gripper,
         reel_rate / REEL_MAX,
-        *_NO_CONTROLS,
+        forces[4] / ROTOR_FMAX,
+        forces[5] / ROTOR_FMAX,
+        forces[6] / ROTOR_FMAX,
+        forces[7] / ROTOR_FMAX,
+        forces[8] / ROTOR_FMAX,
+        forces[9] / ROTOR_FMAX,
+        forces[10] / ROTOR_FMAX,
+        forces[11] / ROTOR_FMAX,
+        forces[12] / ROTOR_FMAX,
+        forces[13] / ROTOR_FMAX,
         mode,
     )
 
@@ -482,9 +527,44 @@ def read_hil_actuator_controls(m: Any) -> HilActuatorControls:
             controls[1] * ROTOR_FMAX,
             controls[2] * ROTOR_FMAX,
             controls[3] * ROTOR_FMAX,
+            controls[6] * ROTOR_FMAX,
+            controls[7] * ROTOR_FMAX,
+            controls[8] * ROTOR_FMAX,
+            controls[9] * ROTOR_FMAX,
+            controls[10] * ROTOR_FMAX,
+            controls[11] * ROTOR_FMAX,
+            controls[12] * ROTOR_FMAX,
+            controls[13] * ROTOR_FMAX,
+            controls[14] * ROTOR_FMAX,
+            controls[15] * ROTOR_FMAX,
         ),
         (m.mode & _ARMED) != 0,
         (m.flags & _LOCKSTEP) != 0,
         controls[_GRIPPER] > 0.5,
         controls[_WINCH] * REEL_MAX,
     )
+
+
+@register_jitable
+def speed_rpm(force: float, greatest: float) -> float:
+    """Speed of a rotor that gives this force and can give `greatest` (N; the nominal one if unlimited), as a
+    speed controller tells it: a whole number, negative: backwards. The force grows with the square of the
+    speed."""
+    full = greatest if 0.0 < greatest < math.inf else ROTOR_FMAX
+    speed = np.rint(math.sqrt(abs(force) / full) * FULL_SPEED_RPM)
+    return if_above(force, 0.0, speed, -speed)
+
+
+@register_jitable
+def force_at(rpm: float, greatest: float) -> float:
+    """Inverse of `speed_rpm`, N."""
+    full = greatest if 0.0 < greatest < math.inf else ROTOR_FMAX
+    share = rpm / FULL_SPEED_RPM
+    return full * share * abs(share)
+
+
+@register_jitable
+def esc_status_values(time_us: int, index: int, rpm: tuple[float, float, float, float]) -> tuple[float, ...]:
+    """ESC_STATUS of four rotors from number `index` on, counted from 0: the numbers in the order of the wire.
+    Voltage and current are not simulated: 0."""
+    return (time_us, *rpm, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, index)

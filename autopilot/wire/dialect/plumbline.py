@@ -6463,6 +6463,7 @@ MAVLINK_MSG_ID_SIM_STATUS = 60105
 MAVLINK_MSG_ID_WIND_STATE = 60106
 MAVLINK_MSG_ID_CABLE_SNAP = 60107
 MAVLINK_MSG_ID_SIM_BOOT = 60108
+MAVLINK_MSG_ID_FILTER_STATE = 60109
 MAVLINK_MSG_ID_SYS_STATUS = 1
 MAVLINK_MSG_ID_SYSTEM_TIME = 2
 MAVLINK_MSG_ID_PING = 4
@@ -6672,6 +6673,8 @@ MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM_UPDATE = 12919
 MAVLINK_MSG_ID_HYGROMETER_SENSOR = 12920
 MAVLINK_MSG_ID_EKF_STATUS_REPORT = 193
 MAVLINK_MSG_ID_COMMAND_CANCEL = 80
+MAVLINK_MSG_ID_ESC_INFO = 290
+MAVLINK_MSG_ID_ESC_STATUS = 291
 MAVLINK_MSG_ID_COMPONENT_INFORMATION = 395
 MAVLINK_MSG_ID_COMPONENT_METADATA = 397
 MAVLINK_MSG_ID_PROTOCOL_VERSION = 300
@@ -6909,22 +6912,22 @@ class MAVLink_rotor_state_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_ROTOR_STATE
     msgname = "ROTOR_STATE"
-    fieldnames = ["time_usec", "force", "force_min", "force_max", "saturated", "source"]
-    ordered_fieldnames = ["time_usec", "force", "force_min", "force_max", "saturated", "source"]
-    fieldtypes = ["uint64_t", "float", "float", "float", "uint8_t", "uint8_t"]
+    fieldnames = ["time_usec", "force", "force_min", "force_max", "saturated", "source", "more_force", "more_saturated", "rotors"]
+    ordered_fieldnames = ["time_usec", "force", "force_min", "force_max", "saturated", "source", "more_force", "more_saturated", "rotors"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "uint8_t", "uint8_t", "float", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {"source": "PLUMBLINE_SOURCE"}
-    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "force": "N", "force_min": "N", "force_max": "N"}
-    native_format = bytearray(b"<QfffBB")
-    orders = [0, 1, 2, 3, 4, 5]
-    lengths = [1, 4, 1, 1, 1, 1]
-    array_lengths = [0, 4, 0, 0, 0, 0]
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "force": "N", "force_min": "N", "force_max": "N", "more_force": "N"}
+    native_format = bytearray(b"<QfffBBfBB")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    lengths = [1, 4, 1, 1, 1, 1, 10, 1, 1]
+    array_lengths = [0, 4, 0, 0, 0, 0, 10, 0, 0]
     crc_extra = 95
-    unpacker = struct.Struct("<Q4fffBB")
+    unpacker = struct.Struct("<Q4fffBB10fBB")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, time_usec: int, force: Sequence[float], force_min: float, force_max: float, saturated: int, source: int):
+    def __init__(self, time_usec: int, force: Sequence[float], force_min: float, force_max: float, saturated: int, source: int, more_force: Sequence[float] = (0, 0, 0, 0, 0, 0, 0, 0, 0, 0), more_saturated: int = 0, rotors: int = 0):
         MAVLink_message.__init__(self, MAVLink_rotor_state_message.id, MAVLink_rotor_state_message.msgname)
         self._fieldnames = MAVLink_rotor_state_message.fieldnames
         self._instance_field = MAVLink_rotor_state_message.instance_field
@@ -6935,9 +6938,12 @@ class MAVLink_rotor_state_message(MAVLink_message):
         self.force_max = force_max
         self.saturated = saturated
         self.source = source
+        self.more_force = more_force
+        self.more_saturated = more_saturated
+        self.rotors = rotors
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.force[0], self.force[1], self.force[2], self.force[3], self.force_min, self.force_max, self.saturated, self.source), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.force[0], self.force[1], self.force[2], self.force[3], self.force_min, self.force_max, self.saturated, self.source, self.more_force[0], self.more_force[1], self.more_force[2], self.more_force[3], self.more_force[4], self.more_force[5], self.more_force[6], self.more_force[7], self.more_force[8], self.more_force[9], self.more_saturated, self.rotors), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -7083,22 +7089,22 @@ class MAVLink_sim_boot_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_SIM_BOOT
     msgname = "SIM_BOOT"
-    fieldnames = ["time_usec", "boot_id", "force", "reeled", "rotors", "released"]
-    ordered_fieldnames = ["time_usec", "boot_id", "force", "reeled", "rotors", "released"]
-    fieldtypes = ["uint64_t", "uint64_t", "float", "float", "uint8_t", "uint8_t"]
+    fieldnames = ["time_usec", "boot_id", "force", "reeled", "rotors", "released", "more_force"]
+    ordered_fieldnames = ["time_usec", "boot_id", "force", "reeled", "rotors", "released", "more_force"]
+    fieldtypes = ["uint64_t", "uint64_t", "float", "float", "uint8_t", "uint8_t", "float"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {"rotors": "PLUMBLINE_ROTORS"}
-    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "force": "N", "reeled": "m"}
-    native_format = bytearray(b"<QQffBB")
-    orders = [0, 1, 2, 3, 4, 5]
-    lengths = [1, 1, 4, 1, 1, 1]
-    array_lengths = [0, 0, 4, 0, 0, 0]
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "force": "N", "reeled": "m", "more_force": "N"}
+    native_format = bytearray(b"<QQffBBf")
+    orders = [0, 1, 2, 3, 4, 5, 6]
+    lengths = [1, 1, 4, 1, 1, 1, 10]
+    array_lengths = [0, 0, 4, 0, 0, 0, 10]
     crc_extra = 252
-    unpacker = struct.Struct("<QQ4ffBB")
+    unpacker = struct.Struct("<QQ4ffBB10f")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int):
+    def __init__(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int, more_force: Sequence[float] = (0, 0, 0, 0, 0, 0, 0, 0, 0, 0)):
         MAVLink_message.__init__(self, MAVLink_sim_boot_message.id, MAVLink_sim_boot_message.msgname)
         self._fieldnames = MAVLink_sim_boot_message.fieldnames
         self._instance_field = MAVLink_sim_boot_message.instance_field
@@ -7109,14 +7115,63 @@ class MAVLink_sim_boot_message(MAVLink_message):
         self.reeled = reeled
         self.rotors = rotors
         self.released = released
+        self.more_force = more_force
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.boot_id, self.force[0], self.force[1], self.force[2], self.force[3], self.reeled, self.rotors, self.released), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.boot_id, self.force[0], self.force[1], self.force[2], self.force[3], self.reeled, self.rotors, self.released, self.more_force[0], self.more_force[1], self.more_force[2], self.more_force[3], self.more_force[4], self.more_force[5], self.more_force[6], self.more_force[7], self.more_force[8], self.more_force[9]), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
 # Done with setattr to hide the class variable from mypy.
 setattr(MAVLink_sim_boot_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_filter_state_message(MAVLink_message):
+    """
+    What the built-in filter estimates, beside an estimator of
+    somebody's own, which flies.
+    """
+
+    id = MAVLINK_MSG_ID_FILTER_STATE
+    msgname = "FILTER_STATE"
+    fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "vehicle_x", "vehicle_y", "vehicle_z"]
+    ordered_fieldnames = ["time_usec", "x", "y", "z", "vx", "vy", "vz", "vehicle_x", "vehicle_y", "vehicle_z"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "float", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "x": "m", "y": "m", "z": "m", "vx": "m/s", "vy": "m/s", "vz": "m/s", "vehicle_x": "m", "vehicle_y": "m", "vehicle_z": "m"}
+    native_format = bytearray(b"<Qfffffffff")
+    orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    crc_extra = 126
+    unpacker = struct.Struct("<Qfffffffff")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, vehicle_x: float, vehicle_y: float, vehicle_z: float):
+        MAVLink_message.__init__(self, MAVLink_filter_state_message.id, MAVLink_filter_state_message.msgname)
+        self._fieldnames = MAVLink_filter_state_message.fieldnames
+        self._instance_field = MAVLink_filter_state_message.instance_field
+        self._instance_offset = MAVLink_filter_state_message.instance_offset
+        self.time_usec = time_usec
+        self.x = x
+        self.y = y
+        self.z = z
+        self.vx = vx
+        self.vy = vy
+        self.vz = vz
+        self.vehicle_x = vehicle_x
+        self.vehicle_y = vehicle_y
+        self.vehicle_z = vehicle_z
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.x, self.y, self.z, self.vx, self.vy, self.vz, self.vehicle_x, self.vehicle_y, self.vehicle_z), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_filter_state_message, "name", mavlink_msg_deprecated_name_property())
 
 
 class MAVLink_sys_status_message(MAVLink_message):
@@ -17134,6 +17189,95 @@ class MAVLink_command_cancel_message(MAVLink_message):
 setattr(MAVLink_command_cancel_message, "name", mavlink_msg_deprecated_name_property())
 
 
+class MAVLink_esc_info_message(MAVLink_message):
+    """
+    What the speed controllers of up to four rotors are, and what has
+    failed.
+    """
+
+    id = MAVLINK_MSG_ID_ESC_INFO
+    msgname = "ESC_INFO"
+    fieldnames = ["index", "time_usec", "counter", "count", "connection_type", "info", "failure_flags", "error_count", "temperature"]
+    ordered_fieldnames = ["time_usec", "error_count", "counter", "failure_flags", "temperature", "index", "count", "connection_type", "info"]
+    fieldtypes = ["uint8_t", "uint64_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint16_t", "uint32_t", "int16_t"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "temperature": "cdegC"}
+    native_format = bytearray(b"<QIHHhBBBB")
+    orders = [5, 0, 2, 6, 7, 8, 3, 1, 4]
+    lengths = [1, 4, 1, 4, 4, 1, 1, 1, 1]
+    array_lengths = [0, 4, 0, 4, 4, 0, 0, 0, 0]
+    crc_extra = 251
+    unpacker = struct.Struct("<Q4IH4H4hBBBB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, index: int, time_usec: int, counter: int, count: int, connection_type: int, info: int, failure_flags: Sequence[int], error_count: Sequence[int], temperature: Sequence[int]):
+        MAVLink_message.__init__(self, MAVLink_esc_info_message.id, MAVLink_esc_info_message.msgname)
+        self._fieldnames = MAVLink_esc_info_message.fieldnames
+        self._instance_field = MAVLink_esc_info_message.instance_field
+        self._instance_offset = MAVLink_esc_info_message.instance_offset
+        self.index = index
+        self.time_usec = time_usec
+        self.counter = counter
+        self.count = count
+        self.connection_type = connection_type
+        self.info = info
+        self.failure_flags = failure_flags
+        self.error_count = error_count
+        self.temperature = temperature
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.error_count[0], self.error_count[1], self.error_count[2], self.error_count[3], self.counter, self.failure_flags[0], self.failure_flags[1], self.failure_flags[2], self.failure_flags[3], self.temperature[0], self.temperature[1], self.temperature[2], self.temperature[3], self.index, self.count, self.connection_type, self.info), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_esc_info_message, "name", mavlink_msg_deprecated_name_property())
+
+
+class MAVLink_esc_status_message(MAVLink_message):
+    """
+    What the speed controllers of up to four rotors measure.
+    """
+
+    id = MAVLINK_MSG_ID_ESC_STATUS
+    msgname = "ESC_STATUS"
+    fieldnames = ["index", "time_usec", "rpm", "voltage", "current"]
+    ordered_fieldnames = ["time_usec", "rpm", "voltage", "current", "index"]
+    fieldtypes = ["uint8_t", "uint64_t", "int32_t", "float", "float"]
+    fielddisplays_by_name: Dict[str, str] = {}
+    fieldenums_by_name: Dict[str, str] = {}
+    fieldunits_by_name: Dict[str, str] = {"time_usec": "us", "rpm": "rpm", "voltage": "V", "current": "A"}
+    native_format = bytearray(b"<QiffB")
+    orders = [4, 0, 1, 2, 3]
+    lengths = [1, 4, 4, 4, 1]
+    array_lengths = [0, 4, 4, 4, 0]
+    crc_extra = 10
+    unpacker = struct.Struct("<Q4i4f4fB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, index: int, time_usec: int, rpm: Sequence[int], voltage: Sequence[float], current: Sequence[float]):
+        MAVLink_message.__init__(self, MAVLink_esc_status_message.id, MAVLink_esc_status_message.msgname)
+        self._fieldnames = MAVLink_esc_status_message.fieldnames
+        self._instance_field = MAVLink_esc_status_message.instance_field
+        self._instance_offset = MAVLink_esc_status_message.instance_offset
+        self.index = index
+        self.time_usec = time_usec
+        self.rpm = rpm
+        self.voltage = voltage
+        self.current = current
+
+    def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.time_usec, self.rpm[0], self.rpm[1], self.rpm[2], self.rpm[3], self.voltage[0], self.voltage[1], self.voltage[2], self.voltage[3], self.current[0], self.current[1], self.current[2], self.current[3], self.index), force_mavlink1=force_mavlink1)
+
+
+# Define name on the class for backwards compatibility (it is now msgname).
+# Done with setattr to hide the class variable from mypy.
+setattr(MAVLink_esc_status_message, "name", mavlink_msg_deprecated_name_property())
+
+
 class MAVLink_component_information_message(MAVLink_message):
     """
     Where the general metadata file is; superseded by
@@ -17543,6 +17687,7 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_WIND_STATE: MAVLink_wind_state_message,
     MAVLINK_MSG_ID_CABLE_SNAP: MAVLink_cable_snap_message,
     MAVLINK_MSG_ID_SIM_BOOT: MAVLink_sim_boot_message,
+    MAVLINK_MSG_ID_FILTER_STATE: MAVLink_filter_state_message,
     MAVLINK_MSG_ID_SYS_STATUS: MAVLink_sys_status_message,
     MAVLINK_MSG_ID_SYSTEM_TIME: MAVLink_system_time_message,
     MAVLINK_MSG_ID_PING: MAVLink_ping_message,
@@ -17752,6 +17897,8 @@ mavlink_map: Dict[int, Type[MAVLink_message]] = {
     MAVLINK_MSG_ID_HYGROMETER_SENSOR: MAVLink_hygrometer_sensor_message,
     MAVLINK_MSG_ID_EKF_STATUS_REPORT: MAVLink_ekf_status_report_message,
     MAVLINK_MSG_ID_COMMAND_CANCEL: MAVLink_command_cancel_message,
+    MAVLINK_MSG_ID_ESC_INFO: MAVLink_esc_info_message,
+    MAVLINK_MSG_ID_ESC_STATUS: MAVLink_esc_status_message,
     MAVLINK_MSG_ID_COMPONENT_INFORMATION: MAVLink_component_information_message,
     MAVLINK_MSG_ID_COMPONENT_METADATA: MAVLink_component_metadata_message,
     MAVLINK_MSG_ID_PROTOCOL_VERSION: MAVLink_protocol_version_message,
@@ -18361,7 +18508,7 @@ class MAVLink(object):
         """
         self.send(self.cascade_errors_encode(time_usec, e_x, e_v, e_q, e_q_dot, e_r, e_omega, psi_r, psi_q, thrust, moment, control_mode), force_mavlink1=force_mavlink1)
 
-    def rotor_state_encode(self, time_usec: int, force: Sequence[float], force_min: float, force_max: float, saturated: int, source: int) -> MAVLink_rotor_state_message:
+    def rotor_state_encode(self, time_usec: int, force: Sequence[float], force_min: float, force_max: float, saturated: int, source: int, more_force: Sequence[float] = (0, 0, 0, 0, 0, 0, 0, 0, 0, 0), more_saturated: int = 0, rotors: int = 0) -> MAVLink_rotor_state_message:
         """
         Rotor forces.
 
@@ -18369,13 +18516,16 @@ class MAVLink(object):
         force                     : Commanded force (estimated source) or true force (truth source). [N] (type:float)
         force_min                 : Least force of a rotor. [N] (type:float)
         force_max                 : Greatest force of a rotor, infinite if unlimited. [N] (type:float)
-        saturated                 : Bit i: the demand on rotor i was cut at a limit. (type:uint8_t)
+        saturated                 : Bit i: the demand on rotor 1+i was cut at a limit. (type:uint8_t)
         source                    : Truth or the autopilot. (type:uint8_t, values:PLUMBLINE_SOURCE)
+        more_force                : Force of rotors 5 to 14. [N] (type:float)
+        more_saturated            : Bit i: the demand on rotor 9+i was cut at a limit. (type:uint8_t)
+        rotors                    : Number of rotors; 0: four. (type:uint8_t)
 
         """
-        return MAVLink_rotor_state_message(time_usec, force, force_min, force_max, saturated, source)
+        return MAVLink_rotor_state_message(time_usec, force, force_min, force_max, saturated, source, more_force, more_saturated, rotors)
 
-    def rotor_state_send(self, time_usec: int, force: Sequence[float], force_min: float, force_max: float, saturated: int, source: int, force_mavlink1: bool = False) -> None:
+    def rotor_state_send(self, time_usec: int, force: Sequence[float], force_min: float, force_max: float, saturated: int, source: int, more_force: Sequence[float] = (0, 0, 0, 0, 0, 0, 0, 0, 0, 0), more_saturated: int = 0, rotors: int = 0, force_mavlink1: bool = False) -> None:
         """
         Rotor forces.
 
@@ -18383,11 +18533,14 @@ class MAVLink(object):
         force                     : Commanded force (estimated source) or true force (truth source). [N] (type:float)
         force_min                 : Least force of a rotor. [N] (type:float)
         force_max                 : Greatest force of a rotor, infinite if unlimited. [N] (type:float)
-        saturated                 : Bit i: the demand on rotor i was cut at a limit. (type:uint8_t)
+        saturated                 : Bit i: the demand on rotor 1+i was cut at a limit. (type:uint8_t)
         source                    : Truth or the autopilot. (type:uint8_t, values:PLUMBLINE_SOURCE)
+        more_force                : Force of rotors 5 to 14. [N] (type:float)
+        more_saturated            : Bit i: the demand on rotor 9+i was cut at a limit. (type:uint8_t)
+        rotors                    : Number of rotors; 0: four. (type:uint8_t)
 
         """
-        self.send(self.rotor_state_encode(time_usec, force, force_min, force_max, saturated, source), force_mavlink1=force_mavlink1)
+        self.send(self.rotor_state_encode(time_usec, force, force_min, force_max, saturated, source, more_force, more_saturated, rotors), force_mavlink1=force_mavlink1)
 
     def sim_status_encode(self, time_usec: int, speed_factor: float, rate_hz: float, late_p50_us: int, late_p99_us: int, late_max_us: int, missed: int, vehicle_on_ground: int, load_on_ground: int) -> MAVLink_sim_status_message:
         """
@@ -18471,7 +18624,7 @@ class MAVLink(object):
         """
         self.send(self.cable_snap_encode(time_usec, speed, impulse), force_mavlink1=force_mavlink1)
 
-    def sim_boot_encode(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int) -> MAVLink_sim_boot_message:
+    def sim_boot_encode(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int, more_force: Sequence[float] = (0, 0, 0, 0, 0, 0, 0, 0, 0, 0)) -> MAVLink_sim_boot_message:
         """
         Which run of the simulated world this is, and how rotors, winch and
         gripper are, for an autopilot that has just started. On the
@@ -18484,11 +18637,12 @@ class MAVLink(object):
         reeled                    : By how much the winch has lengthened the cable. [m] (type:float)
         rotors                    : Whether the rotors obey that command. (type:uint8_t, values:PLUMBLINE_ROTORS)
         released                  : 1 while the gripper holds nothing. (type:uint8_t)
+        more_force                : The same of rotors 5 to 14. [N] (type:float)
 
         """
-        return MAVLink_sim_boot_message(time_usec, boot_id, force, reeled, rotors, released)
+        return MAVLink_sim_boot_message(time_usec, boot_id, force, reeled, rotors, released, more_force)
 
-    def sim_boot_send(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int, force_mavlink1: bool = False) -> None:
+    def sim_boot_send(self, time_usec: int, boot_id: int, force: Sequence[float], reeled: float, rotors: int, released: int, more_force: Sequence[float] = (0, 0, 0, 0, 0, 0, 0, 0, 0, 0), force_mavlink1: bool = False) -> None:
         """
         Which run of the simulated world this is, and how rotors, winch and
         gripper are, for an autopilot that has just started. On the
@@ -18501,9 +18655,48 @@ class MAVLink(object):
         reeled                    : By how much the winch has lengthened the cable. [m] (type:float)
         rotors                    : Whether the rotors obey that command. (type:uint8_t, values:PLUMBLINE_ROTORS)
         released                  : 1 while the gripper holds nothing. (type:uint8_t)
+        more_force                : The same of rotors 5 to 14. [N] (type:float)
 
         """
-        self.send(self.sim_boot_encode(time_usec, boot_id, force, reeled, rotors, released), force_mavlink1=force_mavlink1)
+        self.send(self.sim_boot_encode(time_usec, boot_id, force, reeled, rotors, released, more_force), force_mavlink1=force_mavlink1)
+
+    def filter_state_encode(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, vehicle_x: float, vehicle_y: float, vehicle_z: float) -> MAVLink_filter_state_message:
+        """
+        What the built-in filter estimates, beside an estimator of somebody's
+        own, which flies.
+
+        time_usec                 : Time of the state, clock of the vehicle. [us] (type:uint64_t)
+        x                         : Load, north of home. [m] (type:float)
+        y                         : Load, east of home. [m] (type:float)
+        z                         : Load, below home. [m] (type:float)
+        vx                        : Load velocity north. [m/s] (type:float)
+        vy                        : Load velocity east. [m/s] (type:float)
+        vz                        : Load velocity down. [m/s] (type:float)
+        vehicle_x                 : Vehicle, north of home. [m] (type:float)
+        vehicle_y                 : Vehicle, east of home. [m] (type:float)
+        vehicle_z                 : Vehicle, below home. [m] (type:float)
+
+        """
+        return MAVLink_filter_state_message(time_usec, x, y, z, vx, vy, vz, vehicle_x, vehicle_y, vehicle_z)
+
+    def filter_state_send(self, time_usec: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, vehicle_x: float, vehicle_y: float, vehicle_z: float, force_mavlink1: bool = False) -> None:
+        """
+        What the built-in filter estimates, beside an estimator of somebody's
+        own, which flies.
+
+        time_usec                 : Time of the state, clock of the vehicle. [us] (type:uint64_t)
+        x                         : Load, north of home. [m] (type:float)
+        y                         : Load, east of home. [m] (type:float)
+        z                         : Load, below home. [m] (type:float)
+        vx                        : Load velocity north. [m/s] (type:float)
+        vy                        : Load velocity east. [m/s] (type:float)
+        vz                        : Load velocity down. [m/s] (type:float)
+        vehicle_x                 : Vehicle, north of home. [m] (type:float)
+        vehicle_y                 : Vehicle, east of home. [m] (type:float)
+        vehicle_z                 : Vehicle, below home. [m] (type:float)
+
+        """
+        self.send(self.filter_state_encode(time_usec, x, y, z, vx, vy, vz, vehicle_x, vehicle_y, vehicle_z), force_mavlink1=force_mavlink1)
 
     def sys_status_encode(self, onboard_control_sensors_present: int, onboard_control_sensors_enabled: int, onboard_control_sensors_health: int, load: int, voltage_battery: int, current_battery: int, battery_remaining: int, drop_rate_comm: int, errors_comm: int, errors_count1: int, errors_count2: int, errors_count3: int, errors_count4: int, onboard_control_sensors_present_extended: int = 0, onboard_control_sensors_enabled_extended: int = 0, onboard_control_sensors_health_extended: int = 0) -> MAVLink_sys_status_message:
         """
@@ -26378,6 +26571,68 @@ class MAVLink(object):
 
         """
         self.send(self.command_cancel_encode(target_system, target_component, command), force_mavlink1=force_mavlink1)
+
+    def esc_info_encode(self, index: int, time_usec: int, counter: int, count: int, connection_type: int, info: int, failure_flags: Sequence[int], error_count: Sequence[int], temperature: Sequence[int]) -> MAVLink_esc_info_message:
+        """
+        What the speed controllers of up to four rotors are, and what has
+        failed.
+
+        index                     : Index of the first of them. (type:uint8_t)
+        time_usec                 : Time. [us] (type:uint64_t)
+        counter                   : Counter of these messages. (type:uint16_t)
+        count                     : Number of all speed controllers. (type:uint8_t)
+        connection_type           : Connection type. (type:uint8_t)
+        info                      : Bit i: number i of these is online. (type:uint8_t)
+        failure_flags             : Failures of each. (type:uint16_t)
+        error_count               : Errors of each since start. (type:uint32_t)
+        temperature               : Temperature of each; INT16_MAX: not known. [cdegC] (type:int16_t)
+
+        """
+        return MAVLink_esc_info_message(index, time_usec, counter, count, connection_type, info, failure_flags, error_count, temperature)
+
+    def esc_info_send(self, index: int, time_usec: int, counter: int, count: int, connection_type: int, info: int, failure_flags: Sequence[int], error_count: Sequence[int], temperature: Sequence[int], force_mavlink1: bool = False) -> None:
+        """
+        What the speed controllers of up to four rotors are, and what has
+        failed.
+
+        index                     : Index of the first of them. (type:uint8_t)
+        time_usec                 : Time. [us] (type:uint64_t)
+        counter                   : Counter of these messages. (type:uint16_t)
+        count                     : Number of all speed controllers. (type:uint8_t)
+        connection_type           : Connection type. (type:uint8_t)
+        info                      : Bit i: number i of these is online. (type:uint8_t)
+        failure_flags             : Failures of each. (type:uint16_t)
+        error_count               : Errors of each since start. (type:uint32_t)
+        temperature               : Temperature of each; INT16_MAX: not known. [cdegC] (type:int16_t)
+
+        """
+        self.send(self.esc_info_encode(index, time_usec, counter, count, connection_type, info, failure_flags, error_count, temperature), force_mavlink1=force_mavlink1)
+
+    def esc_status_encode(self, index: int, time_usec: int, rpm: Sequence[int], voltage: Sequence[float], current: Sequence[float]) -> MAVLink_esc_status_message:
+        """
+        What the speed controllers of up to four rotors measure.
+
+        index                     : Index of the first of them. (type:uint8_t)
+        time_usec                 : Time. [us] (type:uint64_t)
+        rpm                       : Speed of each, negative: backwards. [rpm] (type:int32_t)
+        voltage                   : Voltage of each. [V] (type:float)
+        current                   : Current of each. [A] (type:float)
+
+        """
+        return MAVLink_esc_status_message(index, time_usec, rpm, voltage, current)
+
+    def esc_status_send(self, index: int, time_usec: int, rpm: Sequence[int], voltage: Sequence[float], current: Sequence[float], force_mavlink1: bool = False) -> None:
+        """
+        What the speed controllers of up to four rotors measure.
+
+        index                     : Index of the first of them. (type:uint8_t)
+        time_usec                 : Time. [us] (type:uint64_t)
+        rpm                       : Speed of each, negative: backwards. [rpm] (type:int32_t)
+        voltage                   : Voltage of each. [V] (type:float)
+        current                   : Current of each. [A] (type:float)
+
+        """
+        self.send(self.esc_status_encode(index, time_usec, rpm, voltage, current), force_mavlink1=force_mavlink1)
 
     def component_information_encode(self, time_boot_ms: int, general_metadata_file_crc: int, general_metadata_uri: bytes, peripherals_metadata_file_crc: int, peripherals_metadata_uri: bytes) -> MAVLink_component_information_message:
         """

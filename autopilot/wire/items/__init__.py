@@ -5,12 +5,14 @@
 holds of signals), microseconds (periods) and 1e-7 degrees (the place of a waypoint: 5.6 mm). Items that were
 made here come back unchanged: `encode(decode(items)) == items`.
 
-Positions are positions of the load. DO_JUMP is flown by flying its items again.
+Positions are positions of the load. Items that turn the nose are no steps: it begins to turn with the step
+behind them. DO_JUMP is flown by flying its items again.
 """
 
 from autopilot.wire.items.command import Command, Fate
 from autopilot.wire.items.decode import decode_items, endless_from, located_steps, unflown
 from autopilot.wire.items.encode import encode_mission, encode_steps
+from autopilot.wire.items.nose import turn_nose
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
 from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, fate
 
@@ -29,5 +31,6 @@ __all__ = [
     "endless_from",
     "fate",
     "located_steps",
+    "turn_nose",
     "unflown",
 ]

@@ -21,7 +21,7 @@ from autopilot.wire.items.records import (
     WireItem,
     wrong_frame,
 )
-from missions.model import Step
+from missions.model import NoseAim, Step
 
 
 class Fate(Enum):
@@ -43,6 +43,7 @@ class Command:
     written: bool = False  # the record is written as this command
     constants: Mapping[str, float] = field(default_factory=dict)  # written beside the fields
     reads: Callable[[Asked], Iterable[Step]] | None = None  # None: one record of all fields
+    aims: Callable[[Asked], NoseAim] | None = None  # of a command that turns the nose: where to
     mission_frame: bool = False  # its frame must be MAV_FRAME_MISSION
     needs_load: bool = False  # refused behind a release
     fate: Fate = Fate.FLOWN

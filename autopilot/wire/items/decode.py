@@ -14,7 +14,7 @@ from autopilot.wire.items.fields import choice
 from autopilot.wire.items.limits import MOST_FACTORS, MOST_FLOWN, MOST_JUMPS, MOST_TERMS
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
 from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, fate
-from missions.model import Signals, Step, Term
+from missions.model import Delay, Land, NoseAim, ReturnHome, Signals, Step, Takeoff, Term
 
 _TERM, _FACTOR, _RUN = (
     mavlink.PLUMBLINE_LOAD_SIGNAL_TERM,
@@ -51,7 +51,8 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
                 if not any(step.last >= target for step in reader.steps):
                     text = "a jump without end must lead back to something that is flown"
                     raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
-                break
+                reader.aim_at_the_end(seq - 1)
+                return tuple(reader.steps)
             jumps[seq] = jumps.get(seq, 0) + 1
             seq = target if jumps[seq] <= times else seq + 1
         else:
@@ -62,6 +63,7 @@ def located_steps(items: Sequence[WireItem], home: Home, return_to: Vec3 = ZERO)
             text = f"with its jumps the mission has more than {MOST_FLOWN} items"
             raise MissionItemError(min(seq, len(items) - 1), text, mavlink.MAV_MISSION_NO_SPACE)
     reader.expect_no_terms(len(items) - 1)
+    reader.aim_at_the_end(len(items) - 1)
     return tuple(reader.steps)
 
 
@@ -87,6 +89,7 @@ class _Reader:
         self._return_to = return_to
         self._terms: list[Term] = []
         self._first_term = 0
+        self._aims: list[NoseAim] = []  # of the next step
         self._state = ANYWHERE  # after the steps so far
 
     def read(self, seq: int, item: WireItem) -> None:
@@ -97,6 +100,9 @@ class _Reader:
             return
         row = COMMAND[item.command]
         asked = Asked(seq, item, self._home, self._state, row)
+        if row.aims is not None:
+            self._aims.append(row.aims(asked))
+            return
         if item.command not in (_TERM, _FACTOR, _RUN):
             self.expect_no_terms(seq - 1)
         asked.expect_frame()
@@ -116,7 +122,14 @@ class _Reader:
             text = f"the load signal begun at item {self._first_term} has no run (31012) behind it"
             raise MissionItemError(seq, text, mavlink.MAV_MISSION_INVALID)
 
+    def aim_at_the_end(self, seq: int) -> None:
+        """Where no step follows the load is held as the nose turns, unless it is landed anyway."""
+        if self._aims and self.steps and not isinstance(self.steps[-1].step, Land | ReturnHome):
+            self._add(LocatedStep(seq, seq, Delay(0.0)))
+
     def _add(self, located: LocatedStep) -> None:
+        if self._aims and not isinstance(located.step, Takeoff):  # on the ground no nose turns
+            located, self._aims = located._replace(aims=tuple(self._aims)), []
         self.steps.append(located)
         self._state = state_after(located.step, self._state, self._return_to)
 

@@ -10,7 +10,7 @@ import math
 
 from autopilot.trajectory.timeline import SPEED_M_S
 from autopilot.wire.dialect import plumbline as m
-from autopilot.wire.items import readers
+from autopilot.wire.items import nose, readers
 from autopilot.wire.items.command import Command, Fate
 from autopilot.wire.items.fields import Amplitude, Choice, Fall, Height, HomePlace, Number, Place
 from autopilot.wire.items.limits import (
@@ -49,6 +49,9 @@ _DELAY = (Number(1, "duration_s", "delay", "s", 0.0, LONGEST_S),)
 _POINT = (Place(), Height())
 _HELD_POINT = (Number(1, "hold_s", "hold", "s", 0.0, LONGEST_S), *_POINT)
 _SPEED_TYPE = {0: "airspeed", 1: "ground speed", 2: "climb", 3: "descent"}
+_SENSE = {0: 0, 1: 1, -1: -1}  # the shorter way, clockwise, counter-clockwise
+_ROI = (Choice(1, "mode", "mode", {mode: mode for mode in (m.MAV_ROI_NONE, m.MAV_ROI_LOCATION)}), Place())
+_ROI_TEXT = "as DO_SET_ROI_LOCATION; p1 0 without a place as DO_SET_ROI_NONE"
 _ANY_OF_TWO = {0: 0, 1: 1}  # grippers, winches: there is one
 _GRIPPER_ACTION = {0: "release", 1: "grab", 2: "hold"}
 _BY_LENGTH = m.WINCH_RELATIVE_LENGTH_CONTROL
@@ -118,6 +121,27 @@ COMMANDS: tuple[Command, ...] = (
         constants={"param1": 1.0, "param3": -1.0},
         reads=readers.change_speed,
     ),
+    Command(
+        m.MAV_CMD_CONDITION_YAW,
+        "the nose turns to p1, clockwise from north (p4 1: from where it points), at p2 deg/s (0: "
+        "`MPC_YAWRAUTO_MAX`), p3 1 clockwise, -1 counter-clockwise, 0 the shorter way. It begins with the "
+        "next item, which does not wait for it",
+        (
+            Number(1, "angle_deg", "angle", "deg", -360.0, 360.0),
+            Choice(3, "sense", "sense", _SENSE),
+            Choice(4, "relative", "from", {0: False, 1: True}),
+        ),
+        aims=nose.turn,
+    ),
+    Command(
+        m.MAV_CMD_DO_SET_ROI_LOCATION,
+        "the nose follows the place from the next item on, until something else is asked of it",
+        (Place(),),
+        aims=nose.look,
+    ),
+    Command(m.MAV_CMD_DO_SET_ROI_NONE, "the nose stays as it points then", aims=nose.look_away),
+    Command(m.MAV_CMD_DO_SET_ROI, _ROI_TEXT, _ROI, aims=nose.look_or_not),
+    Command(m.MAV_CMD_NAV_ROI, _ROI_TEXT, _ROI, aims=nose.look_or_not),
     Command(
         m.MAV_CMD_NAV_DELAY,
         "a hold",
@@ -238,7 +262,6 @@ COMMANDS: tuple[Command, ...] = (
         mission_frame=True,
         needs_load=True,
     ),
-    Command(m.MAV_CMD_NAV_ROI, "nothing is pointed at it", fate=Fate.KEPT),
     Command(m.MAV_CMD_DO_SET_MODE, _CANNOT, fate=Fate.REFUSED),
     Command(m.MAV_CMD_DO_SET_HOME, _CANNOT, fate=Fate.REFUSED),
     Command(m.MAV_CMD_DO_FLIGHTTERMINATION, _CANNOT, fate=Fate.REFUSED),

@@ -8,7 +8,7 @@ import numpy as np
 
 from gcs.experiments.figures.canvas import COMPONENTS, TIME, Scene, heading, least_range, line, place, span
 from gcs.experiments.figures.canvas import titled as _titled
-from gcs.report.style import GREY, INK, ROTORS, new_figure
+from gcs.report.style import GREY, INK, new_figure, rotor_colour
 
 _MOMENTS = (r"M_\phi", r"M_\theta", r"M_\psi")
 
@@ -25,13 +25,13 @@ def control_inputs(number: str, scene: Scene) -> Any:
     total.set_ylabel("$f$ (N)")
     least_range(total, 2.0)
     _titled(total, "(a) total force", legend=False)
-    for i, color in enumerate(ROTORS):
+    for i in range(rotors.force_n.shape[1]):
         line(
             each,
             flight,
             rotors.time_s,
             rotors.force_n[:, i],
-            color=color,
+            color=rotor_colour(i),
             linewidth=1.1,
             label=f"$F_{i + 1}$",
         )

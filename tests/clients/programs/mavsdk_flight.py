@@ -256,7 +256,13 @@ class Pilot:
     def fly_mission(self) -> None:
         """Start, pause on the way, go on, to the end."""
         done: list[int] = []
-        self.mission.subscribe_mission_progress(lambda progress, *_: done.append(progress.current))
+        left: list[int] = []  # of the same: MAVSDK tells it from another thread than it is asked in
+
+        def told(progress: Any, *_: object) -> None:
+            done.append(progress.current)
+            left.append(progress.total - progress.current)
+
+        self.mission.subscribe_mission_progress(told)
         self.again(self.mission.start_mission)
         self.mode("MISSION")
         self.until("the second item", lambda: bool(done) and done[-1] >= 1)
@@ -266,6 +272,7 @@ class Pilot:
         self.again(self.mission.start_mission)
         self.mode("MISSION")
         self.until("the end of the mission", self.mission.is_mission_finished)
+        self.until("the progress that ends it", lambda: left[-1] == 0)
         self.told["progress"] = sorted(set(done))
 
     def upload_and_fly(self) -> None:

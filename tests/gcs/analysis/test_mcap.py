@@ -19,6 +19,7 @@ from gcs.analysis.parquet import flight_columns
 from gcs.analysis.samples import samples_of
 from tests.doubles import recorded_flights as flights
 
+ROTORS_M = ((-0.126, 0.0), (0.0, -0.126), (0.126, 0.0), (0.0, 0.126))
 Messages = dict[str, list[tuple[float, Any]]]  # by topic: time in s, message
 
 
@@ -26,7 +27,7 @@ def written(flight: flights.Flight, folder: Path) -> tuple[Messages, dict[str, s
     """The messages by topic, and the schemas of the topics."""
     telemetry = flight.telemetry()
     path = folder / "flight.mcap"
-    write_mcap(path, telemetry, samples_of(telemetry), Layout(0.126, 0.02))
+    write_mcap(path, telemetry, samples_of(telemetry), Layout(ROTORS_M, 0.02))
     found: Messages = {}
     schemas = {}
     reader = make_reader(io.BytesIO(path.read_bytes()), decoder_factories=[DecoderFactory()])
@@ -67,6 +68,15 @@ def test_frames_are_where_vehicle_and_load_are(delivery: tuple[Messages, dict[st
         assert all(one.parent_frame_id == "world" for one in message.transforms)
         for frame, place in (("vehicle", samples.vehicle_m[i]), ("load", samples.actual_m[i])):
             np.testing.assert_allclose((places[frame].x, places[frame].y, places[frame].z), place)
+
+
+def test_every_rotor_is_drawn_at_its_place(delivery: tuple[Messages, dict[str, str]]) -> None:
+    (vehicle,) = [
+        one for _, update in delivery[0]["/scene"] for one in update.entities if one.id == "vehicle"
+    ]
+    drawn = [(disc.pose.position.x, disc.pose.position.y) for disc in vehicle.cylinders]
+    np.testing.assert_array_equal(drawn, ROTORS_M)
+    assert len(vehicle.cubes) == len(ROTORS_M)
 
 
 def test_every_column_of_the_table_is_a_field(delivery: tuple[Messages, dict[str, str]]) -> None:

@@ -241,6 +241,9 @@ def test_the_link_lost_in_the_air(world, fly):
     world.vehicle.script = then(normal_flight, 10.0, vanish)
     client, _ = fly()
     assert (client.outcome.name, client.outcome.reason) == ("lost", "the vehicle fell silent while flying")
+    client.explain_silence("autopilot (process 7) stopped by a signal")
+    why = "autopilot (process 7) stopped by a signal; the vehicle fell silent while flying"
+    assert (client.outcome.name, client.outcome.reason) == ("lost", why)
 
 
 def test_nobody_there(world, fly):
@@ -275,7 +278,7 @@ def test_disarmed_by_somebody_else(world, fly, told_on_the_ground):
     world.vehicle.script = then(normal_flight, 10.0, disarm)
     client, _ = fly()
     assert client.outcome.name == "interrupted"
-    assert "item 1 of 4" in client.outcome.reason
+    assert "at item 1 of 3" in client.outcome.reason
 
 
 def test_disarmed_before_take_off(world, fly):

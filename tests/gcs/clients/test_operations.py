@@ -230,12 +230,12 @@ def test_an_empty_mission_uploads_downloads_and_clears(world, run, items):
     assert run(MissionUpload(TARGET, [])).status is Status.DONE
 
 
-def test_old_clients_items_are_answered_in_degrees(items):
-    """A vehicle that asks by MISSION_REQUEST gets MISSION_ITEM with float degrees."""
+def test_an_old_request_too_is_answered_in_whole_numbers(items):
+    """ArduPilot asks by MISSION_REQUEST and takes either; a float32 knows degrees to a metre only."""
     upload = MissionUpload(TARGET, items)
     upload.poll(0)
     request = mavlink.MAVLink_mission_request_message(255, 190, 0, 0)
     upload.receive(heard(request), 1)
     (item,) = upload.poll(2)
-    assert item.get_type() == "MISSION_ITEM"
-    assert math.isclose(item.x, 47.397742) and math.isclose(item.y, 8.545594)
+    assert item.get_type() == "MISSION_ITEM_INT"
+    assert (item.x, item.y) == (473977420, 85455940)

@@ -130,17 +130,16 @@ def test_what_cannot_be_flown_is_named_with_what_to_do() -> None:
     assert judged.kept == [
         "item 2, DO_SET_CAM_TRIGG_DIST (206): kept on the vehicle but not done",
         "item 5, WAYPOINT_USER_5 (31004): kept on the vehicle but not done",
-        "item 6, DO_SET_ROI (201): kept on the vehicle but not done",
     ]
     assert [item.command for item in judged.items] == [22, 206, 16, 31004, 201]
 
 
 def test_what_is_refused_is_left_out_and_not_kept() -> None:
-    judged = judge(read_plan(plan_text(TAKEOFF, simple(208, 2), simple(80, 2), simple(21))), HOME)
+    judged = judge(read_plan(plan_text(TAKEOFF, simple(208, 2), simple(203, 2), simple(21))), HOME)
     (line,) = judged.left_out
     assert line.startswith("item 1 (") and "DO_PARACHUTE (208)" in line
-    assert judged.kept == ["item 2, NAV_ROI (80): kept on the vehicle but not done"]
-    assert [item.command for item in judged.items] == [22, 80, 21]
+    assert judged.kept == ["item 2, DO_DIGICAM_CONTROL (203): kept on the vehicle but not done"]
+    assert [item.command for item in judged.items] == [22, 203, 21]
 
 
 def test_a_plan_that_is_flown_whole_is_not_complained_about() -> None:

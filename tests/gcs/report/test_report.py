@@ -173,6 +173,17 @@ def test_the_page_says_what_matters_and_escapes_what_it_was_given(page):
     assert "Rotor 2 at its limit <b>&amp;" in said
 
 
+def test_figures_say_of_which_part_of_the_flight_they_are(page, built):
+    text = " ".join(page.text)
+    console = Console(width=100, record=True, file=io.StringIO())
+    console.print(record_table(built[1]))
+    table = console.export_text()
+    for group in ("Load position error", "Vehicle and cable", "Rotors"):
+        assert re.search(rf"{group}\s+over the mission", text)
+        assert re.search(rf"{group} .*\n *over the mission", table)
+    assert "given up" not in text
+
+
 def test_groups_in_which_nothing_happened_are_left_out(page, built):
     text = " ".join(page.text)
     for group, metrics in GROUPS:
@@ -240,6 +251,7 @@ def test_a_flight_that_is_lost_gives_a_report(tmp_path):
     path.write_bytes(path.read_bytes()[:-11])  # and the last record is torn
     record = build_report(path, tmp_path, FlightMeta(outcome="diverged", reason="no finite state"))
     assert record["outcome"] == "diverged"
+    assert "end where the flight was given up" in (tmp_path / "report.html").read_text(encoding="utf-8")
     text = (tmp_path / "summary.json").read_text()
     assert strict(text) == record
     assert all(math.isfinite(v) for v in record.values() if isinstance(v, float))

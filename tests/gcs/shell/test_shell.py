@@ -17,14 +17,14 @@ from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
 from gcs.clients.capture import Capture
-from gcs.clients.flight import FlightClient
+from gcs.clients.flight import FlightClient, Progress, Stage
 from gcs.errors import GcsError, NoVehicleError
 from gcs.shell import processes as processes_module
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.flight_loops import run_lockstep, run_wall_clock
+from gcs.workflows.flight_loops import STANDING_LIMIT_S, Clock, run_lockstep, run_wall_clock
 
 WAIT_S = 10.0  # for what takes milliseconds on an idle machine
 TICK_US = 20_000
@@ -195,6 +195,14 @@ def test_lockstep_writes_the_same_bytes_whatever_is_repeated(new_world, items, t
     assert len(logs[0]) > 10_000
 
 
+def test_items_are_counted_as_mavlink_counts_them(capsys):
+    """From 0, and behind the stroke stands the last."""
+    progress = Progress(Stage.FLY, "mission", 3, 7, 0.5, None, None, 12.0, "")
+    with FlightDisplay("test", quiet=False) as display:
+        display.update(progress)
+    assert capsys.readouterr().err == "gcs:   12.0 s  mission  item 3/6\n"
+
+
 def test_an_autopilot_that_dies_in_flight_is_an_outcome(new_world, items, tmp_path):
     client = fly_lockstep(new_world, items, tmp_path / "x.tlog", 0, turns=100)
     assert client.outcome is not None
@@ -235,6 +243,18 @@ def test_ctrl_c_stops_the_flight_once_and_in_order(items, tmp_path, lockstep, ca
     assert capsys.readouterr().err == "gcs: stopping\n"
 
 
+def test_a_clock_that_stands_while_the_vehicle_speaks_is_told_but_not_one_that_we_did_not_look_at():
+    clock = Clock(now_s=0.0)
+    assert clock.standing(None, 1000.0) == "", "it is not known before the vehicle tells"
+    told = [clock.standing(12_500_000, 1000.0 + second) for second in range(int(STANDING_LIMIT_S) + 1)]
+    assert told[:-1] == [""] * int(STANDING_LIMIT_S)
+    assert told[-1].startswith(
+        "the vehicle's clock has stood at 12.500 s for 60 s: the autopilot speaks, but"
+    )
+    assert clock.standing(12_508_000, 1061.0) == ""
+    assert clock.standing(12_508_000, 5000.0) == "", "we were held up ourselves"
+
+
 # ---- processes
 
 
@@ -262,6 +282,22 @@ def test_an_early_end_is_one_line_with_the_last_words(tmp_path):
         line = processes.ended()
     assert line.startswith("timeit ended with exit code 2: ")
     assert "\n" not in line
+
+
+def test_a_child_that_is_stopped_for_long_is_named_and_one_that_goes_on_is_not(tmp_path, monkeypatch):
+    monkeypatch.setattr(processes_module, "STOPPED_LIMIT_S", 0.2)
+    monkeypatch.setattr(processes_module, "LOOK_S", 0.02)
+    with Processes() as processes:
+        child = processes.start("timeit", LASTING, tmp_path / "log")
+        assert processes.ended() == processes.stopped() == ""
+        os.kill(child.pid, signal.SIGSTOP)
+        said = []
+        poll_until(lambda: said.append(processes.stopped()) or said[-1], child)
+        assert said[-1] == f"timeit (process {child.pid}) stopped by a signal"
+        poll_until(lambda: said.append(processes.ended()) or said[-1], child)
+        assert said[-1].startswith(f"timeit (process {child.pid}) has been stopped by a signal for ")
+        os.kill(child.pid, signal.SIGCONT)
+        poll_until(lambda: not processes.stopped(), child)
 
 
 def test_the_prefix_of_the_program_is_said_once(tmp_path):

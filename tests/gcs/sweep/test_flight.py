@@ -12,14 +12,16 @@ import pytest
 from numpy.typing import NDArray
 
 from autopilot.onboard.onboard import Onboard
+from autopilot.own.chosen import Own
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.flight import TRACE_COLUMNS, Flown, boarding, fly
 from missions.fileformat import load_mission
+from plumbline.laws import Asked, Now, force
 from sitl.hil import HilSimulator
 
 MOST_TICKS = 20_000
-THESIS, LQR, PLUMBLINE = 0.0, 1.0, 2.0
+THESIS, LQR, PLUMBLINE, OWN = 0.0, 1.0, 2.0, 3.0
 ROUGH = {"SIM_ACT_DELAY_MS": 9.0, "SIM_DROP_PCT": 10.0, "SIM_GUST_STD": 0.5, "SIM_LOAD_MASS": 0.12}
 FENCE_M = 0.3
 STOP_ROTORS, LAND = 4.0, 5.0  # GF_ACTION
@@ -38,7 +40,7 @@ def flown(name: str, conditions: Conditions) -> tuple[Flown, NDArray[np.float64]
     def watch(_: Onboard, simulator: HilSimulator) -> bool:
         core = simulator.core
         p = core.state
-        real[core.tick_count] = (*p.x_load, *p.x_quad, *p.quat_wxyz, *p.rotor_force)
+        real[core.tick_count] = (*p.x_load, *p.x_quad, *p.quat_wxyz, *core.rotor_force)
         return True
 
     outcome = fly_with_wire(mission, conditions, NoLog(), watch)
@@ -55,6 +57,34 @@ def flown(name: str, conditions: Conditions) -> tuple[Flown, NDArray[np.float64]
 @pytest.mark.parametrize("law", [THESIS, LQR, PLUMBLINE])
 def test_same_bits_with_each_law(short: str, law: float) -> None:
     flown(short, Conditions(sensors="lab", seed=1, settings={"CTL_LAW": law}))
+
+
+@pytest.mark.parametrize("law", ["load_pid:LoadPid", "geometric:Geometric"])
+def test_same_bits_with_a_law_of_ones_own(short: str, law: str) -> None:
+    found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN}, own=Own(f"plumbline.examples.{law}")))
+    assert found.outcome == "completed"
+
+
+@pytest.mark.parametrize("law", ["", "plumbline.examples.geometric:Geometric"])
+def test_same_bits_with_an_estimator_of_ones_own(short: str, law: str) -> None:
+    own = Own(law, estimator="plumbline.examples.luenberger:Luenberger")
+    found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN if law else PLUMBLINE}, own=own))
+    assert found.outcome == "completed"
+
+
+class Failing:
+    """Fails in flight."""
+
+    def load_position(self, memory: None, now: Now) -> tuple[None, Asked]:
+        b = now.believed
+        up = 1.0 - now.state.x_load[2] - now.state.v_load[2] if now.time_s < 5.0 else 1.0 / 0.0
+        return None, force((0.0, 0.0, (b.quad_mass + b.load_mass) * (b.gravity + up)))
+
+
+def test_same_bits_with_a_law_that_fails(short: str) -> None:
+    found, _ = flown(short, Conditions(settings={"CTL_LAW": OWN}, own=Own(f"{__file__}:Failing")))
+    assert found.outcome == "diverged"
+    assert found.reason.startswith("Law Failing failed: ZeroDivisionError: float division by zero")
 
 
 def test_same_bits_under_rough_conditions(short: str) -> None:
@@ -78,6 +108,15 @@ def test_same_end_of_a_flight_that_is_lost(short: str) -> None:
 def test_same_bits_with_receiver_and_camera(short: str) -> None:
     gust = {"SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 12.0, "SIM_GUST_FOR_S": 1.0}
     flown(short, Conditions(sensors="rtk", seed=1, settings={"CTL_LAW": PLUMBLINE, **gust}))
+
+
+def test_same_bits_with_readings_that_overtake_each_other_and_are_hidden(short: str) -> None:
+    flown(short, Conditions(sensors="lab-real", seed=1, settings={"CTL_LAW": PLUMBLINE}))
+
+
+def test_same_bits_with_fixes_that_float_and_are_lost(short: str) -> None:
+    often = {"SIM_GPS_FLT": 20.0, "SIM_GPS_FLT_S": 1.0, "SIM_GPS_LOST": 10.0, "SIM_GPS_LOST_S": 0.3}
+    flown(short, Conditions(sensors="field", seed=1, settings={"CTL_LAW": PLUMBLINE, **often}))
 
 
 @pytest.mark.parametrize("sensors", ["lab", "rtk"])

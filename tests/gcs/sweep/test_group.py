@@ -31,11 +31,15 @@ def as_needed(_: Iterable[Part]) -> None:
 
 
 def both_ways(
-    name: str, settings: Mapping[str, float], seeds: Sequence[int], sensors: str = "lab"
+    name: str,
+    settings: Mapping[str, float],
+    seeds: Sequence[int],
+    sensors: str = "lab",
+    vehicle: str = "bebop",
 ) -> tuple[list[Flown], float]:
     """Fly the seeds alone and together; what the flights found, and the share of ticks flown in lanes."""
     mission = load_mission(name)
-    conditions = Conditions(sensors=sensors, settings=settings)
+    conditions = Conditions(vehicle, sensors, settings=settings)
     start = boarding(mission, conditions)
     alone = [fly(mission, replace(conditions, seed=seed), start) for seed in seeds]
     flights = [SweptFlight(cell_of(mission, conditions), seed, start) for seed in seeds]
@@ -58,7 +62,7 @@ def test_same_bits_with_fewer_than_eight(short: str) -> None:
 
 
 def test_same_bits_where_flights_are_lost_one_by_one(short: str) -> None:
-    flown, share = both_ways(short, {"CTL_LAW": PLUMBLINE, "SIM_NOISE_SCALE": 20.0}, EIGHT)
+    flown, share = both_ways(short, {"CTL_LAW": PLUMBLINE, "SIM_NOISE_SCALE": 30.0}, EIGHT)
     assert {one.outcome for one in flown} == {"diverged"}
     assert len({one.flight_s for one in flown}) > 4
     assert share > 0.05
@@ -79,6 +83,38 @@ def test_same_bits_with_receiver_and_camera(short: str) -> None:
     both_ways(short, {"CTL_LAW": PLUMBLINE}, EIGHT, "rtk")
 
 
+def test_same_bits_with_vibration_and_errors_that_last(short: str) -> None:
+    tracked = {"SIM_TRK_ERR_M": 0.002, "SIM_TRK_CAL_M": 0.002, "SIM_SENS_OFS_MS": 1.0}
+    shaken = {"SIM_VIB_ACC": 1.0, "SIM_VIB_GYR": 0.02, "SIM_VIB_BROAD": 0.2, "SIM_IMU_LPF_HZ": 98.0}
+    _, share = both_ways(short, {"CTL_LAW": PLUMBLINE, **tracked, **shaken}, EIGHT)
+    assert share > 0.3
+
+
+def test_same_bits_with_multipath_and_motor_currents(short: str) -> None:
+    _, share = both_ways(
+        short, {"CTL_LAW": PLUMBLINE, "SIM_GPS_MP_M": 0.02, "SIM_MAG_MOT": 0.02}, EIGHT, "rtk"
+    )
+    assert share > 0.1
+
+
+def test_same_bits_with_drag_wake_battery_and_a_cable_beside_the_centre(short: str) -> None:
+    flown, share = both_ways(short, {"CTL_LAW": PLUMBLINE}, EIGHT, vehicle="bebop-real")
+    assert {one.outcome for one in flown} == {"completed"}
+    assert share > 0.5
+
+
+def test_an_attachment_that_is_told_is_flown_better(short: str) -> None:
+    beside = {"X": 0.02, "Y": -0.01, "Z": -0.02}
+    offset = {f"SIM_ATT_{axis}": place for axis, place in beside.items()}
+    known = {f"VEH_ATT_{axis}": place for axis, place in beside.items()}
+
+    def error(settings: Mapping[str, float]) -> float:
+        mission, conditions = load_mission(short), Conditions(settings=settings)
+        return fly(mission, conditions, boarding(mission, conditions)).load_error_max_m
+
+    assert error({**offset, **known}) < 0.8 * error(offset)
+
+
 def test_a_load_that_is_released_is_flown_alone(delivery: str) -> None:
     flown, share = both_ways(delivery, {"CTL_LAW": PLUMBLINE}, range(1, 4))
     assert {one.outcome for one in flown} == {"completed"}
@@ -97,6 +133,14 @@ def test_readings_that_get_lost_do_not_suit(short: str) -> None:
     start = boarding(mission, Conditions(settings={"CTL_LAW": PLUMBLINE}))
     assert suits(SweptFlight(cell_of(mission, Conditions()), 1, start))
     assert not suits(SweptFlight(cell_of(mission, lossy), 1, start))
+    for name, sensors in (
+        ("SIM_SENS_JIT_MS", "lab"),
+        ("SIM_OCC_LOAD", "lab"),
+        ("SIM_GPS_FLT", "rtk"),
+        ("SIM_GPS_LOST", "rtk"),
+    ):
+        late = Conditions(sensors=sensors, settings={"CTL_LAW": PLUMBLINE, name: 3.0})
+        assert not suits(SweptFlight(cell_of(mission, late), 1, start)), name
 
 
 def test_a_sweep_finds_the_same_with_lanes_and_without(short: str) -> None:

@@ -28,3 +28,10 @@ def test_what_the_linear_loop_does_not_know_has_no_limit() -> None:
 def test_a_gain_of_no_damping_is_no_place_to_be() -> None:
     plan = SweepPlan("hover", "bebop", "lab", ("thesis",), (1,), (), (("NGC_KOMEGA", 0.0),))
     assert linear_range(plan, "thesis", "SIM_ACT_DELAY_MS", 0.0, (0.0, 40.0)) == "nowhere"
+
+
+def test_parameters_of_an_estimator_of_ones_own_are_none_of_the_linear_loop() -> None:
+    estimator = "plumbline.examples.luenberger:Luenberger"
+    plan = SweepPlan("hover", "bebop", "lab", ("thesis",), (1,), (), (("OBS_W_QUAD", 12.0),), 0, estimator)
+    assert linear_range(plan, "thesis", "OBS_W_LOAD", 25.0, (15.0, 40.0)) == ""
+    assert linear_range(plan, "thesis", "SIM_ACT_DELAY_MS", 0.0, (0.0, 5.0)) == "0 … > 5"

@@ -152,7 +152,7 @@ def test_a_slider_sets_its_parameter_and_a_push_ends_with_its_trigger(watched: W
         ("push", {"north": 1000, "east": 0, "seconds": 1}, "must be -30 ... 30"),
         ("goto", {"place": [1, 2]}, "must be [north, east, down]"),
         ("goto", {"place": [1, None, 3]}, "must be a number"),
-        ("fail", {"rotor": 9}, "must be 1 ... 4"),
+        ("fail", {"rotor": 15}, "must be 1 ... 14"),
     ],
 )
 def test_what_is_no_action_is_refused_with_a_reason_and_not_sent(
@@ -324,3 +324,25 @@ def test_the_error_of_the_estimator_is_that_of_one_time() -> None:
     (state,) = station.state(0)["vehicles"]
     assert state["estimator_error"] == pytest.approx(0.003, abs=1e-4)
     assert not math.isnan(state["tension"])
+
+
+def test_the_truth_is_shown_of_the_run_of_the_world_in_which_a_vehicle_says_it_flies(world: Any) -> None:
+    watched = Watched(world)
+    station = watched.station
+    status = FrameWriter(1, 27).frame(mavlink.MAVLink_sim_status_message(5, 0.0, 250.0, 0, 0, 0, 0, 1, 1))
+    watched.run(1.0)
+
+    def shown() -> bool:
+        return station.vehicles[1].truth.message(mavlink.MAVLINK_MSG_ID_SIM_STATUS) is not None
+
+    station.receive_truth(status, run=3, alone=False)
+    assert not shown(), "which of several worlds it is, the vehicle has not said"
+    boot = mavlink.MAVLink_sim_boot_message(0, 7, [0.0] * 4, 0.0, 0, 0)
+    station.receive(FrameWriter(1, 25).frame(boot), 0)
+    station.receive_truth(status, run=3)
+    assert not shown()
+    asked = len(watched.commands(mavlink.MAV_CMD_REQUEST_MESSAGE))
+    watched.run(8.0)
+    assert len(watched.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)) > asked, "it may have begun anew"
+    station.receive_truth(status, run=7, alone=False)
+    assert shown()

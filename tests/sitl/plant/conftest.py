@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from sitl.plant.by_value import initial_state
 from sitl.plant.records import PlantState, Truth
-from sitl.plant.step import initial_state
 from sitl.vehicles.truth import load_truth
 
 Array = NDArray[np.float64]
@@ -43,13 +43,15 @@ def aloft() -> Callable[..., PlantState]:
         direction = np.array(q) / np.linalg.norm(q)
         rate = np.array(q_dot) - direction * (direction @ np.array(q_dot))
         x_load = np.array([0.0, 0.0, height])
+        held = np.array(truth.attachment)
+        beside = np.cross(np.array(fields.get("omega_body", CALM)), held)
         state = initial_state(truth)._replace(
             x_load=tuple(map(float, x_load)),
             v_load=v_load,
             q_cable=tuple(map(float, direction)),
             q_cable_dot=tuple(map(float, rate)),
-            x_quad=tuple(map(float, x_load - truth.cable_length * direction)),
-            v_quad=tuple(map(float, np.array(v_load) - truth.cable_length * rate)),
+            x_quad=tuple(map(float, x_load - truth.cable_length * direction - held)),
+            v_quad=tuple(map(float, np.array(v_load) - truth.cable_length * rate - beside)),
             taut=1.0,
             vehicle_on_ground=0.0,
             load_on_ground=0.0,

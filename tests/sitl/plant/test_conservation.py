@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sitl.plant.step import advance, advance_many
+from sitl.plant.by_value import advance, advance_many
 
 CALM = (0.0, 0.0, 0.0)
 OFF = (0.0, 0.0, 0.0, 0.0)

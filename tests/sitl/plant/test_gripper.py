@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from sitl.plant.by_value import advance, initial_state
 from sitl.plant.gripper import dropped, takes_hold, without_cable
-from sitl.plant.step import advance, initial_state
 
 CALM = (0.0, 0.0, 0.0)
 WIND = (3.0, -1.0, 0.5)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from autopilot.geometry.so3 import quat_exp
 from benchmarks import plant_convergence as convergence
-from sitl.plant.step import advance, advance_many, initial_state
+from sitl.plant.by_value import advance, advance_many, initial_state
 
 CALM = (0.0, 0.0, 0.0)
 OFF = (0.0, 0.0, 0.0, 0.0)

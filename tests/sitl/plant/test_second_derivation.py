@@ -1,7 +1,8 @@
-"""A random ten-second flight against a second derivation of the plant.
+"""Random flights against a second derivation of the plant.
 
 The second plant shares nothing with the first: Lagrange's equations, derived by sympy in minimal coordinates
 (position of the vehicle, two cable angles, three Euler angles), forces by virtual work, integrated by DOP853.
+The cable may be attached anywhere, and each hub may feel the air that it moves through.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from sitl.plant.step import advance_many
+from sitl.plant.by_value import advance_many
 
 # What DOP853 at rtol 1e-13 and the plant at 0.25 ms leave after ten seconds is 2e-9 (m, m/s, rad): the flight
 # is replayed without feedback, so an error in attitude grows with the square of time into position.
 # At the working step of 4 ms the plant's own error has its say, 256^2 times larger: measured 1e-4.
 AGREEMENT = {0.25e-3: 1e-8, 4e-3: 3e-4}
 HOLD = 20e-3  # s a command is held
-DURATION = 10.0  # s
+DURATIONS = {"plain": 10.0, "attached beside": 5.0, "in the air": 3.0}  # s
 WIND = (1.5, -0.8, 0.4)
 
 
@@ -32,8 +33,9 @@ def lagrangian():
     speeds = sp.symbols("s0:8")
     f1, f2, f3, f4 = forces = sp.symbols("f1:5")
     wind = sp.Matrix(sp.symbols("w0:3"))
-    names = "mQ mL L g Jx Jy Jz l c kQ1 kQ2 kS kL1 kL2"
-    mQ, mL, L, g, Jx, Jy, Jz, l, c, kQ1, kQ2, kS, kL1, kL2 = parameters = sp.symbols(names)  # noqa: E741
+    names = "mQ mL L g Jx Jy Jz l c kQ1 kQ2 kS kL1 kL2 rx ry rz h lag stiff"
+    parameters = sp.symbols(names)
+    mQ, mL, L, g, Jx, Jy, Jz, l, c, kQ1, kQ2, kS, kL1, kL2, rx, ry, rz, h, lag, stiff = parameters  # noqa: E741
     s, v = sp.Matrix(coordinates), sp.Matrix(speeds)
 
     def rate(expression):
@@ -41,8 +43,9 @@ def lagrangian():
 
     # singular only where the cable lies along north
     vehicle = sp.Matrix([x, y, z])
-    load = vehicle + L * sp.Matrix([sp.sin(a) * sp.cos(b), sp.sin(b), -sp.cos(a) * sp.cos(b)])
     R = sp.rot_ccw_axis3(yaw) * sp.rot_ccw_axis2(pitch) * sp.rot_ccw_axis1(roll)
+    down = sp.Matrix([sp.sin(a) * sp.cos(b), sp.sin(b), -sp.cos(a) * sp.cos(b)])
+    load = vehicle + R * sp.Matrix([rx, ry, rz]) + L * down
     R_dot = sum(
         (R.diff(angle) * speed for angle, speed in zip(coordinates, speeds, strict=True)), sp.zeros(3)
     )
@@ -64,6 +67,11 @@ def lagrangian():
     moment = sp.Matrix([l * (f4 - f2), l * (f1 - f3), c * (-f1 + f2 - f3 + f4)])
     moment -= kS * sp.sqrt(omega.dot(omega)) * omega
     virtual = v_vehicle.jacobian(v).T * push + v_load.jacobian(v).T * pull + omega.jacobian(v).T * moment
+    for thrust, x, y in ((f1, -l, 0), (f2, 0, -l), (f3, l, 0), (f4, 0, l)):
+        v_hub = rate(vehicle + R * sp.Matrix([x, y, h]))
+        u = R.T * (v_hub - wind)
+        virtual += v_hub.jacobian(v).T * R * sp.Matrix([-lag * thrust * u[0], -lag * thrust * u[1], 0])
+        virtual += omega.jacobian(v).T * sp.Matrix([stiff * u[1], -stiff * u[0], 0])
     momenta = sp.Matrix([kinetic]).jacobian(v).T
     mass = momenta.jacobian(v)
     force = virtual + sp.Matrix([kinetic - potential]).jacobian(s).T - momenta.jacobian(s) * v
@@ -78,9 +86,20 @@ def lagrangian():
     return accelerations
 
 
-@pytest.fixture(scope="module")
-def flight(bebop, aloft):
-    """Start and commands of a random flight: attitude and rates are held roughly, all else wanders."""
+def truth_of_flight(name, truth):
+    """The vehicle with what is looked at in this flight."""
+    if name == "plain":
+        return truth
+    truth = truth._replace(attachment=(0.02, -0.015, -0.04))
+    if name == "attached beside":
+        return truth
+    return truth._replace(air=truth.air._replace(rotor_drag=0.4, rotor_flap=0.01, blade_stiffness=0.3))
+
+
+@pytest.fixture(scope="module", params=DURATIONS)
+def flight(request, bebop, aloft):
+    """Truth, start and commands of a random flight: attitude and rates are held roughly, all else wanders."""
+    bebop = truth_of_flight(request.param, bebop)
     hover = 0.25 * (bebop.quad_mass + bebop.load_mass) * bebop.gravity
     start = aloft(
         bebop,
@@ -91,7 +110,7 @@ def flight(bebop, aloft):
     )
     rng = np.random.default_rng(11)
     state, commands = start, []
-    for _ in range(round(DURATION / HOLD)):
+    for _ in range(round(DURATIONS[request.param] / HOLD)):
         w, x, y, z = state.quat_wxyz
         roll, pitch, _ = Rotation.from_quat([x, y, z, w]).as_euler("xyz")
         p, q, r = state.omega_body
@@ -111,12 +130,12 @@ def flight(bebop, aloft):
         commands.append(command)
         state = advance_many(state, bebop, command, WIND, 1e-3, round(HOLD / 1e-3))
         assert state.taut == 1.0
-    return start, commands
+    return bebop, start, commands
 
 
-def test_random_flight(bebop, flight, lagrangian):
-    start, commands = flight
-    t = bebop
+def test_random_flight(flight, lagrangian):
+    t, start, commands = flight
+    air = t.air
     values = (
         t.quad_mass,
         t.load_mass,
@@ -130,6 +149,10 @@ def test_random_flight(bebop, flight, lagrangian):
         t.spin_drag,
         t.load_drag,
         t.load_drag_quadratic,
+        *t.attachment,
+        t.rotor_height,
+        air.rotor_drag / t.gravity + air.rotor_flap,
+        air.blade_stiffness * air.rotor_flap,
     )
     q, q_dot = start.q_cable, start.q_cable_dot
     angles = (math.atan2(q[0], -q[2]), math.asin(q[1]))
@@ -153,12 +176,13 @@ def test_random_flight(bebop, flight, lagrangian):
         a, b = y[3:5]
         direction = np.array([math.sin(a) * math.cos(b), math.sin(b), -math.cos(a) * math.cos(b)])
         attitude = Rotation.from_euler("xyz", y[5:8])
+        held = attitude.apply(t.attachment)
         for h in AGREEMENT:
             state = advance_many(states[h], t, command, WIND, h, round(HOLD / h))
             w, qx, qy, qz = state.quat_wxyz
             errors = (
                 np.abs(np.array(state.x_quad) - y[:3]).max(),
-                np.abs(np.array(state.x_load) - y[:3] - t.cable_length * direction).max(),
+                np.abs(np.array(state.x_load) - y[:3] - held - t.cable_length * direction).max(),
                 np.abs(np.array(state.v_quad) - y[8:11]).max(),
                 (attitude.inv() * Rotation.from_quat([qx, qy, qz, w])).magnitude(),
             )

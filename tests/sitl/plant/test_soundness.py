@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.plant.step import advance, advance_many, initial_state
+from sitl.plant.by_value import advance, advance_many, initial_state
 
 CALM = (0.0, 0.0, 0.0)
 ROOT = Path(__file__).resolve().parents[3]
@@ -21,7 +21,8 @@ ROOT = Path(__file__).resolve().parents[3]
 # flies through every mode and prints the bits of where it arrives
 SCRIPT = """
 import json, sys
-from sitl.plant.step import advance, initial_state
+from sitl.plant import step
+from sitl.plant.by_value import advance, initial_state
 from sitl.vehicles.truth import load_truth
 
 def numbers(value):
@@ -52,7 +53,7 @@ thrown = above._replace(
     x_load=(0.0, 0.0, 9.0), x_quad=(0.0, 0.0, 9.7), v_load=(0.0, 0.0, 5.0), v_quad=(0.0, 0.0, 5.0)
 )
 fly(fly(thrown, 0.0, 40), 1.9, 40)
-json.dump({"jit": hasattr(advance, "py_func"), "modes": sorted(seen), "bits": lines}, sys.stdout)
+json.dump({"jit": hasattr(step.advance, "py_func"), "modes": sorted(seen), "bits": lines}, sys.stdout)
 """
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from sitl.plant.step import advance
+from sitl.plant.by_value import advance
 
 CALM = (0.0, 0.0, 0.0)
 

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
 
-from sitl.plant.step import advance, initial_state
+from sitl.plant.by_value import advance, initial_state
 from sitl.plant.winch import GREATEST_ACCEL, GREATEST_RATE, SHORTEST, later, reeling
 
 CALM = (0.0, 0.0, 0.0)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sitl.plant.step import advance_many
+from sitl.plant.by_value import advance_many
 from sitl.plant.wind import gust
 
 CALM = (0.0, 0.0, 0.0)

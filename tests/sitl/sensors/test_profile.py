@@ -23,13 +23,14 @@ attitude_noise_rad = 0.001
 
 
 def test_shipped_profiles() -> None:
-    assert PROFILES.names() == ("gps", "ideal", "lab", "rtk")
+    assert PROFILES.names() == ("field", "gps", "ideal", "lab", "lab-blind", "lab-real", "rtk", "rtk-blind")
     for name in PROFILES.names():
         profile = load_profile(name)
         assert profile.description
         # something must tell where the vehicle is and where the load is
         assert profile.mocap or profile.gnss
-        assert profile.load_tracker or profile.cable_sensor
+        sees = profile.load_tracker or profile.cable_sensor
+        assert bool(sees) == (not name.endswith("-blind"))
 
 
 def test_lab_is_what_it_is_called() -> None:
@@ -108,7 +109,8 @@ def test_unknown_name_lists_the_known() -> None:
     with pytest.raises(ProfileError) as error:
         load_profile("labb")
     assert str(error.value) == (
-        "unknown sensors 'labb'; did you mean lab? shipped: gps, ideal, lab, rtk; or the path of a file"
+        "unknown sensors 'labb'; did you mean lab? shipped: field, gps, ideal, lab, lab-blind, "
+        "lab-real, rtk, rtk-blind; or the path of a file"
     )
 
 

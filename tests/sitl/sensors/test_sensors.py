@@ -19,9 +19,13 @@ from sitl.sensors import (
     pose_tracker,
 )
 from sitl.sensors.noise import Drift, Noise
+from sitl.sensors.room import Room
 from sitl.vehicles.truth import load_truth
 
 NONE = Drift(0.0, 1.0, 0.0)
+UNDISTORTED = Room(0.0, 1.0)
+NOT = (0.0, 0.0, 0.0)
+GNSS = gnss.GnssConfig(NOT, NOT, NOT, NONE, NOT, NONE, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1)
 SILENT = Noise(1, 1, 0, 0.0)
 DRAWS = 4000
 SIGMAS = 4.0  # suspicious distance of a statistic from its expectation, in its own standard errors
@@ -85,7 +89,8 @@ def test_imu_noise() -> None:
 
 
 def test_imu_is_cut_at_full_scale() -> None:
-    reading = silent(imu, IMU._replace(accel_range=1.0, gyro_range=0.15))
+    config = IMU._replace(accel_range=1.0, gyro_range=0.15)
+    reading = imu.cut(silent(imu, config), config)
     assert np.array_equal(reading.accel_body, np.clip(FORCE, -1.0, 1.0))
     assert reading.gyro_body == (0.1, -0.15, 0.15)
 
@@ -98,7 +103,7 @@ def test_imu_bias_stays_through_a_flight_and_differs_between_flights() -> None:
     assert abs(np.std(biases) - 0.3) < SIGMAS * 0.3 / 6000**0.5
 
 
-POSE = pose_tracker.PoseConfig(0.001, 0.0007, 0.01, 0.02, NONE)
+POSE = pose_tracker.PoseConfig(0.001, 0.0007, 0.01, 0.02, NONE, NONE, UNDISTORTED)
 
 
 def test_pose_tracker_without_noise() -> None:
@@ -126,7 +131,7 @@ def test_pose_tracker_says_what_it_does_not_measure() -> None:
 
 
 def test_load_tracker() -> None:
-    config = load_tracker.LoadConfig(0.002, 0.03, NONE)
+    config = load_tracker.LoadConfig(0.002, 0.03, NONE, NONE, UNDISTORTED)
     reading = silent(load_tracker, config)
     assert (reading.position, reading.velocity) == (STATE.x_load, STATE.v_load)
     got = readings(load_tracker, config)
@@ -177,7 +182,9 @@ def test_cable_sensor_survives_a_load_at_the_vehicle() -> None:
 
 def test_gnss() -> None:
     still = Drift(1.0, 1.0, 0.0)
-    config = gnss.GnssConfig((0.2, 0.2, 0.4), (0.0, 0.0, 0.0), (0.05, 0.05, 0.1), still)
+    config = GNSS._replace(
+        position_noise=(0.2, 0.2, 0.4), velocity_noise=(0.05, 0.05, 0.1), correlation=still
+    )
     reading = silent(gnss, config)
     assert (reading.position, reading.velocity) == (STATE.x_quad, STATE.v_quad)
     got = readings(gnss, config)
@@ -186,7 +193,7 @@ def test_gnss() -> None:
 
 
 def test_gnss_correlated_error_is_scaled_per_axis() -> None:
-    config = gnss.GnssConfig((0.0,) * 3, (1.5, 1.5, 2.5), (0.0,) * 3, Drift(1.0, 1.0, 0.0))
+    config = GNSS._replace(position_error=(1.5, 1.5, 2.5), correlation=Drift(1.0, 1.0, 0.0))
     state = gnss.start(config, Noise(5, 1, 0, 1.0))
     reading, _ = gnss.sample(STATE, state, config, Noise(5, 1, 0, 1.0))
     expected = np.add(STATE.x_quad, np.multiply((1.5, 1.5, 2.5), state.error))

@@ -7,9 +7,9 @@ import math
 import pytest
 
 from autopilot.wire.parameter_table import ParameterError
-from sitl.plant.records import Truth
+from sitl.plant.records import Air, Drive, Truth
 from sitl.vehicles.sim_parameters import apply, sim_parameters
-from sitl.vehicles.truth import KEYS
+from sitl.vehicles.truth import AIR_KEYS, DRIVE_KEYS, KEYS, load_truth
 
 
 def test_bebop_is_table_4_1(bebop):
@@ -83,6 +83,52 @@ def test_parameter_out_of_range(bebop):
 
 
 def test_every_number_of_the_plant_is_one_key_of_the_file():
-    assert set(Truth._fields) - KEYS.keys() == Truth._field_defaults.keys()
-    assert len(set(KEYS.values())) == len(KEYS)
+    never_told = {"air", "drive", "chain", "supply", "reel_rate", "reel_accel"}
+    assert set(Truth._fields) - KEYS.keys() == never_told
+    assert (AIR_KEYS.keys(), DRIVE_KEYS.keys()) == (set(Air._fields), set(Drive._fields))
+    keys = [*KEYS.values(), *AIR_KEYS.values(), *DRIVE_KEYS.values()]
+    assert len(set(keys)) == len(keys)
     assert KEYS["quad_drag"] == "quad_drag_n_s_m"  # and not the quadratic one
+
+
+EFFECTS = {
+    "SIM_ROTOR_DRAG": (0.4, lambda t: t.air.rotor_drag),
+    "SIM_ROTOR_FLAP": (0.02, lambda t: t.air.rotor_flap),
+    "SIM_BLADE_STIFF": (0.3, lambda t: t.air.blade_stiffness),
+    "SIM_GND_EFFECT": (1.5, lambda t: t.air.ground_effect),
+    "SIM_DOWNWASH": (0.5, lambda t: t.air.downwash),
+    "SIM_CABLE_DIAM": (2.0, lambda t: 1e3 * t.air.cable_diameter),
+    "SIM_ATT_X": (0.01, lambda t: t.attachment[0]),
+    "SIM_ATT_Y": (-0.02, lambda t: t.attachment[1]),
+    "SIM_ATT_Z": (-0.03, lambda t: t.attachment[2]),
+    "SIM_THR_CURVE": (0.8, lambda t: t.drive.thrust_curve),
+    "SIM_THR_KNOWN": (0.7, lambda t: t.drive.known_curve),
+    "SIM_ESC_STEPS": (500.0, lambda t: t.drive.esc_steps),
+    "SIM_ESC_RPM_CTL": (1.0, lambda t: t.drive.speed_controlled),
+    "SIM_BATTERY": (1.0, lambda t: t.drive.battery),
+    "SIM_BAT_CELLS": (6.0, lambda t: t.drive.cells),
+    "SIM_BAT_CAP": (2000.0, lambda t: t.drive.capacity_as / 3.6),
+    "SIM_BAT_R": (0.02, lambda t: t.drive.resistance),
+    "SIM_BAT_HOVER_W": (120.0, lambda t: t.drive.hover_w),
+    "SIM_BAT_CHARGE": (70.0, lambda t: 1e2 * t.drive.charge),
+}
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_each_effect_is_reached_by_one_parameter(bebop, name):
+    value, read = EFFECTS[name]
+    table = sim_parameters(bebop)
+    table.set(name, value)
+    changed = apply(bebop, table)
+    assert read(changed) == pytest.approx(value, rel=1e-12)
+    table.set(name, table.describe(name).default)
+    assert apply(bebop, table) == bebop
+
+
+@pytest.mark.parametrize("name", ["bebop-real", "heavy-real"])
+def test_parameters_start_from_what_a_real_vehicle_has(name):
+    """But for the rounding of capacity and charge."""
+    truth = load_truth(name)
+    table = sim_parameters(truth)
+    assert all(table[effect] == pytest.approx(read(truth)) for effect, (_, read) in EFFECTS.items())
+    assert all(table[effect] != 0.0 for effect in EFFECTS if effect != "SIM_ESC_RPM_CTL")

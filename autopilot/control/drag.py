@@ -1,0 +1,21 @@
+"""Drag of the vehicle in the air."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, norm, scale
+
+
+class Drag(NamedTuple):
+    """Drag of the vehicle, -(linear + quadratic |v|) v."""
+
+    linear: float  # N s/m
+    quadratic: float  # N s^2/m^2
+
+
+@kernel
+def air_force(v_quad: Vec3, drag: Drag) -> Vec3:
+    """D, N, world frame, of a vehicle at v_quad (m/s) in air at rest."""
+    return scale(-(drag.linear + drag.quadratic * norm(v_quad)), v_quad)

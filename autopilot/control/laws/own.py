@@ -1,0 +1,277 @@
+"""The law of one's own: it asks a function at an address what to do (`autopilot.control.law_desk`).
+
+The modes that the function's owner does not define, and all modes once what it asks for was no number, are
+flown by the law `plumbline`. Who asks for a force, an attitude or body rates gets them by the innermost loop
+of `plumbline`, which reckons with delay and lag of the rotors.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.control.actuators.disturbance_observer import Observed, lying, standing
+from autopilot.control.actuators.rotor_model import Actuation
+from autopilot.control.law_desk import (
+    FORCE,
+    RATES,
+    UNLINKED,
+    WRENCH,
+    Asked,
+    Believed,
+    Held,
+    Link,
+    Now,
+    ask,
+    is_sound,
+)
+from autopilot.control.laws import plumbline
+from autopilot.control.laws.interface import Kernels, Law
+from autopilot.control.load_attitude import thrust_along
+from autopilot.control.records import Cable, Command, Reference, State, Vehicle
+from autopilot.control.thesis_cascade import attitude_towards, with_errors
+from autopilot.geometry.addresses import call_at
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, column, cross, sub, times
+from autopilot.geometry.packed import Row
+from autopilot.vehicle.law_files import law_files
+from autopilot.wire.parameter_table import ParameterTable
+
+
+class OwnLaw(NamedTuple):
+    """Where its functions are, and what flies in their stead."""
+
+    link: Link
+    period: float  # s
+    vehicle: Vehicle
+    built_in: plumbline.PlumblineLaw
+
+
+class OwnMemory(NamedTuple):
+    """What the built-in law remembers, and for how long this mode was flown; its own memory lies with its
+    owner."""
+
+    ticks: int
+    built_in: plumbline.PlumblineMemory
+
+
+class OwnRows(NamedTuple):
+    """The law, packed."""
+
+    constants: Row
+    memory: Row
+
+
+def build(table: ParameterTable, vehicle: Vehicle) -> OwnLaw:
+    """The built-in law; its functions are linked where it is flown."""
+    return OwnLaw(UNLINKED, 1.0 / table["CTL_RATE_HZ"], vehicle, plumbline.build(table, vehicle))
+
+
+@kernel
+def start(law: OwnLaw, state: State, x_d: Vec3, v_d: Vec3) -> OwnMemory:
+    """Memory of a mode that begins now."""
+    return OwnMemory(0, plumbline.start(law.built_in, state, x_d, v_d))
+
+
+@kernel
+def _staying(x: Vec3, b1_d: Vec3) -> Reference:
+    """A reference that rests."""
+    return Reference((x, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), b1_d, ZERO, ZERO)
+
+
+@kernel
+def _believed(law: OwnLaw, state: State, actuation: Actuation, observed: Observed) -> Believed:
+    vehicle = law.vehicle
+    return Believed(
+        vehicle.quad_mass,
+        observed.load_mass,
+        vehicle.inertia,
+        vehicle.gravity,
+        observed.push,
+        actuation.thrust,
+        actuation.moment,
+        lying(observed, state),
+        standing(observed, vehicle),
+    )
+
+
+@kernel
+def _asked(law: OwnLaw, function: int, now: Now) -> Asked:
+    """What the function asks for; where that is no number, the alarm has been raised."""
+    asked = ask(function, law.link.desk, now)
+    if not is_sound(asked):
+        call_at(law.link.alarm, law.link.desk)
+    return asked
+
+
+@kernel
+def _obeyed(
+    law: OwnLaw, memory: OwnMemory, now: Now, asked: Asked, actuation: Actuation, observed: Observed
+) -> tuple[OwnMemory, Command]:
+    """The command that does what was asked for."""
+    state, built_in = now.state, memory.built_in
+    thrust, moment = asked.thrust, asked.vector
+    if asked.kind in (WRENCH, RATES):
+        if asked.kind == RATES:
+            inertia, gains = law.vehicle.inertia, law.built_in.other_modes.gains
+            braking = times(gains.k_Omega, sub(asked.vector, state.omega_body))
+            moment = add(braking, cross(state.omega_body, times(inertia, state.omega_body)))
+        command = Command(
+            thrust, moment, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, state.q_cable, state.R
+        )
+    else:
+        R_d = asked.attitude
+        if asked.kind == FORCE:
+            R_d = attitude_towards(asked.vector, now.reference.b1_d, state.R)
+            thrust = thrust_along(asked.vector, state.R)
+        built_in, command = plumbline.quad_attitude(
+            law.built_in, built_in, state, R_d, thrust, actuation, observed, now.cable
+        )
+    return OwnMemory(memory.ticks + 1, built_in), command
+
+
+@kernel
+def _tried(
+    law: OwnLaw,
+    function: int,
+    memory: OwnMemory,
+    state: State,
+    reference: Reference,
+    held: Held,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[bool, OwnMemory, Command]:
+    """Whether the function has asked for something that can be done, and the command for it."""
+    now = Now(
+        memory.ticks == 0,
+        memory.ticks * law.period,
+        law.period,
+        state,
+        reference,
+        held,
+        cable,
+        _believed(law, state, actuation, observed),
+    )
+    asked = _asked(law, function, now)
+    after, command = _obeyed(law, memory, now, asked, actuation, observed)
+    return is_sound(asked), after, command
+
+
+@kernel
+def load_position(
+    law: OwnLaw,
+    memory: OwnMemory,
+    state: State,
+    reference: Reference,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[OwnMemory, Command]:
+    """The load follows a reference."""
+    function, x_d, v_d = law.link.load_position, reference.jet[0], reference.jet[1]
+    if function != 0:
+        held = Held(state.q_cable, 0.0, state.R, 0.0)
+        sound, after, command = _tried(
+            law, function, memory, state, reference, held, actuation, observed, cable
+        )
+        if sound:
+            e_x, e_v = sub(state.x_load, x_d), sub(state.v_load, v_d)
+            return after, with_errors(command, e_x, e_v, ZERO, ZERO, 0.0, state.q_cable)
+        memory = start(law, state, x_d, v_d)
+    built_in, command = plumbline.load_position(
+        law.built_in, memory.built_in, state, reference, actuation, observed, cable
+    )
+    return OwnMemory(memory.ticks + 1, built_in), command
+
+
+@kernel
+def quad_position(
+    law: OwnLaw,
+    memory: OwnMemory,
+    state: State,
+    reference: Reference,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[OwnMemory, Command]:
+    """The vehicle follows a reference, nothing hanging on it."""
+    function, x_d, v_d = law.link.quad_position, reference.jet[0], reference.jet[1]
+    if function != 0:
+        held = Held(state.q_cable, 0.0, state.R, 0.0)
+        sound, after, command = _tried(
+            law, function, memory, state, reference, held, actuation, observed, cable
+        )
+        if sound:
+            e_x, e_v = sub(state.x_quad, x_d), sub(state.v_quad, v_d)
+            return after, with_errors(command, e_x, e_v, ZERO, ZERO, 0.0, state.q_cable)
+        memory = start(law, state, x_d, v_d)
+    built_in, command = plumbline.quad_position(
+        law.built_in, memory.built_in, state, reference, actuation, observed, cable
+    )
+    return OwnMemory(memory.ticks + 1, built_in), command
+
+
+@kernel
+def load_attitude(
+    law: OwnLaw,
+    memory: OwnMemory,
+    state: State,
+    q_d: Vec3,
+    b1_d: Vec3,
+    pull: float,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[OwnMemory, Command]:
+    """The cable's direction follows q_d under a given pull (N)."""
+    function = law.link.load_attitude
+    if function != 0:
+        held = Held(q_d, pull, state.R, 0.0)
+        sound, after, command = _tried(
+            law, function, memory, state, _staying(state.x_load, b1_d), held, actuation, observed, cable
+        )
+        if sound:
+            return after, command
+        memory = start(law, state, state.x_load, ZERO)
+    built_in, command = plumbline.load_attitude(
+        law.built_in, memory.built_in, state, q_d, b1_d, pull, actuation, observed, cable
+    )
+    return OwnMemory(memory.ticks + 1, built_in), command
+
+
+@kernel
+def quad_attitude(
+    law: OwnLaw,
+    memory: OwnMemory,
+    state: State,
+    R_d: Mat3,
+    thrust: float,
+    actuation: Actuation,
+    observed: Observed,
+    cable: Cable,
+) -> tuple[OwnMemory, Command]:
+    """The vehicle's attitude follows R_d under a given thrust (N)."""
+    function = law.link.quad_attitude
+    if function != 0:
+        held, reference = Held(state.q_cable, 0.0, R_d, thrust), _staying(state.x_quad, column(R_d, 0))
+        sound, after, command = _tried(
+            law, function, memory, state, reference, held, actuation, observed, cable
+        )
+        if sound:
+            return after, command
+        memory = start(law, state, state.x_load, ZERO)
+    built_in, command = plumbline.quad_attitude(
+        law.built_in, memory.built_in, state, R_d, thrust, actuation, observed, cable
+    )
+    return OwnMemory(memory.ticks + 1, built_in), command
+
+
+OWN = Law(
+    name="own",
+    number=len(law_files()),  # no law of the list: CTL_LAW has it where one was brought
+    constants=OwnLaw,
+    memory=OwnMemory,
+    rows=OwnRows,
+    build=build,
+    kernels=Kernels(start, load_position, quad_position, load_attitude, quad_attitude),
+)

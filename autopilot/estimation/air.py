@@ -1,0 +1,59 @@
+"""What the air does to the load: a wind that stays, and drag that follows the load's speed.
+
+The error state has what the pendulum lacks, d, as a walk. Drag is learned beside it: the least-squares fit
+of d to the load's velocity, of both what differs from their means of some seconds. With it d follows the
+speed at once.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from autopilot.estimation.covariance import kept
+from autopilot.estimation.records import AirEstimate, EstimatorTuning, LoadEstimate
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, dot
+
+DRAG_TIME_S = 0.15  # for which a change of drag goes on
+LEARNING_S = 4.0
+# drag is learned by motion faster than this, m/s, and is at most so much, 1/s
+SLOW, GREATEST_DRAG = 0.2, 2.0
+
+
+@kernel
+def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: EstimatorTuning) -> float:
+    """How fast what the air does to the load may change, m/s^2 per square root of a second.
+
+    As in gusts, and as drag does, c u^2, when the speed changes: by 2 c u times the acceleration, of a wind
+    that c u^2 tells of.
+    """
+    still, c = tuning.air_walk, tuning.load_drag
+    wind = sqrt(air.load[0] * air.load[0] + air.load[1] * air.load[1])
+    speed2 = c * c * dot(load.v_load, load.v_load) + c * wind
+    return sqrt(still * still + 4.0 * speed2 * dot(accel_quad, accel_quad) * DRAG_TIME_S)
+
+
+@kernel
+def _nearer(mean: tuple[float, float], to: tuple[float, float], share: float) -> tuple[float, float]:
+    return mean[0] + share * (to[0] - mean[0]), mean[1] + share * (to[1] - mean[1])
+
+
+@kernel
+def predict_air(
+    air: AirEstimate, before: LoadEstimate, load: LoadEstimate, tuning: EstimatorTuning, dt: float
+) -> AirEstimate:
+    """What the air does dt seconds on, `load` being that of then."""
+    calm, still = kept(tuning.air_std, tuning.air_walk, dt), kept(tuning.push_std, tuning.push_walk, dt)
+    pushed = (still * air.vehicle[0], still * air.vehicle[1])
+    d = (calm * air.load[0], calm * air.load[1])
+    if load.taut == 0.0 or before.taut == 0.0:
+        return AirEstimate(d, pushed, air.load_drag, air.mean_speed, air.mean_load, air.together, air.alone)
+    v, c = load.v_load, air.load_drag
+    d = (d[0] - c * (v[0] - before.v_load[0]), d[1] - c * (v[1] - before.v_load[1]))
+    share = dt / (LEARNING_S + dt)
+    mean_speed, mean_load = _nearer(air.mean_speed, (v[0], v[1]), share), _nearer(air.mean_load, d, share)
+    s0, s1 = v[0] - mean_speed[0], v[1] - mean_speed[1]
+    together = air.together + share * (s0 * (d[0] - mean_load[0]) + s1 * (d[1] - mean_load[1]) - air.together)
+    alone = air.alone + share * (s0 * s0 + s1 * s1 - air.alone)
+    drag = min(GREATEST_DRAG, max(0.0, -together / (alone + SLOW * SLOW)))
+    return AirEstimate(d, pushed, drag, mean_speed, mean_load, together, alone)

@@ -1,0 +1,298 @@
+"""What an estimator of one's own is given at a tick, and what it gives: records, and how they are filled.
+
+World ENU, body FLU, SI. Times are on the vehicle's clock; an estimate is of the instant that the inertial
+unit shows.
+"""
+
+from __future__ import annotations
+
+from math import inf, isfinite, isnan, nan
+from typing import Any, NamedTuple
+
+from autopilot.control.records import Cable, State
+from autopilot.estimation.inbox import (
+    DIRECTION,
+    FIELD,
+    FIX,
+    HEIGHT,
+    IMU,
+    KIND,
+    LOAD,
+    POSE,
+    READING,
+    SHOWS,
+    age_of,
+    direction_in,
+    fix_in,
+    is_sane,
+    load_in,
+    pose_in,
+    vector_in,
+)
+from autopilot.estimation.records import Array, EstimatorTuning, ImuReading
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import IDENTITY, ZERO, Mat3, Vec3, dot, norm
+from autopilot.geometry.packed import unpack, width, with_field
+from autopilot.geometry.so3 import rotation_from_quat
+from autopilot.vehicle.layout import MOST
+
+NEVER = -inf  # when a sensor was heard that never was
+UNTOLD: Vec3 = (nan, nan, nan)  # an acceleration that an estimate does not have
+UNIT_TOLERANCE = 0.02  # of the square of a length that must be 1
+
+Forces = tuple[  # of each rotor, N; zeros for those that there are not
+    float, float, float, float, float, float, float, float, float, float, float, float, float, float
+]
+NO_FORCES: Forces = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+assert len(NO_FORCES) == MOST
+
+
+class InertialSample(NamedTuple):
+    """The inertial unit's last sample."""
+
+    new: bool  # at this tick
+    time_s: float  # of the instant that it shows; -inf: there was none yet
+    gyro: Vec3  # rad/s, body
+    accel: Vec3  # specific force, m/s^2, body
+
+
+class PoseSample(NamedTuple):
+    """The pose tracker's last reading of the vehicle."""
+
+    new: bool
+    time_s: float
+    x_quad: Vec3  # m
+    R: Mat3  # body to world
+    v_quad: Vec3  # m/s
+    position_std: float  # m, as the tracker states it
+    attitude_std: float  # rad
+    velocity_std: float  # m/s; negative: velocity is not measured
+
+
+class LoadSample(NamedTuple):
+    """The load tracker's last reading."""
+
+    new: bool
+    time_s: float
+    x_load: Vec3  # m
+    v_load: Vec3  # m/s
+    position_std: float  # m
+    velocity_std: float  # m/s; negative: velocity is not measured
+
+
+class DirectionSample(NamedTuple):
+    """What the cable sensor (camera or encoder) saw last."""
+
+    new: bool
+    time_s: float
+    direction_body: Vec3  # unit vector from vehicle to load, body
+    direction_std: float  # rad
+
+
+class FixSample(NamedTuple):
+    """The satellite navigation receiver's last fix."""
+
+    new: bool
+    time_s: float
+    position: Vec3  # m, from home
+    velocity: Vec3  # m/s
+    horizontal_std: float  # m
+    vertical_std: float  # m
+    rtk: bool  # with carrier phase
+
+
+class FieldSample(NamedTuple):
+    """The magnetometer's last reading."""
+
+    new: bool
+    time_s: float
+    field_body: Vec3  # gauss, body
+
+
+class HeightSample(NamedTuple):
+    """The barometer's last reading."""
+
+    new: bool
+    time_s: float
+    height: float  # m above home
+
+
+class Driven(NamedTuple):
+    """What the rotors were asked for at the last tick, and what they are believed to give at this one."""
+
+    thrust: float  # N along the thrust axis, asked for
+    moment: Vec3  # N m, body, asked for
+    forces: Forces  # N, of each rotor, asked for
+    given_thrust: float  # N, believed, by delay and lag of the rotors
+    given_moment: Vec3  # N m
+
+
+class Sensed(NamedTuple):
+    """What an estimator is given at a tick."""
+
+    begins: bool  # the first tick, or the first after a time without any
+    time_s: float  # of the instant that the estimate is to be of
+    period_s: float  # since the last tick; 0 at the first
+    inertial: InertialSample
+    pose: PoseSample
+    load: LoadSample
+    direction: DirectionSample
+    fix: FixSample
+    field: FieldSample
+    height: HeightSample
+    driven: Driven
+    cable: Cable  # length, rate and acceleration, as the winch has it
+    taut: bool  # the built-in filter believes that the cable pulls
+    built_in: State  # its estimate
+
+
+class Estimate(NamedTuple):
+    """What an estimator gives."""
+
+    known: bool  # False: there is none yet
+    state: State  # a_quad may be UNTOLD
+    tension: float  # N of the cable; NaN: untold
+    horizontal_std: float  # m, of the vehicle's position, each axis; NaN: untold
+    vertical_std: float
+
+
+REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
+NO_ESTIMATE = Estimate(False, REST, nan, nan, nan)
+NOTHING_SENSED = Sensed(
+    True,
+    0.0,
+    0.0,
+    InertialSample(False, NEVER, ZERO, ZERO),
+    PoseSample(False, NEVER, ZERO, IDENTITY, ZERO, 0.0, 0.0, 0.0),
+    LoadSample(False, NEVER, ZERO, ZERO, 0.0, 0.0),
+    DirectionSample(False, NEVER, (0.0, 0.0, -1.0), 0.0),
+    FixSample(False, NEVER, ZERO, ZERO, 0.0, 0.0, False),
+    FieldSample(False, NEVER, ZERO),
+    HeightSample(False, NEVER, 0.0),
+    Driven(0.0, ZERO, NO_FORCES, 0.0, ZERO),
+    Cable(1.0),
+    False,
+    REST,
+)
+GIVEN = width(Sensed)  # where an estimate lies on the desk
+OWN = GIVEN + width(Estimate)  # what lies from here on is the estimator's
+
+
+@kernel
+def with_readings(sensed: Sensed, inbox: Array, count: int, now_us: int, tuning: EstimatorTuning) -> Sensed:
+    """What was sensed before, with the first `count` readings of the inbox.
+
+    Those that the built-in filter would drop are dropped here too; of two readings of one sensor at one tick
+    the later row stays.
+    """
+    time_s = now_us * 1e-6 - tuning.imu_age
+    inertial = with_field(sensed.inertial, "new", False)
+    pose, load = with_field(sensed.pose, "new", False), with_field(sensed.load, "new", False)
+    direction, fix = with_field(sensed.direction, "new", False), with_field(sensed.fix, "new", False)
+    field, height = with_field(sensed.field, "new", False), with_field(sensed.height, "new", False)
+    for i in range(count):
+        row, kind = inbox[i], inbox[i, KIND]
+        if kind == IMU:
+            imu = unpack(ImuReading, row, READING)
+            if row[SHOWS] == now_us and is_sane(imu):
+                inertial = InertialSample(True, time_s, imu.gyro, imu.accel)
+        elif kind == POSE:
+            age = age_of(row, now_us, tuning.imu_age)
+            ok, p = pose_in(row, age)
+            if ok:
+                R = rotation_from_quat(p.quat_wxyz)
+                std = (p.position_std, p.attitude_std, p.velocity_std)
+                pose = PoseSample(True, time_s - age, p.x_quad, R, p.v_quad, std[0], std[1], std[2])
+        elif kind == LOAD:
+            age = age_of(row, now_us, tuning.imu_age)
+            ok, at = load_in(row, age)
+            if ok:
+                load = LoadSample(True, time_s - age, at.x_load, at.v_load, at.position_std, at.velocity_std)
+        elif kind == DIRECTION:
+            age = age_of(row, now_us, tuning.imu_age)
+            ok, sight = direction_in(row, age)
+            if ok:
+                direction = DirectionSample(True, time_s - age, sight.direction_body, sight.direction_std)
+        elif kind == FIX:
+            age = age_of(row, now_us, tuning.imu_age)
+            ok, f = fix_in(row, age)
+            if ok:
+                std2 = (f.horizontal_std, f.vertical_std)
+                fix = FixSample(True, time_s - age, f.position, f.velocity, std2[0], std2[1], f.rtk != 0.0)
+        elif kind == FIELD:
+            gauss = vector_in(row)
+            size = norm(gauss)
+            if isfinite(size) and size > 0.0:
+                field = FieldSample(True, time_s - tuning.magnetic_age, gauss)
+        elif kind == HEIGHT and isfinite(row[READING]):
+            height = HeightSample(True, time_s - tuning.barometer_age, row[READING])
+    return Sensed(
+        sensed.begins,
+        time_s,
+        sensed.period_s,
+        inertial,
+        pose,
+        load,
+        direction,
+        fix,
+        field,
+        height,
+        sensed.driven,
+        sensed.cable,
+        sensed.taut,
+        sensed.built_in,
+    )
+
+
+# what is wrong with an estimate
+SOUND, NO_NUMBER, NO_ROTATION, NO_DIRECTION, FORGOTTEN = range(5)
+
+
+@kernel
+def _is_number(v: Vec3) -> bool:
+    return isfinite(v[0] + v[1] + v[2])
+
+
+@kernel
+def _is_unit(v: Vec3) -> bool:
+    return abs(dot(v, v) - 1.0) < UNIT_TOLERANCE
+
+
+@kernel
+def flaw(estimate: Estimate) -> int:
+    """What is wrong with an estimate that is known: SOUND if nothing is."""
+    s = estimate.state
+    numbers = _is_number(s.x_load) and _is_number(s.v_load) and _is_number(s.x_quad) and _is_number(s.v_quad)
+    numbers = numbers and _is_number(s.omega_body) and _is_number(s.q_cable_dot) and _is_number(s.q_cable)
+    told = not (isnan(s.a_quad[0]) and isnan(s.a_quad[1]) and isnan(s.a_quad[2]))
+    if not numbers or (told and not _is_number(s.a_quad)):
+        return NO_NUMBER
+    if not _is_unit(s.q_cable):
+        return NO_DIRECTION
+    a, b, c = s.R
+    level = abs(dot(a, b)) + abs(dot(b, c)) + abs(dot(c, a)) < UNIT_TOLERANCE
+    if not (_is_unit(a) and _is_unit(b) and _is_unit(c) and level):
+        return NO_ROTATION
+    return SOUND
+
+
+def told_of(estimate: Estimate, found: int) -> str:
+    """What is wrong with it, in words."""
+    state = estimate.state
+    if found == FORGOTTEN:
+        return "gives no estimate any more"
+    if found == NO_DIRECTION:
+        return f"gives q_cable = {_shown(state.q_cable)}, which is no unit vector"
+    if found == NO_ROTATION:
+        return f"gives R = {_shown(state.R)}, which is no rotation"
+    for name in ("x_load", "v_load", "q_cable", "q_cable_dot", "x_quad", "v_quad", "omega_body", "a_quad"):
+        vector = getattr(state, name)
+        if not _is_number(vector):
+            return f"gives {name} = {_shown(vector)}"
+    return "gives what is no number"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_shown, value))})"
+    return f"{value:.4g}"

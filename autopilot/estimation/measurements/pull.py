@@ -1,0 +1,108 @@
+"""Correction by what the load does to the vehicle, where no sensor ever saw the load.
+
+What moves the vehicle besides weight, rotors and air is the pull of the cable,
+
+    m_Q (R (a - bias) - D/m_Q - p) - f R e_3 = T q,
+
+with D the believed drag and p, which is estimated, what the air does beyond it. It points along the cable,
+its size T is taken as it is. A wind on the vehicle feigns a slant of the cable; it is told from one by the
+pendulum, which knows how the cable must swing, and by what it was while nothing pulled.
+"""
+
+from __future__ import annotations
+
+from autopilot.control.drag import air_force
+from autopilot.estimation.correction import enter_attitude, enter_direction, heard, inject, look_back
+from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
+from autopilot.estimation.records import (
+    ACCEL_BIAS,
+    CAMERA,
+    NOBODY,
+    PULL,
+    PUSH,
+    SIZE,
+    EstimatorState,
+    EstimatorTuning,
+    History,
+    LoadEstimate,
+)
+from autopilot.estimation.vibration import accel_noise
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, apply, apply_transposed, axpy, column, cross, dot, scale, sub
+from autopilot.geometry.so3 import rotation_from_quat
+
+FIRM, LOOSE = (
+    0.3,
+    0.05,
+)  # of the load's weight: a cable that pulls so much tells its direction; so little, none
+HIGH = 0.2  # of the cable's length over the load: the vehicle is off the ground
+SLANT_STD = 0.005  # rad, of the rotors' force from the body's axis
+
+
+@kernel
+def unseen(load: LoadEstimate) -> bool:
+    """Whether no sensor has ever seen the load."""
+    return load.source == CAMERA and load.age_s == float("inf")
+
+
+@kernel
+def pulling(state: EstimatorState, tuning: EstimatorTuning, thrust: float) -> Vec3:
+    """What the cable does to the vehicle, N, world, by the last sample of the accelerometer."""
+    vehicle, push = state.vehicle, state.air.vehicle
+    R = rotation_from_quat(vehicle.quat_wxyz)
+    a = apply(R, sub(state.last_imu.accel, vehicle.accel_bias))
+    known = axpy(thrust, column(R, 2), air_force(vehicle.v_quad, tuning.drag))
+    return sub(scale(tuning.quad_mass, (a[0] - push[0], a[1] - push[1], a[2])), known)
+
+
+@kernel
+def correct_pull(
+    state: EstimatorState, history: History, tuning: EstimatorTuning, thrust: float
+) -> EstimatorState:
+    """The state after a prediction; `thrust` (N) is what the rotors are believed to give.
+
+    While the cable is slack what is left is the wind alone; while it comes taut or slack, neither is told.
+    """
+    load = state.load
+    if state.vehicle.source == NOBODY or not unseen(load):
+        return state
+    state = heard(state, 0.0, SIZE)
+    weight = tuning.load_mass * tuning.gravity
+    taut = load.taut > 0.0
+    if taut:
+        told = load.pull > FIRM * weight
+    else:
+        over = state.vehicle.x_quad[2] - load.x_load[2]
+        told = abs(load.pull) < LOOSE * weight and over > HIGH * tuning.cable_length
+    if not told:
+        return state
+    n = state.size
+    past = look_back(state, history, tuning, 0.0)
+    r = pulling(state, tuning, thrust)
+    # slack: what is left as an acceleration along east and north; taut: the direction of the pull
+    by = 1.0 / dot(r, past.q_cable) if taut else 1.0 / tuning.quad_mass
+    if not by > 0.0:
+        return state
+    share, slant = tuning.quad_mass * by, SLANT_STD * thrust * by
+    variance = share * share * accel_noise(state.vibration, tuning) + slant * slant
+    for i in range(2):
+        axis = (1.0 - i, float(i), 0.0)
+        if taut:
+            axis = past.across if i == 0 else past.along
+        scalar(history, i, by * dot(r, axis), variance)
+        enter_attitude(history, i, past, scale(by, cross(axis, r)))
+        if taut:
+            enter_direction(history, i, past, 1.0 if i == 0 else 0.0, 0.0 if i == 0 else 1.0)
+        about = apply_transposed(past.R, axis)
+        for j in range(3):
+            enter(history, i, ACCEL_BIAS + j, share * about[j])
+        enter(history, i, PUSH, share * axis[0])
+        enter(history, i, PUSH + 1, share * axis[1])
+    gather(history, 0, 2, n)
+    if not farness(history, 2) <= 2.0 * tuning.gate_sigma * tuning.gate_sigma:
+        return state
+    begin(history)
+    nis = absorb(history, 2, n)
+    history.consistency[PULL, 0] += 1.0
+    history.consistency[PULL, 1] += nis
+    return inject(state, history)

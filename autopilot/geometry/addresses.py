@@ -1,0 +1,56 @@
+"""Numbers and functions at addresses: how machine code calls what was compiled, or written, apart from it.
+
+`numbers_at(address, size)` are the numbers (float64) at an address, as an array that nobody owns;
+`call_at(function, address)` calls the C function `void f(void *)` at an address with another address. Both
+work in kernels, and where nothing is compiled in Python.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
+
+_FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
+
+
+def _numbers_in_python(address: int, size: int) -> Any:
+    return np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
+
+
+def _call_in_python(function: int, address: int) -> None:
+    _FUNCTION(function)(address)
+
+
+def _numbers(context: Any, address: Any, size: Any) -> Any:
+    kind = types.Array(types.float64, 1, "C")
+
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(kind)(context, builder)
+        wide = context.get_constant(types.intp, 8)
+        data = builder.inttoptr(arguments[0], array.data.type)
+        populate_array(array, data, (arguments[1],), (wide,), wide, None)
+        return array._getvalue()
+
+    return kind(types.int64, types.int64), lower
+
+
+def _call(context: Any, function: Any, address: Any) -> Any:
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t])
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        builder.call(function, [builder.inttoptr(arguments[1], cgutils.voidptr_t)])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64), lower
+
+
+numbers_at: Any = _numbers_in_python if numba.config.DISABLE_JIT else intrinsic(_numbers)
+call_at: Any = _call_in_python if numba.config.DISABLE_JIT else intrinsic(_call)

@@ -1,0 +1,77 @@
+"""What a law may ask for: how it is said in Python, and in compiled methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+
+from autopilot.control.law_desk import ATTITUDE, FORCE, RATES, WRENCH, Asked
+from autopilot.geometry.compiler import INLINED
+from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
+
+
+def wrench(thrust: float, moment: Sequence[float]) -> Asked:
+    """Thrust (N) along the body's upward axis and moment (N m, body), as they go to the mixer."""
+    return Asked(WRENCH, float(thrust), _vector(moment, "the moment"), IDENTITY)
+
+
+def force(F: Sequence[float]) -> Asked:
+    """A force of the rotors (N, world): the built-in attitude loop turns the thrust axis to it, the nose as
+    the reference says."""
+    return Asked(FORCE, 0.0, _vector(F, "the force"), IDENTITY)
+
+
+def attitude(R_d: Sequence[Sequence[float]], thrust: float) -> Asked:
+    """An attitude (rows of the matrix from body to world), which the built-in loop holds, and a thrust
+    (N)."""
+    if len(R_d) != 3:
+        raise ValueError(f"the attitude has {len(R_d)} rows; must be 3 rows of 3 numbers")
+    first, second, third = (_vector(row, "a row of the attitude") for row in R_d)
+    return Asked(ATTITUDE, float(thrust), ZERO, (first, second, third))
+
+
+def rates(thrust: float, omega_d: Sequence[float]) -> Asked:
+    """Thrust (N) and body rate (rad/s, body), which the built-in loop holds."""
+    return Asked(RATES, float(thrust), _vector(omega_d, "the rate"), IDENTITY)
+
+
+def _vector(numbers: Sequence[float], what: str) -> Vec3:
+    if np.shape(numbers) != (3,):
+        shape = " x ".join(map(str, np.shape(numbers))) or "1"
+        raise ValueError(f"{what} has {shape} numbers; must be 3")
+    return (float(numbers[0]), float(numbers[1]), float(numbers[2]))
+
+
+@overload(wrench, jit_options=INLINED)
+def _wrench(thrust: Any, moment: Any) -> Any:
+    def made(thrust: Any, moment: Any) -> Any:
+        return Asked(WRENCH, thrust, moment, IDENTITY)
+
+    return made
+
+
+@overload(force, jit_options=INLINED)
+def _force(F: Any) -> Any:
+    def made(F: Any) -> Any:
+        return Asked(FORCE, 0.0, F, IDENTITY)
+
+    return made
+
+
+@overload(attitude, jit_options=INLINED)
+def _attitude(R_d: Any, thrust: Any) -> Any:
+    def made(R_d: Any, thrust: Any) -> Any:
+        return Asked(ATTITUDE, thrust, ZERO, R_d)
+
+    return made
+
+
+@overload(rates, jit_options=INLINED)
+def _rates(thrust: Any, omega_d: Any) -> Any:
+    def made(thrust: Any, omega_d: Any) -> Any:
+        return Asked(RATES, thrust, omega_d, IDENTITY)
+
+    return made

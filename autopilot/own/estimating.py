@@ -1,0 +1,114 @@
+"""What an estimator gives: how it is said in Python, and in compiled methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+
+from autopilot.control.records import State
+from autopilot.estimation.desk import NO_ESTIMATE, UNTOLD, Estimate
+from autopilot.geometry.compiler import INLINED
+from autopilot.geometry.linear import Mat3, Vec3
+
+Numbers = Sequence[float] | np.ndarray[Any, Any]
+
+
+def estimated(
+    x_load: Numbers,
+    v_load: Numbers,
+    q_cable: Numbers,
+    q_cable_dot: Numbers,
+    x_quad: Numbers,
+    v_quad: Numbers,
+    R: Sequence[Numbers] | np.ndarray[Any, Any],
+    omega_body: Numbers,
+    a_quad: Numbers = UNTOLD,
+    tension: float = nan,
+    horizontal_std: float = nan,
+    vertical_std: float = nan,
+) -> Estimate:
+    """An estimate: what laws are given as `now.state`, in its order, units and frames.
+
+    What may be left out: `a_quad` (m/s^2; then the built-in filter's is used), `tension` of the cable (N) and
+    the standard deviations of the vehicle's position (m, each axis), which are told to ground stations.
+    """
+    state = State(
+        _vector(x_load, "x_load"),
+        _vector(v_load, "v_load"),
+        _vector(q_cable, "q_cable"),
+        _vector(q_cable_dot, "q_cable_dot"),
+        _vector(x_quad, "x_quad"),
+        _vector(v_quad, "v_quad"),
+        _matrix(R),
+        _vector(omega_body, "omega_body"),
+        _vector(a_quad, "a_quad"),
+    )
+    return Estimate(True, state, float(tension), float(horizontal_std), float(vertical_std))
+
+
+def no_estimate() -> Estimate:
+    """Nothing is known yet: until the first estimate the built-in filter's is used, and the vehicle is not
+    armed."""
+    return NO_ESTIMATE
+
+
+def _vector(numbers: Numbers, what: str) -> Vec3:
+    if np.shape(numbers) != (3,):
+        shape = " x ".join(map(str, np.shape(numbers))) or "1"
+        raise ValueError(f"{what} has {shape} numbers; must be 3")
+    return (float(numbers[0]), float(numbers[1]), float(numbers[2]))
+
+
+def _matrix(rows: Any) -> Mat3:
+    if np.shape(rows) != (3, 3):
+        shape = " x ".join(map(str, np.shape(rows))) or "1"
+        raise ValueError(f"R has {shape} numbers; must be 3 x 3")
+    first, second, third = (_vector(row, "a row of R") for row in rows)
+    return (first, second, third)
+
+
+@overload(estimated, jit_options=INLINED)
+def _estimated(
+    x_load: Any,
+    v_load: Any,
+    q_cable: Any,
+    q_cable_dot: Any,
+    x_quad: Any,
+    v_quad: Any,
+    R: Any,
+    omega_body: Any,
+    a_quad: Any = UNTOLD,
+    tension: Any = nan,
+    horizontal_std: Any = nan,
+    vertical_std: Any = nan,
+) -> Any:
+    def made(
+        x_load: Any,
+        v_load: Any,
+        q_cable: Any,
+        q_cable_dot: Any,
+        x_quad: Any,
+        v_quad: Any,
+        R: Any,
+        omega_body: Any,
+        a_quad: Any = UNTOLD,
+        tension: Any = nan,
+        horizontal_std: Any = nan,
+        vertical_std: Any = nan,
+    ) -> Any:
+        state = State(x_load, v_load, q_cable, q_cable_dot, x_quad, v_quad, R, omega_body, a_quad)
+        return Estimate(True, state, tension, horizontal_std, vertical_std)
+
+    return made
+
+
+@overload(no_estimate, jit_options=INLINED)
+def _no_estimate() -> Any:
+    def made() -> Any:
+        return NO_ESTIMATE
+
+    return made

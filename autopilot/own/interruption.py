@@ -1,0 +1,36 @@
+"""Tells an exception that comes from outside, as Ctrl-C, from one of the code that it interrupts."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from opcode import opmap
+from types import FrameType
+
+_RAISE = opmap["RAISE_VARARGS"]  # the statement `raise`
+
+
+def is_interruption(error: BaseException) -> bool:
+    """Whether nobody in the traceback of an error is to blame for it.
+
+    So it is with Python's own answer to Ctrl-C, which no statement raises, and with what a handler of signals
+    raises. A `SystemExit`, or a `KeyboardInterrupt` that the interrupted code raises itself, is its fault.
+    """
+    if isinstance(error, Exception):
+        return False
+    frames: list[FrameType] = []
+    last, at = error.__traceback__, -1
+    while last is not None:
+        frames.append(last.tb_frame)
+        at = last.tb_frame.f_code.co_code[last.tb_lasti]
+        last = last.tb_next
+    if any(_handles_signals(inner, outer) for outer, inner in pairwise(frames)):
+        return True
+    return isinstance(error, KeyboardInterrupt) and at != _RAISE
+
+
+def _handles_signals(inner: FrameType, outer: FrameType) -> bool:
+    """Whether the inner frame is that of a handler: it is given the frame that the signal interrupted."""
+    given = list(inner.f_locals.values())
+    for several in [one for one in given if isinstance(one, tuple)]:
+        given += several
+    return any(one is outer for one in given)

@@ -1,0 +1,183 @@
+"""A class that somebody has brought: found by its file, by its module, or by an entry point.
+
+my_law.py:MyLaw       the class of a file; `:MyLaw` may be left out where the file has one such class
+package.module:MyLaw  the class of a module
+my-law                an entry point, of the group that the caller names
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+from autopilot.own.interruption import is_interruption
+
+_OURS = Path(__file__).resolve().parents[1]
+_MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
+_LONGEST = 120  # characters of an error that are told
+
+
+class OwnError(ValueError):
+    """What was brought cannot be used; the text says where and why."""
+
+
+def found_class(
+    reference: str, group: str, suits: Callable[[type], bool], what: str, shipped: Sequence[str]
+) -> type:
+    """The class that a reference names. `suits` tells those that can be meant, `what` is their kind in words,
+    and `shipped` are the names of those that are there anyway.
+
+    OwnError if there is no such file, module, class or entry point, or if its module cannot be loaded.
+    """
+    place, _, name = reference.rpartition(":") if ":" in reference else (reference, "", "")
+    if place.endswith(".py"):
+        module, told = _of_file(place), place
+    elif ":" in reference:
+        module, told = _of_name(place), place
+    else:
+        return _of_entry_point(reference, group, what, shipped)
+    if not name:
+        own = [
+            one
+            for one in vars(module).values()
+            if isinstance(one, type) and one.__module__ == module.__name__ and suits(one)
+        ]
+        if len(own) == 1:
+            return own[0]
+        named = f"has {', '.join(one.__name__ for one in own)}; name one" if own else f"has no {what}"
+        raise OwnError(f"{told}: {named}, as {told}:{own[0].__name__ if own else 'MyLaw'}")
+    found = getattr(module, name, None)
+    if not isinstance(found, type):
+        classes = [one.__name__ for one in vars(module).values() if isinstance(one, type) and suits(one)]
+        there = f"; there is {', '.join(classes)}" if classes else ""
+        raise OwnError(f"{told}: has no class {name}{there}")
+    return found
+
+
+def _of_file(place: str) -> ModuleType:
+    path = Path(place).expanduser()
+    if not path.is_file():
+        raise OwnError(f"{place}: no such file")
+    return _loaded(path.resolve(), place)
+
+
+def _loaded(path: Path, told: str) -> ModuleType:
+    # by its content: a file that was changed is another module. Records find what their annotations mean by
+    # the name
+    name = f"{path.stem}_{hashlib.sha256(str(path).encode() + path.read_bytes()).hexdigest()[:12]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise OwnError(f"{told}: is no Python file")
+    module = module_from_spec(spec)
+    sys.modules[name] = module
+    folder = str(path.parent)
+    sys.path.insert(0, folder)  # what lies beside it can be imported
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:
+        del sys.modules[name]
+        raise OwnError(f"{told}: {blamed(error, path)}") from error
+    finally:
+        if folder in sys.path:
+            sys.path.remove(folder)
+    return module
+
+
+def _of_name(place: str) -> ModuleType:
+    if not _MODULE.fullmatch(place):
+        raise OwnError(f"{place}: is no Python file (.py), and no name of a module")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.append(here)  # as a program that is run from here has it
+    try:
+        return import_module(place)
+    except BaseException as error:
+        raise OwnError(f"{place}: {blamed(error, None)}") from error
+
+
+def _of_entry_point(name: str, group: str, what: str, shipped: Sequence[str]) -> type:
+    there = {point.name: point for point in entry_points(group=group)}
+    if name not in there:
+        known = ", ".join((*shipped, *sorted(there)))
+        raise OwnError(f"{name!r}: no {what} of that name; must be {known}, or a file as my_law.py:MyLaw")
+    try:
+        found = there[name].load()
+    except BaseException as error:
+        raise OwnError(f"{name}: {blamed(error, None)}") from error
+    if not isinstance(found, type):
+        raise OwnError(f"{name}: {there[name].value} is no class")
+    return found
+
+
+def file_of(kind: type) -> Path | None:
+    """The file in which a class is written, None where there is none."""
+    module = sys.modules.get(kind.__module__)
+    place = getattr(module, "__file__", None)
+    return Path(place) if place else None
+
+
+def digest_of(kind: type) -> str:
+    """A hash of the file in which a class is written, and of all modules beside and below that it has
+    loaded."""
+    path = file_of(kind)
+    digest = hashlib.sha256()
+    for file in sorted(_beside(path)) if path is not None else ():
+        digest.update(file.relative_to(path.parent).as_posix().encode() + b"\0" + file.read_bytes())  # type: ignore[union-attr]
+    return digest.hexdigest()[:16]
+
+
+def _beside(path: Path) -> set[Path]:
+    places = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
+    files = {Path(place) for place in places if isinstance(place, str) and place.endswith(".py")}
+    return {path, *(file for file in files if file.is_file() and file.is_relative_to(path.parent))}
+
+
+def blamed(error: BaseException, path: Path | None) -> str:
+    """What is told of an error of what somebody has brought, written in the file `path`: one line, with file
+    and line, the last place in the folder of that file, or the last at all.
+
+    What has only interrupted it, as Ctrl-C, is raised again.
+    """
+    if is_interruption(error):
+        raise error
+    if type(error).__module__.startswith("numba"):
+        return _told_of_compiler(str(error), path)
+    said = " ".join(str(error).split())
+    said = said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
+    text = f"{type(error).__name__}: {said}" if said else type(error).__name__
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}:{error.lineno})"
+    frames = traceback.extract_tb(error.__traceback__)
+    near = [one for one in frames if path is not None and _is_beside(path, one.filename)]
+    last = near or [one for one in frames if not _of_importing(one.filename)]
+    return f"{text} ({Path(last[-1].filename).name}:{last[-1].lineno})" if last else text
+
+
+def _is_beside(path: Path, filename: str) -> bool:
+    """Whether a file lies beside or below another, and is neither ours nor of a library."""
+    file = Path(filename)
+    theirs = not file.is_relative_to(_OURS) and "site-packages" not in file.parts
+    return file == path or (theirs and file.is_relative_to(path.parent))
+
+
+def _of_importing(filename: str) -> bool:
+    return filename.startswith("<") or "importlib" in Path(filename).parts or filename == __file__
+
+
+def _told_of_compiler(said: str, path: Path | None) -> str:
+    """What the compiler cannot do: its first line that says so, and the place in the file of `path`."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    why = next((line for line in lines if not line.startswith(("Failed in", ">>>", "File "))), "no reason")
+    place = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', said) if path is not None else None
+    where = f" ({path.name}:{place.group(1)})" if path is not None and place is not None else ""
+    return f"cannot be compiled: {why[:_LONGEST]}{where}"

@@ -1,0 +1,68 @@
+"""ESC_STATUS and ESC_INFO: what the speed controllers tell, four of them a message, as PX4 sends them.
+
+Builders of `telemetry`. The speeds are those that the controllers measure; voltage and current are the
+battery's, the current shared out by the power that each rotor takes, the cube of its speed.
+"""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import Any
+
+from autopilot.services.identity import Identity
+from autopilot.services.snapshot import Snapshot
+from autopilot.wire.convert import saturated
+from autopilot.wire.dialect import plumbline as mavlink
+
+_GROUP = 4  # of a message
+_TOLD_US = 20_000  # the controllers tell their speeds so often
+_DSHOT = 5  # ESC_CONNECTION_TYPE
+_STUCK = 32  # ESC_FAILURE_FLAGS: the motor stands though it is asked to turn
+_UNKNOWN_TEMPERATURE = 0x7FFF
+_INT32 = 2**31 - 1
+
+
+def _four(values: list[Any], first: int, missing: Any) -> list[Any]:
+    """The values of a group, filled up."""
+    found = values[first : first + _GROUP]
+    return found + [missing] * (_GROUP - len(found))
+
+
+def esc_status(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """ESC_STATUS of every group of rotors."""
+    work = [abs(rpm) ** 3 for rpm in s.rotor_rpm]
+    whole = sum(work) or 1.0
+    volts = 0.0 if isnan(s.battery_voltage) else s.battery_voltage
+    amperes = 0.0 if isnan(s.battery_current) else s.battery_current
+    speeds = [saturated(rpm, -_INT32, _INT32) for rpm in s.rotor_rpm]
+    currents = [amperes * share / whole for share in work]
+    voltages = [volts] * len(speeds)
+    return tuple(
+        mavlink.MAVLink_esc_status_message(
+            index=first,
+            time_usec=s.now_us,
+            rpm=_four(speeds, first, 0),
+            voltage=_four(voltages, first, 0.0),
+            current=_four(currents, first, 0.0),
+        )
+        for first in range(0, s.rotors, _GROUP)
+    )
+
+
+def esc_info(s: Snapshot, identity: Identity) -> tuple[Any, ...]:
+    """ESC_INFO of every group of rotors; all controllers answer, also that of a rotor that is lost."""
+    flags = [_STUCK if s.rotors_lost >> i & 1 else 0 for i in range(s.rotors)]
+    return tuple(
+        mavlink.MAVLink_esc_info_message(
+            index=first,
+            time_usec=s.now_us,
+            counter=s.now_us // _TOLD_US & 0xFFFF,
+            count=s.rotors,
+            connection_type=_DSHOT,
+            info=(1 << min(_GROUP, s.rotors - first)) - 1,
+            failure_flags=_four(flags, first, 0),
+            error_count=[0] * _GROUP,
+            temperature=[_UNKNOWN_TEMPERATURE] * _GROUP,
+        )
+        for first in range(0, s.rotors, _GROUP)
+    )

@@ -1,0 +1,54 @@
+"""How much processor time of this thread each tick took: what is late beyond that is the machine's doing."""
+
+from __future__ import annotations
+
+import time
+
+_BIN_US = 10
+_BINS = 2000
+
+
+class TickCost:
+    """Counts ticks by the processor time that they took, in bins of 10 us up to 20 ms."""
+
+    def __init__(self) -> None:
+        self._bins = [0] * (_BINS + 1)
+        self._longest_us = self._ticks = self._too_long = 0
+        self._last_ns = -1
+
+    def tick(self, period_us: int) -> None:
+        """A tick begins; what ran since the last one began was that one's. Ticks last so many microseconds, 0
+        while that is not known, and then nothing counts."""
+        now_ns = time.thread_time_ns()
+        if self._last_ns >= 0 and period_us > 0:
+            self.count((now_ns - self._last_ns) // 1000, period_us)
+        self._last_ns = now_ns
+
+    def count(self, cost_us: int, period_us: int) -> None:
+        """One tick more that took so long."""
+        self._bins[min(cost_us // _BIN_US, _BINS)] += 1
+        self._longest_us = max(self._longest_us, cost_us)
+        self._ticks += 1
+        self._too_long += cost_us >= period_us
+
+    def pause(self) -> None:
+        """What runs until the next tick is no tick's work."""
+        self._last_ns = -1
+
+    def _percentile_us(self, share: float) -> int:
+        """The upper edge of the bin that so many ticks do not exceed."""
+        left = share * self._ticks
+        for k, count in enumerate(self._bins):
+            left -= count
+            if left <= 0.0:
+                return min((k + 1) * _BIN_US, self._longest_us)
+        return self._longest_us
+
+    def summary(self) -> str:
+        """One line on the whole run; empty before the first tick has ended."""
+        if not self._ticks:
+            return ""
+        return (
+            f"processor time of a tick: p50 {self._percentile_us(0.5)} p99 {self._percentile_us(0.99)} "
+            f"max {self._longest_us} us; {self._too_long} of {self._ticks} took as long as a tick lasts"
+        )

@@ -1,0 +1,62 @@
+"""A watch over the calls of what users bring: one that does not come back is broken off.
+
+Of Python code alone: machine code cannot be interrupted. In the main thread a signal also wakes a call that
+sleeps or waits; SIGURG, because the system passes over it where nobody asks for it.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+
+from autopilot.own.calls import CALL, TooSlow
+
+LONGEST_S = 5.0  # of one call
+
+_WAKING = signal.SIGURG
+
+
+@contextmanager
+def watched_calls(real_time: bool = False, longest_s: float = LONGEST_S) -> Iterator[None]:
+    """Watch the calls in this thread, each of which is broken off after `longest_s`, or a little later.
+
+    In real time they are also held to the time that there is for them.
+    """
+    ended, thread = threading.Event(), threading.get_ident()
+    wakes = threading.current_thread() is threading.main_thread()
+    stop = partial(_wake, thread) if wakes else partial(CALL.break_off, thread)
+    watch = threading.Thread(target=_watch, args=(ended, stop, longest_s), daemon=True)
+    CALL.clock = time.perf_counter if real_time else None
+    before = signal.signal(_WAKING, _woken) if wakes else None
+    watch.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        watch.join()
+        if wakes:
+            signal.signal(_WAKING, before)
+        CALL.clock = None
+
+
+def _watch(ended: threading.Event, stop: Callable[[], None], longest_s: float) -> None:
+    while True:
+        seen = CALL.count if CALL.going_on else -1
+        if ended.wait(longest_s):
+            return
+        if CALL.going_on and CALL.count == seen:
+            stop()
+
+
+def _wake(thread: int) -> None:
+    signal.pthread_kill(thread, _WAKING)
+
+
+def _woken(_signal: int, _frame: object) -> None:
+    """In the main thread, amid the call, or just after it."""
+    if CALL.going_on:
+        raise TooSlow

@@ -1,0 +1,199 @@
+"""A path of the load through waypoints that a planner of somebody's own has made: what the planner is given,
+what it gives, and what that must be like.
+
+World ENU, m, from home; the load rests at the first point before, and at the last one afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from math import acos, degrees, factorial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
+
+from autopilot.geometry.linear import Vec3
+from autopilot.trajectory.convex import excess
+from autopilot.trajectory.peaks import Body
+from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand
+from autopilot.trajectory.splines import COLUMNS, DEGREE, PieceTable
+from autopilot.trajectory.waypoint_path import Passage, passage_jets
+
+Array = NDArray[np.float64]
+
+FINE_S = 0.01  # between samples of a path that is looked at
+NEAR_M = 0.05  # of each waypoint, that the path must pass
+MOST_PIECES, LONGEST_S = 5000, 3600.0
+# by how much position and derivatives may jump where two pieces meet, and at the ends, where all rests: what
+# jumps less is lost in the errors of any flight
+_JUMPS = (("position", 1e-3, "m"), ("velocity", 1e-2, "m/s"), ("acceleration", 5e-2, "m/s^2"))
+_JUMP_JERK = ("jerk", 0.5, "m/s^3")
+
+
+class Route(NamedTuple):
+    """What a planner is given: a stretch from rest to rest."""
+
+    points: tuple[Vec3, ...]  # m: where the load rests, the waypoints to be passed, and where it is to rest
+    speed_m_s: float  # not to be exceeded: the mission's, or MIS_SPEED
+    accel_m_s2: float  # MIS_ACCEL
+    time_optimal: bool  # MIS_TIME_OPT: as quick as the bounds allow, whatever speed and acceleration
+    body: Body  # what the vehicle is: masses, cable, drag, rotors
+    bounds: Bounds  # what rotors, cable and tilt may be asked for
+
+
+class Path(NamedTuple):
+    """What a planner gives: pieces of polynomials, and when which waypoint is passed."""
+
+    table: PieceTable  # rows as `autopilot.trajectory.splines` has them
+    passes_s: tuple[float, ...]  # of each point of the route, from its first on
+
+
+Planner = Callable[[Route], Path]  # gives what `check_path` finds nothing wrong with; may raise PlanError
+
+
+class PlanError(ValueError):
+    """A path cannot be had, or is none that can be flown; the text says why."""
+
+
+def polynomials(breaks_s: ArrayLike, coefficients: ArrayLike, passes_s: ArrayLike) -> Path:
+    """A path of n polynomials: `coefficients[k][i]` (n, m, 3), with m up to 10, is that of
+    (t - breaks_s[k])^i between breaks_s[k] and breaks_s[k + 1] (n + 1); `passes_s` when each point of the
+    route is passed. ValueError where shapes do not fit."""
+    breaks, found = np.asarray(breaks_s, np.float64), np.asarray(coefficients, np.float64)
+    if found.ndim != 3 or found.shape[2] != 3 or not 1 <= found.shape[1] <= DEGREE + 1:
+        raise ValueError(
+            f"coefficients are of shape {found.shape}; must be (pieces, up to {DEGREE + 1} of them, 3)"
+        )
+    if breaks.shape != (len(found) + 1,):
+        raise ValueError(f"breaks_s are of shape {breaks.shape}; must be ({len(found) + 1},)")
+    table = np.zeros((len(found), COLUMNS))
+    table[:, 0], table[:, 1] = breaks[:-1], breaks[1:]
+    by_power = table[:, 2:].reshape(len(found), 3, DEGREE + 1)
+    by_power[:, :, : found.shape[1]] = found.transpose(0, 2, 1)
+    return Path(table, tuple(np.asarray(passes_s, np.float64).ravel().tolist()))
+
+
+def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Path:
+    """A path through sampled positions (n, 3) at rising times (n,), n >= 2, from rest to rest: the spline of
+    degree 9 through them. ValueError where shapes do not fit."""
+    times, places = np.asarray(times_s, np.float64), np.asarray(positions, np.float64)
+    if times.ndim != 1 or len(times) < 2 or places.shape != (len(times), 3):
+        raise ValueError(f"positions are of shape {places.shape}; must be ({times.size}, 3)")
+    if not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
+        raise ValueError("times_s must rise")
+    rest = [(order, np.zeros(3)) for order in range(1, (DEGREE + 1) // 2)]
+    spline = make_interp_spline(times, places, DEGREE, bc_type=(rest, rest))
+    breaks = np.unique(spline.t)
+    orders = [spline(breaks[:-1], nu=n) / factorial(n) for n in range(DEGREE + 1)]
+    return polynomials(breaks, np.stack(orders, axis=1), passes_s)
+
+
+def slower(path: Path, factor: float) -> Path:
+    """The same path at 1 / factor of the speed."""
+    table = path.table.copy()
+    table[:, :2] *= factor
+    by_power = table[:, 2:].reshape(len(table), 3, DEGREE + 1)
+    by_power /= factor ** np.arange(DEGREE + 1)
+    return Path(table, tuple(factor * t for t in path.passes_s))
+
+
+def use(path: Path, route: Route) -> float:
+    """How many times as long the path should take, roughly, to keep what the route allows: 1 or less, it
+    keeps it."""
+    times, jets = _fine(path)
+    asked = 0.0
+    if not route.time_optimal:
+        too_fast = float(np.linalg.norm(jets[1], axis=1).max()) / route.speed_m_s
+        asked = max(too_fast, float(np.sqrt(np.linalg.norm(jets[2], axis=1).max() / route.accel_m_s2)))
+    over = float(excess(demand(jets, route.body), float(times[1] - times[0]), route.bounds).max())
+    return max(asked, 1.0 + over if over > 0.0 else 0.0)
+
+
+def check_path(path: Path, route: Route) -> None:
+    """PlanError if it is no path along the route: of no numbers, with jumps, past a waypoint, underground."""
+    table, passes = path.table, path.passes_s
+    if len(passes) != len(route.points):
+        raise PlanError(f"passes_s are {len(passes)} times; must be {len(route.points)}, one for each point")
+    if not 1 <= len(table) <= MOST_PIECES:
+        raise PlanError(f"the path has {len(table)} pieces; must be 1 ... {MOST_PIECES}")
+    if not (np.isfinite(table).all() and np.isfinite(passes).all()):
+        raise PlanError("the path has what is no number")
+    if table[0, 0] != 0.0 or passes[0] != 0.0:
+        raise PlanError(f"the path begins at {table[0, 0]:g} s; must be 0")
+    ends = table[:, 1] > table[:, 0]
+    if not ends.all() or (table[1:, 0] != table[:-1, 1]).any() or any(b <= a for a, b in pairwise(passes)):
+        raise PlanError("the times of the path do not rise")
+    last_s = float(table[-1, 1])
+    if abs(passes[-1] - last_s) > 1e-9 or last_s > LONGEST_S:
+        raise PlanError(
+            f"the path ends at {last_s:g} s and passes its last point at {passes[-1]:g} s; must be the same, "
+            f"and at most {LONGEST_S:g} s"
+        )
+    _check_joints(table)
+    passed = passage_jets(table, np.array(passes))[0]
+    for i, (there, point) in enumerate(zip(passed, route.points, strict=True)):
+        off = float(np.linalg.norm(there - point))
+        if not off <= NEAR_M:
+            raise PlanError(f"the path passes point {i} {off:.2f} m beside it; must be {NEAR_M:g} m at most")
+    lowest = float(_fine(path)[1][0, :, 2].min())
+    if lowest <= 0.0:
+        raise PlanError(f"the path leads to {lowest:.2f} m above home; must be above the ground")
+
+
+def _check_joints(table: PieceTable) -> None:
+    """PlanError where the path jumps, or does not begin and end at rest."""
+    # from the left and from the right of each break; beyond the ends nothing moves
+    starts = _derivatives(table, np.zeros(len(table)))
+    ends = _derivatives(table, table[:, 1] - table[:, 0])
+    for order, (what, most, unit) in enumerate((*_JUMPS, _JUMP_JERK)):
+        if order and (moving := max(np.abs(starts[order, 0]).max(), np.abs(ends[order, -1]).max())) > most:
+            raise PlanError(f"the path begins or ends with a {what} of {moving:.3g} {unit}; must be at rest")
+        jumps = np.abs(starts[order, 1:] - ends[order, :-1]).max(axis=1, initial=0.0)
+        if len(jumps) and jumps.max() > most:
+            at = float(table[1 + int(jumps.argmax()), 0])
+            raise PlanError(f"the {what} of the path jumps by {jumps.max():.3g} {unit} at {at:.2f} s")
+
+
+def _derivatives(table: PieceTable, since: Array) -> Array:
+    """(4, n, 3) position to jerk of each piece, so long after its begin."""
+    c = table[:, 2:].reshape(len(table), 3, DEGREE + 1)
+    powers = np.arange(DEGREE + 1, dtype=np.float64)
+    found = np.empty((4, len(table), 3))
+    for order in range(4):
+        found[order] = np.einsum("kan,kn->ka", c, since[:, None] ** powers)
+        c = np.concatenate([c[:, :, 1:] * powers[1:], np.zeros((len(table), 3, 1))], axis=2)
+    return found
+
+
+def trouble_of(path: Path, route: Route) -> str:
+    """What of the bounds the path breaks, in words; empty if it keeps them."""
+    times, jets = _fine(path)
+    spacing, bounds = float(times[1] - times[0]), route.bounds
+    found = demand(jets, route.body)
+    if not excess(found, spacing, bounds).max() > 0.0:
+        return ""
+    asked = commanded(found, spacing, bounds.rotor_tau)
+    high, low = float(asked.max()), float(asked.min())
+    tension, tilt = float(found[:, TENSION].min()), degrees(acos(max(-1.0, found[:, COS_TILT].min())))
+    if high > bounds.rotor_high:
+        return f"a rotor would have to give {high:.2f} N; allowed are {bounds.rotor_high:.2f} N"
+    if low < bounds.rotor_low:
+        return f"a rotor would have to give {low:.2f} N; it must give {bounds.rotor_low:.2f} N at least"
+    if tension < bounds.tension_low:
+        return f"the cable would pull with {tension:.2f} N; it must be {bounds.tension_low:.2f} N at least"
+    return f"the vehicle would lean {tilt:.0f} deg; allowed are {degrees(acos(bounds.cos_tilt)):.0f} deg"
+
+
+def passages(path: Path, route: Route) -> list[Passage]:
+    """The stretches of the path, from each point to the next."""
+    return [Passage(path.table, begin, end, route.points[0]) for begin, end in pairwise(path.passes_s)]
+
+
+def _fine(path: Path) -> tuple[Array, Array]:
+    """Times (n,) and jets (7, n, 3) along the path."""
+    last_s = float(path.table[-1, 1])
+    times = np.linspace(0.0, last_s, max(int(last_s / FINE_S), 50) + 1)
+    return times, passage_jets(path.table, times)

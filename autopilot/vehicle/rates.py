@@ -1,0 +1,32 @@
+"""One clock for everything: the sensors' ticks, and jobs that run on every n-th of them."""
+
+from __future__ import annotations
+
+from autopilot.wire.parameter_table import ParameterTable
+
+
+class RateError(ValueError):
+    """A rate that the tick rate is no multiple of."""
+
+
+def divider(tick_hz: float, job_hz: float, job: str, least_hz: float = 1.0) -> int:
+    """On every how many-th tick a job runs.
+
+    RateError if that is no whole number: it names both rates, and those from `least_hz` on that there can be.
+    """
+    ratio = tick_hz / job_hz
+    n = round(ratio)
+    if n < 1 or abs(ratio - n) > 1e-6 * ratio:
+        rates = (tick_hz / n for n in range(1, int(tick_hz / least_hz) + 1))
+        allowed = ", ".join(f"{rate:g}" for rate in rates if rate.is_integer())
+        raise RateError(
+            f"{job} = {job_hz:g} Hz does not divide the sensor rate of {tick_hz:g} Hz; "
+            f"must be one of {allowed}, or change SIM_RATE_HZ"
+        )
+    return n
+
+
+def control_divider(tick_hz: float, table: ParameterTable) -> int:
+    """On every how many-th tick the control law runs, as CTL_RATE_HZ says; RateError as above."""
+    name = "CTL_RATE_HZ"
+    return divider(tick_hz, table[name], name, table.describe(name).low)

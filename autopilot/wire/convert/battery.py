@@ -1,0 +1,67 @@
+"""BATTERY_STATUS, from the simulator and from the vehicle; what of it SYS_STATUS repeats."""
+
+from __future__ import annotations
+
+from math import isnan, nan
+from typing import Any, NamedTuple
+
+from autopilot.wire.convert.scaling import saturated
+from autopilot.wire.dialect import plumbline as mavlink
+
+_INT16, _UINT16 = 2**15 - 1, 2**16 - 1
+_CELLS = 10  # entries of BATTERY_STATUS.voltages
+
+
+class BatteryReading(NamedTuple):
+    """What is known of a battery; NaN what is not."""
+
+    voltage: float = nan  # V
+    current: float = nan  # A
+    used_mah: float = nan
+    remaining: float = nan  # 0 ... 1
+
+
+def battery_mv(reading: BatteryReading) -> int:
+    """The voltage as SYS_STATUS has it; the greatest number: unknown."""
+    return _UINT16 if isnan(reading.voltage) else saturated(reading.voltage * 1e3, 0, _UINT16 - 1)
+
+
+def battery_ca(reading: BatteryReading) -> int:
+    """The current in 10 mA; -1: unknown."""
+    return -1 if isnan(reading.current) else saturated(reading.current * 100.0, 0, _INT16)
+
+
+def battery_percent(reading: BatteryReading) -> int:
+    """What remains; -1: unknown."""
+    return -1 if isnan(reading.remaining) else saturated(reading.remaining * 100.0, 0, 100)
+
+
+def battery_status_message(reading: BatteryReading) -> Any:
+    """BATTERY_STATUS of a pack whose cells are not measured one by one: its voltage is the first entry, and
+    what does not fit there the second."""
+    first = battery_mv(reading)
+    voltages = [first, *[_UINT16] * (_CELLS - 1)]
+    if first == _UINT16 - 1:
+        voltages[1] = saturated(reading.voltage * 1e3 - first, 0, _UINT16 - 1)
+    return mavlink.MAVLink_battery_status_message(
+        id=0,
+        battery_function=mavlink.MAV_BATTERY_FUNCTION_ALL,
+        type=mavlink.MAV_BATTERY_TYPE_LIPO,
+        temperature=_INT16,
+        voltages=voltages,
+        current_battery=battery_ca(reading),
+        current_consumed=-1 if isnan(reading.used_mah) else saturated(reading.used_mah, 0, 2**31 - 1),
+        energy_consumed=-1,
+        battery_remaining=battery_percent(reading),
+    )
+
+
+def read_battery_status(m: Any) -> BatteryReading:
+    """Inverse of `battery_status_message`; also of a message that has the cells one by one."""
+    told = [entry for entry in m.voltages if entry != _UINT16]
+    return BatteryReading(
+        sum(told) * 1e-3 if told else nan,
+        m.current_battery * 0.01 if m.current_battery >= 0 else nan,
+        float(m.current_consumed) if m.current_consumed >= 0 else nan,
+        m.battery_remaining * 0.01 if m.battery_remaining >= 0 else nan,
+    )

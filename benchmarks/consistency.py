@@ -1,0 +1,226 @@
+"""Does the estimator know what it does not know? Its own covariance against the truth, phase by phase.
+
+    python benchmarks/consistency.py [--mission NAME] [--sensors NAME ...] [--wind M_S ...] [--seeds N]
+                                     [--set NAME=VALUE ...] [--jobs N]
+
+Flies a mission with each seed, fused (no wire), calm and in wind, and compares ten times a second the error
+of the estimate with the covariance that the filter has of it. Told are, for each phase of the flight and each
+part of the error state, the share of instants inside the bounds that hold 95 % of a consistent filter's
+errors, and in brackets the NEES (error^T P^-1 error) per degree of freedom, 1 for a consistent filter. While
+the cable is slack the load's place and speed stand for direction and rate.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import defaultdict
+from concurrent.futures import ProcessPoolExecutor
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from autopilot.estimation.records import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    DIRECTION,
+    GYRO_BIAS,
+    POSITION,
+    RATE,
+    TRACKER,
+    VELOCITY,
+    EstimatorState,
+)
+from autopilot.geometry.packed import unpack
+from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
+from autopilot.supervisor.state import Phase
+from gcs.closed_loop import Conditions
+from gcs.sweep.cell import cell_of
+from gcs.sweep.flight import Boarding, SweptFlight, boarding
+from missions.fileformat import load_mission
+from missions.model import Mission
+from sitl.sensors.imu import ImuState
+from sitl.world import IMU, World
+
+EVERY_S = 0.1
+INSIDE = 0.95
+PARTS = {
+    "position": (POSITION, 3),
+    "velocity": (VELOCITY, 3),
+    "attitude": (ATTITUDE, 3),
+    "direction": (DIRECTION, 2),
+    "rate": (RATE, 2),
+    "gyro bias": (GYRO_BIAS, 3),
+    "accel bias": (ACCEL_BIAS, 3),
+}
+Array = NDArray[np.float64]
+# phase -> part -> NEES of each instant, and how many degrees of freedom it has
+Nees = dict[str, dict[str, list[tuple[float, int]]]]
+
+
+def error_of(flight: SweptFlight, estimate: EstimatorState) -> Array:
+    """Truth minus estimate, in the axes of the error state."""
+    plant = unpack(World, flight.world.world, 0).plant
+    biases = unpack(ImuState, flight.world.errors[IMU], 0)
+    vehicle, load = estimate.vehicle, estimate.load
+    axes = np.array([load.across, np.cross(load.q_cable, load.across)])
+    turned = quat_log(quat_multiply(plant.quat_wxyz, quat_conjugate(vehicle.quat_wxyz)))
+    return np.concatenate(
+        [
+            np.subtract(plant.x_quad, vehicle.x_quad),
+            np.subtract(plant.v_quad, vehicle.v_quad),
+            turned,
+            np.subtract(biases.gyro_bias, vehicle.gyro_bias),
+            np.subtract(biases.accel_bias, vehicle.accel_bias),
+            axes @ np.subtract(plant.q_cable, load.q_cable),
+            axes @ np.subtract(plant.q_cable_dot, load.q_cable_dot),
+        ]
+    )
+
+
+def note(flight: SweptFlight, found: dict[str, list[tuple[float, int]]]) -> float:
+    """Add the NEES of this instant; the error of the cable's direction, rad."""
+    estimate = unpack(EstimatorState, flight.core.rows.estimator, 0)
+    error, P = error_of(flight, estimate), flight.core.rows.history.covariance
+    slack = estimate.load.taut == 0.0
+    for part, (first, count) in PARTS.items():
+        at = slice(first, first + count)
+        if slack and part in ("direction", "rate"):
+            continue
+        found[part].append((float(error[at] @ np.linalg.solve(P[at, at], error[at])), count))
+    if slack:
+        plant, load = unpack(World, flight.world.world, 0).plant, estimate.load
+        place, _, speed = load.covariance
+        tracked = load.source == TRACKER
+        off = np.subtract(plant.x_load, load.x_load)
+        if not tracked:  # where it lies is known as seen from the vehicle, along the ground
+            off = (off - error[POSITION : POSITION + 3])[:2]
+        found["load place"].append((float(off @ off) / place, len(off)))
+        if tracked:
+            off = np.subtract(plant.v_load, load.v_load)
+            found["load speed"].append((float(off @ off) / speed, 3))
+    return float(np.hypot(error[DIRECTION], error[DIRECTION + 1]))
+
+
+def flown(mission: Mission, conditions: Conditions, start: Boarding) -> tuple[Nees, dict[str, object]]:
+    """The NEES of one flight by phase, and what became of it."""
+    found: Nees = defaultdict(lambda: defaultdict(list))
+    flight = SweptFlight(cell_of(mission, conditions), conditions.seed, start)
+    every = round(EVERY_S * 1e6 / flight.tick_us)
+    at, slants = every, [0.0]
+    while not flight.flown.outcome:
+        flight.turn(at)
+        if flight.tick >= at:
+            at += every
+            phase = flight.core.flight.phase
+            if flight.airborne_us >= 0 and phase != Phase.DISARMED:
+                astray = note(flight, found[phase.name.lower()])
+                if phase == Phase.MISSION:
+                    slants.append(astray)
+    end = flight.conclude()
+    return {phase: dict(parts) for phase, parts in found.items()}, {
+        "seed": conditions.seed,
+        "outcome": end.outcome,
+        "reason": end.reason,
+        "error_mm": 1e3 * end.load_error_max_m,
+        "rms_mm": 1e3 * end.load_error_rms_m,
+        "cable_deg": float(np.degrees(np.sqrt(np.mean(np.square(slants))))),
+        "saturated": end.saturated_fraction,
+    }
+
+
+def inside(values: list[tuple[float, int]]) -> float:
+    """The share of instants inside the bounds."""
+    nees, dof = np.array(values).T
+    return float((nees <= chi2.ppf(INSIDE, dof)).mean())
+
+
+def per_degree(values: list[tuple[float, int]]) -> float:
+    """NEES per degree of freedom."""
+    nees, dof = np.array(values).T
+    return float(nees.sum() / dof.sum())
+
+
+def table(title: str, found: Nees) -> str:
+    """Rows of a Markdown table: a phase a row, a part a column."""
+    parts = [*PARTS, "load place", "load speed"]
+    rows = [
+        f"| {title} | seconds | " + " | ".join(parts) + " |",
+        "|---" * (len(parts) + 2) + "|",
+    ]
+    for phase in (one.name.lower() for one in Phase):
+        if phase not in found:
+            continue
+        cells = [
+            f"{inside(found[phase][part]):.2f} ({per_degree(found[phase][part]):.2f})"
+            if found[phase].get(part)
+            else ""
+            for part in parts
+        ]
+        seconds = EVERY_S * len(found[phase]["position"])
+        rows.append(f"| {phase.replace('_', ' ')} | {seconds:.0f} | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
+
+
+def _one(work: tuple[Mission, Conditions, Boarding]) -> tuple[Nees, dict[str, object]]:
+    return flown(*work)
+
+
+def measure(
+    mission: Mission, sensors: str, settings: dict[str, float], seeds: int, pool: ProcessPoolExecutor
+) -> tuple[Nees, list[dict[str, object]]]:
+    """The NEES of so many seeds together, and what became of each."""
+    start = boarding(mission, Conditions(sensors=sensors, settings=settings))
+    works = [
+        (mission, Conditions(sensors=sensors, seed=s + 1, settings=settings), start) for s in range(seeds)
+    ]
+    together: Nees = defaultdict(lambda: defaultdict(list))
+    ends = []
+    for found, end in pool.map(_one, works):
+        ends.append(end)
+        for phase, parts in found.items():
+            for part, values in parts.items():
+                together[phase][part] += values
+    return together, ends
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--mission", default="case-b")
+    parser.add_argument("--sensors", nargs="*", default=["lab", "rtk"])
+    parser.add_argument("--wind", nargs="*", type=float, default=[0.0, 5.0], metavar="M_S")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    more = {name: float(value) for name, _, value in (pair.partition("=") for pair in options.set)}
+    mission = load_mission(options.mission)
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for sensors in options.sensors:
+            for wind in options.wind:
+                settings = {**more, **({"SIM_WIND_E": wind} if wind else {})}
+                found, ends = measure(mission, sensors, settings, options.seeds, pool)
+                title = f"`{sensors}`, " + (f"{wind:g} m/s of wind" if wind else "calm")
+                print(table(title, found))
+                worst = max(float(str(end["error_mm"])) for end in ends)
+                rms = sqrt(float(np.mean([float(str(end["rms_mm"])) ** 2 for end in ends])))
+                slant = max(float(str(end["cable_deg"])) for end in ends)
+                busy = max(float(str(end["saturated"])) for end in ends)
+                done = sum(end["outcome"] == "completed" for end in ends)
+                print(
+                    f"\n{done} of {len(ends)} completed, worst load error {worst:.1f} mm,"
+                    f" RMS {rms:.2f} mm, cable at worst {slant:.2f} deg RMS,"
+                    f" saturated at most {100 * busy:.1f} %\n",
+                    flush=True,
+                )
+                for end in ends:
+                    if end["outcome"] != "completed":
+                        print(json.dumps(end))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,162 @@
+"""How fast other simulators fly in a closed loop, beside Plumbline, in one run on this machine.
+
+    pip install '.[peers]'
+    python benchmarks/peers.py [--repeat 5] [--docs docs/performance.md]
+
+Each flies what it has, as its own authors set it up: udaan a quadrotor whose load follows a circle by the law
+of Sreenath et al. (2013), in its own physics and in MuJoCo's; RotorPy a quadrotor without a load on a circle,
+by its law on SE(3); MuJoCo alone no law at all, only the physics of our vehicle with its load, which hovers.
+They are flown in turn, and the median of their processor time counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import logging
+import math
+import re
+import statistics
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.learning_speed import TIMESTEP_S, mujoco_model
+from gcs.closed_loop import Conditions
+from gcs.sweep.flight import boarding, fly
+from missions.fileformat import load_mission
+from sitl.vehicles.truth import load_truth
+
+FLIGHT_S = 20.0  # of a peer's flight; ours is longer, and per second costs less
+RADIUS_M, PERIOD_S = 1.0, 8.0
+BEGIN, END = "<!-- peers -->", "<!-- end of peers -->"
+
+
+class Peer(NamedTuple):
+    """What flies, what its flight holds, and a call that flies and returns the seconds flown."""
+
+    name: str
+    holds: str
+    fly: Callable[[], float]
+
+
+def circle(t: float) -> tuple[Any, Any, Any]:
+    """Position, velocity and acceleration (m, s) of a load on a circle, each an array of three."""
+    w = 2.0 * math.pi / PERIOD_S
+    c, s = RADIUS_M * math.cos(w * t), RADIUS_M * math.sin(w * t)
+    return np.array([c, s, 1.0]), np.array([-w * s, w * c, 0.0]), np.array([-w * w * c, -w * w * s, 0.0])
+
+
+def ours() -> Peer:
+    """Case B with the sensors of the lab, without the wire."""
+    mission, conditions = load_mission("case-b"), Conditions()
+    board = boarding(mission, conditions)
+    return Peer(
+        "**Plumbline**, Case B",
+        "load, slack cable, ground, rotors, sensors with noise and delay, estimator, law: 250 Hz",
+        lambda: fly(mission, conditions, board).flight_s,
+    )
+
+
+def udaan(mujoco_cable: str | None) -> Peer:
+    """The load on a circle, by udaan's own law."""
+    from udaan.models.quadrotor_cspayload import QuadrotorCsPayloadBase, QuadrotorCsPayloadMujoco
+
+    def flown() -> float:
+        if mujoco_cable is None:
+            model: Any = QuadrotorCsPayloadBase()
+        else:
+            model = QuadrotorCsPayloadMujoco(render=False, cable_model=mujoco_cable)
+        model.payload_controller.setpoint = circle
+        model.simulate(tf=FLIGHT_S, payload_position=circle(0.0)[0])
+        # what is fast only because it fell is no peer
+        assert np.linalg.norm(model.state.payload_position - circle(model.t)[0]) < 1.0, "udaan has crashed"
+        return float(model.t)
+
+    if mujoco_cable is None:
+        return Peer("udaan, its own physics", "load on a taut cable, law: 200 Hz, Euler at 800 Hz", flown)
+    return Peer(f"udaan, MuJoCo's {mujoco_cable}", "load, law; truth instead of sensors", flown)
+
+
+def rotorpy(rate_hz: int) -> Peer:
+    """A quadrotor without a load on a circle, by RotorPy's own law, as its examples set it up."""
+    from rotorpy.controllers.quadrotor_control import SE3Control
+    from rotorpy.environments import Environment
+    from rotorpy.trajectories.circular_traj import ThreeDCircularTraj
+    from rotorpy.vehicles.hummingbird_params import quad_params
+    from rotorpy.vehicles.multirotor import Multirotor
+
+    def flown() -> float:
+        turns = np.array([1.0 / PERIOD_S] * 3)
+        path = ThreeDCircularTraj(radius=np.array([RADIUS_M, RADIUS_M, 0.0]), freq=turns)
+        world = Environment(Multirotor(quad_params), SE3Control(quad_params), path, sim_rate=rate_hz)
+        return float(world.run(t_final=FLIGHT_S, plot=False, verbose=False)["time"][-1])
+
+    return Peer(f"RotorPy at {rate_hz} Hz", "no load; rotors, drag, inertial unit, law", flown)
+
+
+def mujoco() -> Peer:
+    """The physics of our vehicle alone, which hovers."""
+    import mujoco as mj
+
+    truth = load_truth("bebop")
+    model = mujoco_model(truth, "RK4")
+    data = mj.MjData(model)
+
+    def flown() -> float:
+        mj.mj_resetData(model, data)
+        data.act[:] = data.ctrl[:] = 0.25 * (truth.quad_mass + truth.load_mass) * truth.gravity
+        mj.mj_step(model, data, nstep=round(FLIGHT_S / TIMESTEP_S))
+        return FLIGHT_S
+
+    return Peer("MuJoCo, physics alone", "load on a tendon, rotors: Runge-Kutta at 250 Hz; no law", flown)
+
+
+def processor_s_of_a_second(peer: Peer) -> float:
+    """Processor seconds that one second of flight takes."""
+    began = time.process_time()
+    flown_s = peer.fly()
+    return (time.process_time() - began) / flown_s
+
+
+def main() -> None:
+    """Fly all in turn, print the table, and write it into the page if so asked."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeat", type=int, default=5)
+    parser.add_argument("--docs", type=Path)
+    options = parser.parse_args()
+    missing = [name for name in ("mujoco", "rotorpy", "udaan") if importlib.util.find_spec(name) is None]
+    if missing:
+        parser.error(f"not installed: {', '.join(missing)} (pip install '.[peers]')")
+    logging.disable(logging.INFO)
+    warnings.simplefilter("ignore")
+    peers = [ours(), mujoco(), udaan(None), udaan("tendon"), udaan("links"), rotorpy(100), rotorpy(500)]
+    for peer in peers:
+        peer.fly()  # what is loaded or compiled at the first flight does not count
+    costs: dict[str, list[float]] = {peer.name: [] for peer in peers}
+    for _ in range(options.repeat):
+        for peer in peers:
+            costs[peer.name].append(processor_s_of_a_second(peer))
+    base = statistics.median(costs[peers[0].name])
+    lines = ["| what flies | what a flight holds | times real time | Plumbline is so many times as fast |"]
+    lines.append("| --- | --- | --- | --- |")
+    for peer in peers:
+        cost = statistics.median(costs[peer.name])
+        lines.append(f"| {peer.name} | {peer.holds} | {1.0 / cost:.3g} | {cost / base:.3g} |")
+    text = "\n".join(lines) + "\n"
+    print(text)
+    if options.docs:
+        page = options.docs.read_text(encoding="utf-8")
+        made = re.sub(f"{BEGIN}.*{END}", f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
+        options.docs.write_text(made, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""What each effect of the world does to Cases A, B and C: the table of docs/realism.md.
+
+    python benchmarks/realism.py [--seeds 4] [--docs docs/realism.md] [--only WORD]
+
+Each row is three sweeps. A cell has the greatest error of the load (mm), median and worst of the flights that
+were completed; then, where it is not zero, how many were not, and the mean share of ticks at a rotor's limit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import plumbline
+
+CASES = ("case-a", "case-b", "case-c")
+BEGIN, END = "<!-- measured -->", "<!-- end -->"
+LEAST_SHARE = 0.005  # of the ticks at a rotor's limit, that is told
+
+
+class Effect(NamedTuple):
+    """A row of the table: what is on beside what vehicle and sensors have."""
+
+    name: str
+    settings: Mapping[str, float] = {}
+    sensors: str = "lab"
+    vehicle: str = "bebop"
+
+
+BATTERY = {"SIM_BATTERY": 1, "SIM_BAT_CHARGE": 90, "SIM_THR_CURVE": 0.57, "SIM_THR_KNOWN": 0.57}
+OFF_CENTRE = {"X": 0.008, "Y": -0.004, "Z": -0.02}
+ATTACHED = {f"SIM_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
+TOLD = {f"VEH_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
+SHAKEN = {"SIM_VIB_ACC": 2, "SIM_VIB_GYR": 0.05}
+CORD = {"SIM_CBL_LINKS": 4, "SIM_CBL_MASS": 0.003, "SIM_CABLE_DIAM": 2}
+EFFECTS = (
+    Effect("nothing"),
+    Effect("wind of 3 m/s", {"SIM_WIND_E": 3}),
+    Effect("gusts of 1 m/s", {"SIM_GUST_STD": 1}),
+    Effect("drag, ten times the believed", {"SIM_DRAG_SCALE": 10}),
+    Effect("rotors of 30 ms, believed 20", {"SIM_ROTOR_TAU_MS": 30, "VEH_ROTOR_TAU": 20}),
+    Effect("drag of the rotors, 0.25 1/s", {"SIM_ROTOR_DRAG": 0.25}),
+    Effect("flapping of stiff blades", {"SIM_ROTOR_FLAP": 0.01, "SIM_BLADE_STIFF": 0.1}),
+    Effect("ground effect", {"SIM_GND_EFFECT": 1}),
+    Effect("downwash", {"SIM_DOWNWASH": 1}),
+    Effect("downwash, cable of 1 mm", {"SIM_DOWNWASH": 1, "SIM_CABLE_DIAM": 1}),
+    Effect("cord of 2 mm and 3 g/m, four links", CORD),
+    Effect("attachment 2 cm off the centre", ATTACHED),
+    Effect("the same, told", {**ATTACHED, **TOLD}),
+    Effect("thrust curve 0.62, taken for 0.57", {"SIM_THR_CURVE": 0.62, "SIM_THR_KNOWN": 0.57}),
+    Effect("throttle of 1000 steps", {"SIM_ESC_STEPS": 1000}),
+    Effect("battery at 90 %, rotors slow down with it", BATTERY),
+    Effect("the same, speed controlled", {**BATTERY, "SIM_ESC_RPM_CTL": 1}),
+    Effect("vibration of 0.5 m/s²", {"SIM_VIB_ACC": 0.5}),
+    Effect("vibration of 2 m/s² and 0.05 rad/s, low-pass 98 Hz", {**SHAKEN, "SIM_IMU_LPF_HZ": 98}),
+    Effect("white noise, 0.3 m/s² and 0.02 rad/s", {"SIM_ACC_NOISE": 0.3, "SIM_GYR_NOISE": 0.02}),
+    Effect("white noise, 1.0 m/s² and 0.05 rad/s", {"SIM_ACC_NOISE": 1.0, "SIM_GYR_NOISE": 0.05}),
+    Effect("readings late at random, 5 ms on average", {"SIM_SENS_JIT_MS": 5}),
+    Effect("clocks 2 ms apart", {"SIM_SENS_OFS_MS": 2}),
+    Effect("trackers' correlated error, 1 mm", {"SIM_TRK_ERR_M": 0.001}),
+    Effect("distorted room, 2 mm", {"SIM_TRK_CAL_M": 0.002}),
+    Effect("load hidden 4 times a minute for 0.15 s", {"SIM_OCC_LOAD": 4, "SIM_OCC_S": 0.15}),
+    Effect("`bebop-real`", vehicle="bebop-real"),
+    Effect("`lab-real`", sensors="lab-real"),
+    Effect("`lab-real`, `bebop-real`, 12 ms", {"SIM_ACT_DELAY_MS": 12}, "lab-real", "bebop-real"),
+    Effect("`rtk`", sensors="rtk"),
+    Effect("`rtk`, multipath of 1 cm", {"SIM_GPS_MP_M": 0.01}, "rtk"),
+    Effect("`rtk`, floating twice a minute", {"SIM_GPS_FLT": 2}, "rtk"),
+    Effect("`rtk`, motor currents, 20 mG", {"SIM_MAG_MOT": 0.02}, "rtk"),
+    Effect("`field`", sensors="field"),
+    Effect("`heavy`", vehicle="heavy"),
+    Effect("`heavy-real`", vehicle="heavy-real"),
+    Effect(
+        "`field`, `heavy-real`, wind 5 m/s, gusts 1 m/s",
+        {"SIM_WIND_E": 5, "SIM_GUST_STD": 1},
+        "field",
+        "heavy-real",
+    ),
+)
+
+
+def cell(table: Any) -> str:
+    """Of the flights of one mission."""
+    home = table[table["outcome"] == "completed"]
+    text = "none came home"
+    if len(home):
+        errors = 1e3 * home["load_error_max_m"]
+        text = f"{errors.median():.0f}, {errors.max():.0f}"
+    if lost := len(table) - len(home):
+        text += f"; {lost} of {len(table)} lost" if len(home) else ""
+    share = home["saturated_fraction"].mean() if len(home) else 0.0
+    return text + (f" ({share:.0%})" if share >= LEAST_SHARE else "")
+
+
+def row(effect: Effect, seeds: int) -> str:
+    """Of the table."""
+    cells = []
+    for case in CASES:
+        try:
+            table = plumbline.sweep(
+                case,
+                settings=effect.settings,
+                sensors=effect.sensors,
+                vehicle=effect.vehicle,
+                seeds=seeds,
+                quiet=True,
+            )
+        except plumbline.Error:  # the vehicle has not what the mission asks for
+            cells.append("not flyable")
+        else:
+            cells.append(cell(table))
+    return f"| {effect.name} | {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Fly all, print the table, and write it into the page if so asked."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--docs", type=Path)
+    parser.add_argument("--only", default="", metavar="WORD", help="effects whose names have this")
+    options = parser.parse_args()
+    lines = ["| effect | Case A | Case B | Case C |", "|---|---|---|---|"]
+    for effect in EFFECTS:
+        if options.only in effect.name:
+            lines.append(row(effect, options.seeds))
+            print(lines[-1], flush=True)
+    if options.docs:
+        text = f"{options.seeds} seeds each:\n\n" + "\n".join(lines) + "\n"
+        page = options.docs.read_text(encoding="utf-8")
+        made = re.sub(f"{BEGIN}.*{END}", lambda _: f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
+        options.docs.write_text(made, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+"""What a flight asked of the load, where the autopilot knows of none and says nothing: read from its mission.
+
+An autopilot of others flies the vehicle along lines between its waypoints; the load belongs a cable length
+below. What is asked of the load at a time is the nearest point of the line that is being flown: the error is
+the load's distance from the path, whatever the time table. The phases are Plumbline's, seen in the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items.records import WireItem
+from gcs.analysis.align import as_of
+from gcs.analysis.axes import Floats
+from gcs.analysis.tracks import Ints, ItemTrack, LoadTrack, RotorTrack, SetpointTrack
+
+_PLACES = (
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LOITER_TIME,
+    mavlink.MAV_CMD_NAV_TAKEOFF,
+    mavlink.MAV_CMD_NAV_LAND,
+)
+_LIFTED_M = 0.01  # above where the load lay
+_TURNS = 0.002  # share of their greatest force that turning rotors give at least
+_EVER = np.inf  # how long ago what holds may have been said
+
+
+def observed_setpoint(
+    load: LoadTrack, rotors: RotorTrack, current: ItemTrack, items: Sequence[WireItem], home: Home
+) -> SetpointTrack:
+    """The setpoints at the stamps of the true load; `home` is the origin of the world."""
+    time_s, position = load.time_s, load.position_m
+    item = as_of(current.time_s, current.item.astype(np.float64), time_s, _EVER)
+    seq = np.clip(np.nan_to_num(item), 0, len(items) - 1).astype(np.int64)
+    command = np.array([one.command for one in items])
+    rests = position[0, 2]
+    lifted = position[:, 2] > rests + _LIFTED_M
+    turning = _turning(rotors, time_s)
+    phase = np.full(len(time_s), mavlink.PLUMBLINE_PHASE_MISSION)
+    phase[command[seq] == mavlink.MAV_CMD_NAV_LAND] = mavlink.PLUMBLINE_PHASE_LOWER
+    places = _places(items, load, home)
+    phase[seq <= _last_of_lift(command, places, rests)] = mavlink.PLUMBLINE_PHASE_LIFT
+    ever = np.cumsum(lifted & turning) > 0
+    phase[~lifted & ~ever] = mavlink.PLUMBLINE_PHASE_TAUTEN
+    phase[~lifted & ever] = mavlink.PLUMBLINE_PHASE_SET_DOWN
+    phase[~turning] = mavlink.PLUMBLINE_PHASE_DISARMED
+    carried = lifted & turning
+    line = _nearest(position, places[np.maximum(seq - 1, 0)], places[seq])
+    asked = np.where(carried[:, None], line, position)
+    still, nothing = np.zeros_like(asked), np.full(len(time_s), np.nan)
+    mode = np.where(carried, mavlink.PLUMBLINE_CONTROL_LOAD_POSITION, mavlink.PLUMBLINE_CONTROL_NONE).astype(
+        np.int64
+    )
+    return SetpointTrack(
+        time_s=time_s,
+        position_m=asked,
+        velocity_m_s=still,
+        acceleration_m_s2=still,
+        asked_m=asked,
+        asked_m_s=still,
+        q_cable_c=np.full_like(asked, np.nan),
+        elapsed_s=nothing,
+        duration_s=nothing,
+        item=seq,
+        phase=phase.astype(np.int64),
+        control_mode=mode,
+    )
+
+
+def _turning(rotors: RotorTrack, at_s: Floats) -> NDArray[np.bool_]:
+    """(n,) whether the rotors turn."""
+    if len(rotors.time_s) == 0:
+        return np.ones(len(at_s), dtype=np.bool_)
+    shares = rotors.force_n.max(axis=1) / rotors.force_max_n
+    return np.asarray(np.nan_to_num(as_of(rotors.time_s, shares, at_s, _EVER)) > _TURNS)
+
+
+def _last_of_lift(command: Ints, places: Floats, rests: float) -> int:
+    """The item with which the load is lifted: the first that ends above the ground and, where that is the
+    take-off itself, the waypoint in which it comes to rest."""
+    raised = np.flatnonzero(places[:, 2] > rests + _LIFTED_M)
+    if not len(raised):
+        return 0
+    last = int(raised[0])
+    rests_next = (
+        command[last] == mavlink.MAV_CMD_NAV_TAKEOFF
+        and command[last + 1 : last + 2] == mavlink.MAV_CMD_NAV_WAYPOINT
+        and np.array_equal(places[last + 1], places[last])
+    )
+    return last + 1 if rests_next else last
+
+
+def _places(items: Sequence[WireItem], load: LoadTrack, home: Home) -> Floats:
+    """(items, 3) where the load hangs at the end of each item, ENU."""
+    taut = load.distance_m[load.taut > 0]
+    cable_m = float(np.median(taut if len(taut) else load.distance_m))
+    stands_m = float(load.position_m[0, 2] - load.distance_m[0] * load.q_cable[0, 2])
+    rests = load.position_m[0, 2]
+    found, here = [], load.position_m[0]
+    for item in items:
+        if item.command in _PLACES:
+            x, y, _ = enu_from_geodetic(item.x, item.y, 0, home)
+            low = item.command == mavlink.MAV_CMD_NAV_LAND
+            height = rests if low else max(item.z + stands_m - cable_m, rests)
+            here = np.array([x, y, height])
+        found.append(here)
+    return np.array(found)
+
+
+def _nearest(points: Floats, begin: Floats, end: Floats) -> Floats:
+    """(n, 3) the points of the lines from `begin` to `end` that are nearest to `points`."""
+    along = end - begin
+    length = np.sum(along * along, axis=1)
+    share = np.sum((points - begin) * along, axis=1) / np.where(length > 0.0, length, 1.0)
+    return np.asarray(begin + np.clip(share, 0.0, 1.0)[:, None] * along)

@@ -1,0 +1,146 @@
+"""A flight by an autopilot that knows of no load: found, uploaded, armed, flown and landed by its messages.
+
+Unlike Plumbline's it tells no phases: that it flies is told by EXTENDED_SYS_STATE, where it is by
+MISSION_CURRENT, and the load is seen by the simulator alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem
+from gcs.clients import command
+from gcs.clients.connection import LINK_TIMEOUT_US
+from gcs.clients.flight import FlightClient, Row, Stage
+from gcs.clients.insisting import Insisting
+from gcs.clients.missions import MissionUpload
+from gcs.clients.operation import Operation, Target
+
+READY_LIMIT_US = 120_000_000  # its estimator settles for half a minute of its own time
+AGAIN_US = 500_000  # after a refusal: it answers before it is ready, and may say to be ready before it is
+_STREAMS_US = {
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 50_000,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 100_000,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 200_000,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 500_000,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 20_000,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 40_000,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 200_000,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 50_000,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 1_000_000,
+}
+_FLYING = (
+    mavlink.MAV_LANDED_STATE_IN_AIR,
+    mavlink.MAV_LANDED_STATE_TAKEOFF,
+    mavlink.MAV_LANDED_STATE_LANDING,
+)
+_WATCHED = frozenset(
+    {
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+        mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+    }
+)
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """What one autopilot wants that others do not."""
+
+    title: str
+    begins_with_home: bool  # item 0 of a mission is home
+    takes_off_low: bool  # lets a mission begin below the length of a cable
+    tells_ready: bool  # by the pre-arm bit of SYS_STATUS
+    before_arming: Callable[[Target], Operation]  # the mode in which it is armed
+
+
+def _guided(target: Target) -> Operation:
+    return command.set_mode(target, "guided", 4, 0, armed=False)
+
+
+def _hold(target: Target) -> Operation:
+    return command.set_mode(target, "hold", 4, 3, armed=False)
+
+
+ARDUPILOT = Firmware("ArduPilot", True, True, True, _guided)
+PX4 = Firmware("PX4", False, False, False, _hold)
+FIRMWARES = {"ardupilot": ARDUPILOT, "px4": PX4}
+
+
+class FirmwareFlight(FlightClient):
+    """Flies `items`, which begin with a take-off and end with a landing, by a firmware of others."""
+
+    def __init__(
+        self,
+        firmware: Firmware,
+        items: Sequence[WireItem],
+        expected_s: float,
+        limit_s: float | None = None,
+        link_timeout_us: int = LINK_TIMEOUT_US,
+    ) -> None:
+        super().__init__(items, expected_s, limit_s, link_timeout_us)
+        self._firmware = firmware
+
+    @property
+    def watched(self) -> frozenset[int]:
+        return _WATCHED
+
+    def row(self, stage: Stage) -> Row:
+        row = super().row(stage)
+        match stage:
+            case Stage.STREAMS:
+                return replace(row, operations=_streams)
+            case Stage.UPLOAD:
+                return replace(row, operations=_upload)
+            case Stage.READY:
+                return replace(
+                    row,
+                    operations=self._prepare,
+                    limit_us=READY_LIMIT_US if self._firmware.tells_ready else 0,
+                )
+            case Stage.ARM:
+                return replace(row, operations=_arm)
+        return row
+
+    def _prepare(self, client: FlightClient) -> list[Operation]:
+        assert client.connection.target is not None
+        return [self._firmware.before_arming(client.connection.target)]
+
+    def _watch(self) -> None:
+        view = self.view
+        self._was_armed = self._was_armed or bool(view.armed)
+        state = view.latest.get("EXTENDED_SYS_STATE")
+        if state is not None and state.landed_state in _FLYING:
+            self._was_airborne = True
+        current, reached = view.latest.get("MISSION_CURRENT"), view.latest.get("MISSION_ITEM_REACHED")
+        if not self._was_airborne:
+            return
+        self._item_flown = self._item()
+        told = [message.seq for message in (current, reached) if message is not None]
+        if len(self.items) - 1 in told:
+            self._mission_over = True
+
+    def _item(self) -> int:
+        current = self.view.latest.get("MISSION_CURRENT")
+        return int(current.seq) if current is not None else 0
+
+
+def _upload(client: FlightClient) -> list[Operation]:
+    assert client.connection.target is not None
+    target = client.connection.target
+    return [Insisting(lambda: MissionUpload(target, client.items), AGAIN_US, READY_LIMIT_US)]
+
+
+def _arm(client: FlightClient) -> list[Operation]:
+    assert client.connection.target is not None
+    target = client.connection.target
+    return [Insisting(lambda: command.arm(target), AGAIN_US, READY_LIMIT_US)]
+
+
+def _streams(client: FlightClient) -> list[Operation]:
+    assert client.connection.target is not None
+    target = client.connection.target
+    return [command.message_interval(target, kind, period) for kind, period in _STREAMS_US.items()]

@@ -1,0 +1,102 @@
+"""A mission of the load as one of the vehicle: what autopilots fly that know of no load.
+
+Each place of the load becomes one of the vehicle, a cable length above it. What cannot be said so is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import geodetic_from_enu
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items import WireItem
+from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE
+from missions.model import Delay, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint
+
+SLACK_SHARE = 0.6  # of the cable's length: how high the vehicle goes over the load that lies on the ground
+SETTLE_S = 2.0  # over it, and once it hangs
+_GROUND_SPEED = 1.0  # of DO_CHANGE_SPEED
+_UNCHANGED = -1.0  # throttle
+_NAMES = {
+    "Winch": "the winch",
+    "Signals": "signals (paths given by formulas)",
+    "AttitudeRun": "an attitude of vehicle or load",
+}
+
+
+class FirmwareMissionError(ValueError):
+    """A step that firmwares cannot fly."""
+
+
+def firmware_items(
+    steps: Sequence[Step],
+    home: Home,
+    cable_m: float,
+    stands_m: float,
+    begins_with_home: bool,
+    takes_off_low: bool = True,
+) -> tuple[WireItem, ...]:
+    """The items of these steps, for a vehicle that stands `stands_m` (its centre of mass) above the ground.
+
+    Heights of the items are above where it stood, as firmwares take them. `begins_with_home`: item 0 is home
+    and is not flown, as with ArduPilot. `takes_off_low`: it goes over the load with the cable slack first;
+    else it lifts it from beside. After a release the places are the vehicle's own.
+    """
+    items: list[WireItem] = []
+    if begins_with_home:
+        items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, place=ZERO, home=home))
+    east, north, height, above = 0.0, 0.0, 0.0, cable_m - stands_m
+
+    def here() -> Vec3:
+        return east, north, height + above
+
+    for step in steps:
+        match step:
+            case Takeoff():
+                height = step.altitude_m
+                # the vehicle stands beside the load: it goes over it with the cable slack, then lifts
+                low = (east, north, max(SLACK_SHARE * cable_m - stands_m, 0.0))
+                first = low if takes_off_low else here()
+                items.append(_item(mavlink.MAV_CMD_NAV_TAKEOFF, place=first, home=home))
+                if takes_off_low:
+                    items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, SETTLE_S, place=low, home=home))
+                items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, SETTLE_S, place=here(), home=home))
+            case Waypoint():
+                east, north, height = step.east_m, step.north_m, step.altitude_m
+                items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, step.hold_s, place=here(), home=home))
+            case ReturnHome():
+                east, north = 0.0, 0.0
+                items.append(_item(mavlink.MAV_CMD_NAV_WAYPOINT, place=here(), home=home))
+            case Speed():
+                items.append(
+                    _item(mavlink.MAV_CMD_DO_CHANGE_SPEED, _GROUND_SPEED, step.speed_m_s, _UNCHANGED)
+                )
+            case Delay():
+                items.append(_item(mavlink.MAV_CMD_NAV_LOITER_TIME, step.duration_s, place=here(), home=home))
+            case Release():
+                items.append(_item(mavlink.MAV_CMD_DO_GRIPPER, 1.0, float(mavlink.GRIPPER_ACTION_RELEASE)))
+                above = 0.0
+            case Land():
+                items.append(_item(mavlink.MAV_CMD_NAV_LAND, place=(east, north, 0.0), home=home))
+            case _:
+                what = _NAMES.get(type(step).__name__, type(step).__name__)
+                raise FirmwareMissionError(
+                    f"it asks for {what}; this autopilot flies take-off, waypoints, speeds, delays, "
+                    "release and landing"
+                )
+    return tuple(items)
+
+
+def _item(
+    command: int,
+    *parameters: float,
+    place: Vec3 | None = None,
+    home: Home | None = None,
+) -> WireItem:
+    p1, p2, p3, p4 = (*parameters, *(0.0,) * (4 - len(parameters)))
+    if place is None or home is None:
+        return WireItem(FRAME_MISSION, command, 0, 1, p1, p2, p3, p4, 0, 0, 0.0)
+    latitude, longitude, _ = geodetic_from_enu(place, home)
+    return WireItem(FRAME_RELATIVE, command, 0, 1, p1, p2, p3, p4, latitude, longitude, place[2])

@@ -1,0 +1,46 @@
+"""An exchange that is begun anew where the vehicle refuses it, until a time is over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from gcs.clients.operation import Operation, Result, Status
+
+
+class Insisting:
+    """Runs what `make` makes; after a refusal again `pause_us` later, for no longer than `limit_us`."""
+
+    def __init__(self, make: Callable[[], Operation], pause_us: int, limit_us: int) -> None:
+        self.result: Result | None = None
+        self._make = make
+        self._pause_us = pause_us
+        self._limit_us = limit_us
+        self._began_us: int | None = None
+        self._again_us = 0
+        self._operation = make()
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        return self._operation.progress
+
+    def receive(self, message: Any, now_us: int) -> None:
+        self._operation.receive(message, now_us)
+
+    def poll(self, now_us: int) -> list[Any]:
+        if self._began_us is None:
+            self._began_us = now_us
+        result = self._operation.result
+        if self.result is not None or result is None:
+            return self._operation.poll(now_us)
+        refused = result.status is Status.REFUSED
+        if not refused or now_us - self._began_us >= self._limit_us:
+            self.result = result
+            return []
+        if self._again_us == 0:
+            self._again_us = now_us + self._pause_us
+        if now_us < self._again_us:
+            return []
+        self._again_us = 0
+        self._operation = self._make()
+        return self._operation.poll(now_us)

@@ -1,0 +1,82 @@
+"""Whose truth it is: of the simulators that tell theirs at one port, only the vehicle's own is heard.
+
+A simulator says in SIM_BOOT which run of the world it is: to the autopilot, which tells it on request, and
+among the truth. Several simulators may tell theirs at one port; they are told apart by where it comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from autopilot.wire.codec import Field
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.datagrams import messages
+
+Sender = tuple[str, int]
+
+_SIM_BOOT = mavlink.MAVLINK_MSG_ID_SIM_BOOT
+_RUN = Field(mavlink.MAVLink_sim_boot_message, "boot_id")
+_OTHER = "--truth PORT is where the vehicle's own tells it (sitl --truth HOST:PORT)"
+
+
+class Worlds:
+    """The simulators that tell their truth at one port."""
+
+    def __init__(self) -> None:
+        self._runs: dict[Sender, int | None] = {}
+
+    def __len__(self) -> int:
+        return len(self._runs)
+
+    def run(self, datagram: bytes, sender: Sender) -> int | None:
+        """Which run of the world a datagram tells of; None: its sender has not said."""
+        said = [_RUN.of(one.frame) for one in messages(datagram)[0] if one.id == _SIM_BOOT]
+        self._runs[sender] = int(said[-1]) if said else self._runs.get(sender)
+        return self._runs[sender]
+
+
+class Truth:
+    """Passes on the truth of the world that the vehicle flies in, and drops all other.
+
+    `vouched`: somebody has named the place at which it is told; a vehicle that cannot say which world it
+    flies in is then taken to fly in the one that tells there, while it is the only one.
+    """
+
+    def __init__(self, where: str, vouched: bool) -> None:
+        self._where = where
+        self._vouched = vouched
+        self._worlds = Worlds()
+        self._run: int | None = None  # of the vehicle
+        self.heard = False  # the vehicle's own
+
+    def of_vehicle(self, run: int | None) -> None:
+        """The run of the world that the vehicle says it flies in; None: it does not say."""
+        self._run = run
+
+    def take(self, datagrams: Iterable[tuple[bytes, Sender]]) -> list[bytes]:
+        """Of datagrams with their senders those that tell of the vehicle's world."""
+        own = []
+        for datagram, sender in datagrams:
+            run = self._worlds.run(datagram, sender)
+            unsaid = self._run is None and self._vouched and len(self._worlds) == 1
+            if unsaid or (run is not None and run == self._run):
+                own.append(datagram)
+        self.heard = self.heard or bool(own)
+        return own
+
+    @property
+    def missing(self) -> str:
+        """Why there is no truth of the vehicle's world, and what to do; empty where there is."""
+        where = f"UDP {self._where}"
+        if self.heard:
+            return ""
+        if not self._worlds:
+            return f"no simulator tells its truth at {where}; {_OTHER}"
+        if self._run is not None:
+            return f"the truth at {where} is refused: it is that of another simulator; {_OTHER}"
+        if self._vouched:
+            return f"{len(self._worlds)} simulators tell their truth at {where}; {_OTHER}"
+        return (
+            f"the vehicle does not say which simulator it flies in, so the truth at {where} is refused; "
+            "if it is the vehicle's, say so by --truth PORT"
+        )

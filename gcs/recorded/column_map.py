@@ -1,0 +1,129 @@
+"""What is in which column of a recording, how it was taken, and what is believed of the load: a TOML file."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from gcs.recorded.load_model import LoadModel
+from missions.toml_files import FileError, TomlFiles
+
+Column = Annotated[int, Field(ge=0, le=9999)]
+Three = Annotated[list[Column], Field(min_length=3, max_length=3)]
+Four = Annotated[list[Column], Field(min_length=4, max_length=4)]
+Positive = Annotated[float, Field(gt=0.0, le=1e6, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e6, allow_inf_nan=False)]
+Any = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+
+
+class MapError(FileError):
+    """The column map is at fault."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class VehicleColumns(_Table):
+    """The vehicle's measured pose, in a frame whose z is up; body z up, too."""
+
+    position: Three
+    quaternion: Four
+    quaternion_order: Literal["xyzw", "wxyz"] = "wxyz"
+
+
+class LoadColumns(_Table):
+    """The load's measured position."""
+
+    position: Three
+
+
+class Tracking(_Table):
+    """How well poses are measured, and how lively they are."""
+
+    noise_m: Positive = 1e-3  # of what the smoothed course leaves out
+    grid_noise_m: Positive = 4e-4  # the same while times of rows are inferred
+    jerk_density: Positive = 100.0  # m^2/s^5
+
+
+class Attachment(_Table):
+    """Where the cable is attached, and where the thrust points, in the tracked body."""
+
+    below_m: Any = 0.0
+    thrust_tilt: Annotated[list[Any], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+
+
+class ModelTable(_Table):
+    """Numbers of `LoadModel`; without a length it is the median distance from attachment to load."""
+
+    length_m: Positive | None = None
+    drag_per_m: Any = 0.0
+    wash_per_s2: Any = 0.0
+    swirl_per_s2: Any = 0.0
+    wash_radius_m: Positive = 0.5
+    wash_delay_s: NotNegative = 0.0
+    acceleration_share: Any = 0.0
+    push_x_m_s2: Any = 0.0
+    push_y_m_s2: Any = 0.0
+    mass_ratio: NotNegative
+    vehicle_drag_per_s: Any = 0.0
+    tilt_share: Positive = 1.0
+    turbulence_m_s2: Positive = 0.05
+    turbulence_s: Positive = 3.0
+    force_density: Positive = 0.05
+    seen_m: Positive = 2e-3
+    seen_s: NotNegative = 0.0
+    tilt_noise: Positive = 0.03
+    tilt_per_accel: NotNegative = 0.0
+    tilt_walk: Positive = 1e-3
+
+
+Name = Literal[
+    "length_m",
+    "drag_per_m",
+    "wash_per_s2",
+    "swirl_per_s2",
+    "wash_radius_m",
+    "wash_delay_s",
+    "acceleration_share",
+    "push_x_m_s2",
+    "push_y_m_s2",
+]
+
+
+class Identify(_Table):
+    """Which numbers of the load `gcs identify` looks for."""
+
+    parameters: Annotated[list[Name], Field(min_length=1)] = ["length_m", "drag_per_m"]
+
+
+class ColumnMap(_Table):
+    """A column map. Columns are counted from 0; SI units."""
+
+    rate_hz: Annotated[float, Field(gt=1.0, le=10000.0)] | None = None  # of rows without a time
+    jitter_s: Positive = 1e-3  # and the standard deviation of their times
+    time: Column | None = None  # s
+    gravity_m_s2: Positive = 9.81
+    vehicle: VehicleColumns | None = None
+    load: LoadColumns | None = None
+    tracking: Tracking = Tracking()
+    attachment: Attachment = Attachment()
+    model: ModelTable
+    identify: Identify = Identify()
+
+    def load_model(self, length_m: float) -> LoadModel:
+        """The model; `length_m` counts where the map names no length."""
+        given = self.model.model_dump()
+        given["length_m"] = given["length_m"] or length_m
+        return LoadModel(gravity_m_s2=self.gravity_m_s2, **given)
+
+
+MAPS = TomlFiles("column map", "gcs.recorded", "maps", MapError)
+
+
+def load_map(name_or_path: str | PathLike[str]) -> ColumnMap:
+    """A shipped map by its name, or a file; MapError if there is none, or it is at fault."""
+    read = MAPS.read(name_or_path)
+    return MAPS.record(ColumnMap, MAPS.table(read.text, read.where), read.where)

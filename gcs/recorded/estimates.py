@@ -1,0 +1,118 @@
+"""Estimates of the load over a whole recording: filtered, smoothed, and predicted ahead."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcs.recorded.load_filter import SIZE, WORK, look_ahead, run_filter
+from gcs.recorded.load_model import LoadModel
+from gcs.recorded.motion import Motion, drive_rows, sight_rows, slow_rows
+from gcs.recorded.smoothing import Floats
+
+
+class Estimates(NamedTuple):
+    """Of each row: states (n, 8), covariances (n, 8, 8), innovations squared (n, 2)."""
+
+    states: Floats
+    covariances: Floats
+    squares: Floats
+
+
+class Rows(NamedTuple):
+    """A motion as the kernels read it."""
+
+    time_s: Floats
+    drive: Floats
+    slow: Floats
+    sight: Floats
+
+
+def rows_of(motion: Motion, model: LoadModel) -> Rows:
+    """The rows of a motion; they depend on the model by its length and the delay of the wash."""
+    return Rows(motion.time_s, drive_rows(motion, model), slow_rows(motion), sight_rows(motion))
+
+
+def filtered(rows: Rows, model: LoadModel, *, load: bool, tilt: bool, smoothed: bool = False) -> Estimates:
+    """Estimates from the load's position, the vehicle's attitude, or both; `smoothed`: by all rows."""
+    n = len(rows.time_s)
+    states, forecasts = np.zeros((2, n, SIZE))
+    covariances, before, transitions = np.zeros((3, n, SIZE, SIZE))
+    squares = np.zeros((n, 2))
+    run_filter(
+        *rows,
+        model,
+        load,
+        tilt,
+        states,
+        covariances,
+        forecasts,
+        before,
+        transitions,
+        squares,
+        np.zeros((WORK, SIZE)),
+    )
+    if smoothed:
+        _smooth(states, covariances, forecasts, before, transitions)
+    return Estimates(states, covariances, squares)
+
+
+def _smooth(
+    states: Floats, covariances: Floats, forecasts: Floats, before: Floats, transitions: Floats
+) -> None:
+    """Rauch, Tung and Striebel's backward pass, in place."""
+    gains = np.linalg.solve(before[1:], transitions[1:] @ covariances[:-1]).transpose(0, 2, 1)
+    for k in range(len(states) - 2, -1, -1):
+        gain = gains[k]
+        states[k] += gain @ (states[k + 1] - forecasts[k + 1])
+        covariances[k] += gain @ (covariances[k + 1] - before[k + 1]) @ gain.T
+
+
+class Window(NamedTuple):
+    """A prediction: rows at which it begins and ends, cable directions (k, 2) there, covariances (k, 3)."""
+
+    begin: int
+    ends: NDArray[np.intp]
+    direction: Floats
+    covariance: Floats
+
+
+def predicted(
+    rows: Rows,
+    model: LoadModel,
+    estimates: Estimates,
+    begins: NDArray[np.intp],
+    horizons_s: tuple[float, ...],
+    *,
+    tilt: bool,
+) -> list[Window]:
+    """Predictions from rows `begins` on, by the vehicle's motion alone, as far as the rows reach."""
+    windows = []
+    work = np.zeros((WORK + SIZE, SIZE))
+    for begin in begins:
+        ends = np.searchsorted(rows.time_s, rows.time_s[begin] + np.array(horizons_s))
+        if ends[-1] >= len(rows.time_s):
+            break
+        found = np.zeros((len(ends), 5))
+        look_ahead(
+            *rows,
+            model,
+            tilt,
+            int(begin),
+            ends.astype(np.float64),
+            estimates.states,
+            estimates.covariances,
+            found,
+            work,
+        )
+        windows.append(Window(int(begin), ends, found[:, :2], found[:, 2:]))
+    return windows
+
+
+def load_position(motion: Motion, model: LoadModel, row: NDArray[np.intp], direction: Floats) -> Floats:
+    """Where the load is (k, 3) at rows `row` if the cable points to `direction` (k, 2)."""
+    below = -np.sqrt(np.maximum(0.0, 1.0 - np.sum(direction**2, axis=1)))
+    at: Floats = motion.attachment.position[row] + model.length_m * np.column_stack([direction, below])
+    return at

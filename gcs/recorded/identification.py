@@ -1,0 +1,193 @@
+"""What a recording says of cable, load and vehicle, with intervals of 95 %.
+
+The length is found twice: by the distance between the tracked points, and by the swing alone. Numbers of the
+load are those that predict it best, 2 s and 5 s ahead: robust least squares (Huber's weights) by Gauss and
+Newton. Those of the vehicle are a linear regression: its thrust lies along its axis, so that the horizontal
+momentum of vehicle and load shows in the tilt. Intervals take the residuals of each ten seconds as one draw
+(a sandwich of block sums), since neighbouring ones are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, filtfilt
+
+from gcs.recorded.estimates import filtered, load_position, predicted, rows_of
+from gcs.recorded.load_model import LoadModel
+from gcs.recorded.motion import SLOW_DENSITY, SLOW_NOISE_M, Motion
+from gcs.recorded.scoring import HORIZONS_S, SETTLED_ROWS
+from gcs.recorded.smoothing import Floats, smooth
+
+_NORMAL_95 = 1.96
+_BLOCK_S = 10.0  # residuals further apart are taken as independent
+_EVERY_ROWS = 30
+_ROUNDS = 6
+_BEND_M = 0.03  # errors beyond count by their size, not their square
+_FAR_WEIGHT = 0.35  # of the longer horizon
+_PART = 0.3  # of a step, for differences
+_PRIOR = 1e-7  # of a step squared, for what the flight says nothing of
+_SHORTENED = (1.0, 0.5, 0.25)
+_ABOVE_SWING = 4.0  # times the pendulum's frequency is left of the tilt, the rest filtered
+_EDGE_S = 5.0  # left out at both ends of what is filtered
+
+_STEPS = {
+    "length_m": 0.01,
+    "drag_per_m": 0.005,
+    "wash_per_s2": 0.1,
+    "swirl_per_s2": 0.05,
+    "wash_radius_m": 0.02,
+    "wash_delay_s": 0.05,
+    "acceleration_share": 0.01,
+    "push_x_m_s2": 0.01,
+    "push_y_m_s2": 0.01,
+}
+
+# shortest recording that something can be told from: the edges, and one block between them
+LEAST_S = 2.0 * _EDGE_S + _BLOCK_S
+
+
+class TooLittleMotionError(ValueError):
+    """The recording does not tell the numbers of the vehicle apart."""
+
+
+class Identified(NamedTuple):
+    """A number, and half the width of its 95 % interval; in the unit that its name ends with."""
+
+    name: str
+    value: float
+    half_width: float
+
+
+def tracked_length(motion: Motion, below_m: float) -> Identified:
+    """The median distance from the vehicle's tracked point, `below_m` above the attachment, to the load."""
+    arm = motion.attachment.position + below_m * motion.thrust
+    far = np.linalg.norm(motion.load - arm, axis=1)
+    known = np.isfinite(far)
+    blocks = _blocks(motion.time_s[known])
+    medians = np.array(
+        [np.median(far[known][blocks == k]) for k in range(blocks[-1] + 1) if np.any(blocks == k)]
+    )
+    spread = float(np.std(medians, ddof=1)) / np.sqrt(len(medians)) if len(medians) > 1 else float("nan")
+    return Identified("tracked_length_m", float(np.median(far[known])), _NORMAL_95 * spread)
+
+
+def identify_load(motion: Motion, model: LoadModel, names: Sequence[str]) -> list[Identified]:
+    """The numbers `names` of the model that predict this load best; the rest stays as it is in `model`."""
+    steps = np.array([_STEPS[name] for name in names])
+    errors, times = _errors(motion, model)
+    sensitivity = np.zeros((len(names), *errors.shape))
+    for _ in range(_ROUNDS):
+        for j, name in enumerate(names):
+            nudged = model._replace(**{name: getattr(model, name) + _PART * steps[j]})
+            sensitivity[j] = (_errors(motion, nudged)[0] - errors) / _PART
+        weights = _weights(errors)
+        normal = np.einsum("jkhi,kh,lkhi->jl", sensitivity, weights, sensitivity)
+        normal += _PRIOR * np.eye(len(names))
+        change = -np.linalg.solve(normal, np.einsum("jkhi,kh,khi->j", sensitivity, weights, errors))
+        before = _cost(errors)
+        for shorter in _SHORTENED:
+            moved = {
+                n: getattr(model, n) + shorter * s * c for n, s, c in zip(names, steps, change, strict=True)
+            }
+            tried = model._replace(**moved)
+            found, _ = _errors(motion, tried)
+            if _cost(found) < before:
+                model, errors = tried, found
+                break
+        else:
+            break
+    each = np.einsum("jkhi,kh,khi->kj", sensitivity, _weights(errors), errors)
+    spread = steps * _sandwich(normal, each, times)
+    return [
+        Identified(name, float(getattr(model, name)), _NORMAL_95 * float(s))
+        for name, s in zip(names, spread, strict=True)
+    ]
+
+
+def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
+    """Mass ratio (load / vehicle), drag of the vehicle, share of its acceleration in the tilt, its delay.
+
+    TooLittleMotionError where the recording does not tell them apart.
+    """
+    time, slow = motion.time_s, motion.slow
+    load = smooth(time, motion.load, SLOW_NOISE_M**2 / motion.times.sure, SLOW_DENSITY)
+    cut = _ABOVE_SWING * np.sqrt(model.gravity_m_s2 / model.length_m) / (2.0 * np.pi)
+    rate = 1.0 / float(np.median(np.diff(time)))
+    b, a = butter(3, min(0.9, 2.0 * cut / rate))
+    up = (
+        slow.acceleration[:, 2]
+        + model.gravity_m_s2
+        + model.mass_ratio * (load.acceleration[:, 2] + model.gravity_m_s2)
+    )
+    speed = np.linalg.norm(slow.velocity, axis=1)
+    turning = np.gradient(motion.tilt, time, axis=0)
+    one, none = np.ones_like(up), np.zeros_like(up)
+    terms = [
+        load.acceleration[:, :2],
+        slow.velocity[:, :2],
+        slow.acceleration[:, :2],
+        -up[:, None] * turning,
+        speed[:, None] * slow.velocity[:, :2],
+        np.column_stack([one, none]) * up[:, None],
+        np.column_stack([none, one]) * up[:, None],
+    ]
+    edge = int(_EDGE_S * rate)
+    kept = slice(edge, len(time) - edge)
+    rows = np.stack([filtfilt(b, a, term, axis=0)[kept] for term in terms], axis=-1)
+    right = filtfilt(b, a, up[:, None] * motion.tilt, axis=0)[kept]
+    flat = rows.reshape(-1, len(terms))
+    if np.linalg.matrix_rank(flat) < len(terms):
+        raise TooLittleMotionError("the vehicle moves too little for its numbers to be identified")
+    normal = flat.T @ flat
+    found = np.linalg.solve(normal, flat.T @ right.ravel())
+    each = np.einsum("kij,ki->kj", rows, right - rows @ found)
+    spread = _NORMAL_95 * _sandwich(normal, each, time[kept])
+    names = ("mass_ratio", "vehicle_drag_per_s", "tilt_share", "attitude_delay_s", "vehicle_drag_per_m")
+    return [Identified(n, float(v), float(s)) for n, v, s in zip(names, found, spread, strict=False)]
+
+
+def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:
+    """Errors of predictions (k, horizons, 3) in metres, and when they began (k,)."""
+    rows = rows_of(motion, model)
+    estimates = filtered(rows, model, load=True, tilt=False)
+    begins = np.arange(SETTLED_ROWS, len(rows.time_s), _EVERY_ROWS)
+    windows = predicted(rows, model, estimates, begins, HORIZONS_S, tilt=False)
+    at = np.array([one.ends for one in windows], dtype=np.intp)
+    direction = np.array([one.direction for one in windows])
+    errors = [
+        load_position(motion, model, at[:, i], direction[:, i]) - motion.load[at[:, i]] for i in range(2)
+    ]
+    began = motion.time_s[[one.begin for one in windows]]
+    return np.nan_to_num(np.stack(errors, axis=1)), began
+
+
+def _weights(errors: Floats) -> Floats:
+    """Of each error (k, horizons): one up to the bend, then falling with its size."""
+    size = np.linalg.norm(errors, axis=2)
+    weights: Floats = np.array([1.0, _FAR_WEIGHT]) * _BEND_M / np.maximum(size, _BEND_M)
+    return weights
+
+
+def _cost(errors: Floats) -> float:
+    size = np.linalg.norm(errors, axis=2)
+    bent = np.where(size < _BEND_M, size**2 / 2.0, _BEND_M * (size - _BEND_M / 2.0))
+    return float(np.sum(bent * np.array([1.0, _FAR_WEIGHT])))
+
+
+def _blocks(time: Floats) -> NDArray[np.intp]:
+    blocks: NDArray[np.intp] = ((time - time[0]) / _BLOCK_S).astype(np.intp)
+    return blocks
+
+
+def _sandwich(normal: Floats, each: Floats, time: Floats) -> Floats:
+    """Standard deviations of a least squares solution whose gradient is the sum of `each` (k, j)."""
+    blocks = _blocks(time)
+    sums = np.zeros((blocks[-1] + 1, each.shape[1]))
+    np.add.at(sums, blocks, each)
+    inverse = np.linalg.inv(normal)
+    spread: Floats = np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse))
+    return spread

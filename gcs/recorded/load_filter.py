@@ -1,0 +1,285 @@
+"""Kalman filter of the load: from its measured position, from the vehicle's attitude, from both, or neither.
+
+Errors of eight states: cable direction (2), its rate (2), turbulence (2), bias of the thrust's direction (2).
+The rows of `drive` hold the vehicle's motion (`load_model.Drive`), those of `slow` the same smoothed as
+strongly as the attitude, and `sight` what is measured: load from attachment (2, m), direction of the thrust
+(2), weight of the row, whether the time since the row before is unknown.
+"""
+
+from __future__ import annotations
+
+from autopilot.geometry.kernel import kernel
+from gcs.recorded.load_model import Drive, LoadModel, LoadState, step_load, thrust_tilt
+from gcs.recorded.smoothing import Floats
+
+SIZE = 8
+WORK = 3 * SIZE + 4  # rows of SIZE numbers that the kernels work with
+_LITTLE = 1e-5  # of differences
+_GATE_LOAD = 60.0  # squared, in standard deviations
+_GATE_TILT = 30.0
+_LOST_ROWS = 8  # refused in a row: the load is looked for anew
+_SEEN_SD = 0.01  # of a direction and a rate to begin with
+_RATE_SD = 1.0
+_UNSEEN_SD = 0.15  # of a direction that is not seen; its rate as in a swing
+_BIAS_SD = 5e-3  # of the thrust's direction
+
+
+@kernel
+def _drive(rows: Floats, k: int) -> Drive:
+    return (
+        rows[k, 0],
+        rows[k, 1],
+        rows[k, 2],
+        rows[k, 3],
+        rows[k, 4],
+        rows[k, 5],
+        rows[k, 6],
+        rows[k, 7],
+    )
+
+
+@kernel
+def _state(x: Floats) -> LoadState:
+    return (x[0], x[1], x[2], x[3], x[4], x[5])
+
+
+@kernel
+def _nudged(s: LoadState, j: int) -> LoadState:
+    e = _LITTLE
+    return (
+        s[0] + (e if j == 0 else 0.0),
+        s[1] + (e if j == 1 else 0.0),
+        s[2] + (e if j == 2 else 0.0),
+        s[3] + (e if j == 3 else 0.0),
+        s[4] + (e if j == 4 else 0.0),
+        s[5] + (e if j == 5 else 0.0),
+    )
+
+
+@kernel
+def forecast(
+    x: Floats, p: Floats, f: Floats, h: float, before: Drive, after: Drive, m: LoadModel, work: Floats
+) -> None:
+    """Move state x (8,) and covariance p (8, 8) on by h; f (8, 8) becomes the transition matrix."""
+    s = _state(x)
+    new = step_load(s, h, before, after, m)
+    for i in range(SIZE):
+        for j in range(SIZE):
+            f[i, j] = 1.0 if i == j else 0.0
+    for j in range(6):
+        other = step_load(_nudged(s, j), h, before, after, m)
+        f[0, j] = (other[0] - new[0]) / _LITTLE
+        f[1, j] = (other[1] - new[1]) / _LITTLE
+        f[2, j] = (other[2] - new[2]) / _LITTLE
+        f[3, j] = (other[3] - new[3]) / _LITTLE
+        f[4, j] = (other[4] - new[4]) / _LITTLE
+        f[5, j] = (other[5] - new[5]) / _LITTLE
+    for i in range(6):
+        x[i] = new[i]
+    for i in range(SIZE):
+        for j in range(SIZE):
+            total = 0.0
+            for k in range(SIZE):
+                total += f[i, k] * p[k, j]
+            work[i, j] = total
+    for i in range(SIZE):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(SIZE):
+                total += work[i, k] * f[j, k]
+            p[i, j] = total
+            p[j, i] = total
+    shaken = (m.force_density / m.length_m) ** 2 * h
+    turbulent = 2.0 * m.turbulence_m_s2**2 / m.turbulence_s * h
+    drifting = m.tilt_walk**2 * h
+    for i in range(2):
+        p[2 + i, 2 + i] += shaken
+        p[4 + i, 4 + i] += turbulent
+        p[6 + i, 6 + i] += drifting
+
+
+@kernel
+def _correct(
+    x: Floats,
+    p: Floats,
+    h: Floats,
+    y0: float,
+    y1: float,
+    r00: float,
+    r01: float,
+    r11: float,
+    gate: float,
+    work: Floats,
+) -> float:
+    """Correct by two numbers whose Jacobian is h (2, 8); their normalised square, negative if refused."""
+    s00, s01, s11 = r00, r01, r11
+    for i in range(SIZE):
+        a = 0.0
+        b = 0.0
+        for j in range(SIZE):
+            a += p[i, j] * h[0, j]
+            b += p[i, j] * h[1, j]
+        work[0, i] = a
+        work[1, i] = b
+    for i in range(SIZE):
+        s00 += h[0, i] * work[0, i]
+        s01 += h[0, i] * work[1, i]
+        s11 += h[1, i] * work[1, i]
+    det = s00 * s11 - s01 * s01
+    square = (s11 * y0 * y0 - 2.0 * s01 * y0 * y1 + s00 * y1 * y1) / det
+    if not square < gate:
+        return -square
+    for i in range(SIZE):
+        work[2, i] = (s11 * work[0, i] - s01 * work[1, i]) / det
+        work[3, i] = (s00 * work[1, i] - s01 * work[0, i]) / det
+        x[i] += work[2, i] * y0 + work[3, i] * y1
+    for i in range(SIZE):
+        for j in range(i + 1):
+            p[i, j] -= work[2, i] * work[0, j] + work[3, i] * work[1, j]
+            p[j, i] = p[i, j]
+    return square
+
+
+@kernel
+def see_load(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, work: Floats) -> float:
+    """Correct by the load's position of row k; the normalised square, negative if refused."""
+    h = work[:2]
+    for i in range(2):
+        for j in range(SIZE):
+            h[i, j] = 1.0 if i == j else 0.0
+    inverse = 1.0 / m.length_m
+    place = m.seen_m**2 * inverse * inverse / sight[k, 4]
+    late = m.seen_s**2
+    return _correct(
+        x,
+        p,
+        h,
+        sight[k, 0] * inverse - x[0],
+        sight[k, 1] * inverse - x[1],
+        place + late * x[2] * x[2],
+        late * x[2] * x[3],
+        place + late * x[3] * x[3],
+        _GATE_LOAD,
+        work[2:],
+    )
+
+
+@kernel
+def see_tilt(x: Floats, p: Floats, sight: Floats, slow: Floats, k: int, m: LoadModel, work: Floats) -> float:
+    """Correct by the thrust's direction of row k; the normalised square, negative if refused."""
+    h = work[:2]
+    s, u = _state(x), _drive(slow, k)
+    tx, ty = thrust_tilt(s, u, m)
+    for j in range(SIZE):
+        h[0, j] = 1.0 if j == 6 else 0.0
+        h[1, j] = 1.0 if j == 7 else 0.0
+    for j in range(4):
+        ox, oy = thrust_tilt(_nudged(s, j), u, m)
+        h[0, j] = (ox - tx) / _LITTLE
+        h[1, j] = (oy - ty) / _LITTLE
+    r = m.tilt_noise**2 * (1.0 + m.tilt_per_accel * (u[0] * u[0] + u[1] * u[1])) / sight[k, 4]
+    return _correct(
+        x, p, h, sight[k, 2] - tx - x[6], sight[k, 3] - ty - x[7], r, 0.0, r, _GATE_TILT, work[2:]
+    )
+
+
+@kernel
+def start(x: Floats, p: Floats, sight: Floats, k: int, m: LoadModel, with_load: bool) -> None:
+    """A state of which no more is known than the cable's direction in row k, or not even that."""
+    for i in range(SIZE):
+        x[i] = 0.0
+        for j in range(SIZE):
+            p[i, j] = 0.0
+    if with_load:
+        x[0], x[1] = sight[k, 0] / m.length_m, sight[k, 1] / m.length_m
+    for i in range(2):
+        p[i, i] = _SEEN_SD**2 if with_load else _UNSEEN_SD**2
+        p[2 + i, 2 + i] = _RATE_SD**2 if with_load else _UNSEEN_SD**2 * m.gravity_m_s2 / m.length_m
+        p[4 + i, 4 + i] = m.turbulence_m_s2**2
+        p[6 + i, 6 + i] = _BIAS_SD**2
+
+
+@kernel
+def run_filter(
+    time: Floats,
+    drive: Floats,
+    slow: Floats,
+    sight: Floats,
+    m: LoadModel,
+    with_load: bool,
+    with_tilt: bool,
+    states: Floats,
+    covariances: Floats,
+    forecasts: Floats,
+    forecast_covariances: Floats,
+    transitions: Floats,
+    squares: Floats,
+    work: Floats,
+) -> None:
+    """Estimates (n, 8), (n, 8, 8) of all rows, with the forecasts before each correction and the normalised
+    squares of what the load's position (squares[:, 0]) and the thrust's direction (squares[:, 1]) said anew.
+    """
+    n = len(time)
+    x, p, rest = work[0], work[1 : 1 + SIZE], work[1 + SIZE :]
+    lost = 0
+    for k in range(n):
+        if k == 0 or sight[k, 5] > 0.0:
+            start(x, p, sight, k, m, with_load)
+            for i in range(SIZE):
+                for j in range(SIZE):
+                    transitions[k, i, j] = 0.0  # nothing is carried on, nor back
+        else:
+            forecast(
+                x, p, transitions[k], time[k] - time[k - 1], _drive(drive, k - 1), _drive(drive, k), m, rest
+            )
+        for i in range(SIZE):
+            forecasts[k, i] = x[i]
+            for j in range(SIZE):
+                forecast_covariances[k, i, j] = p[i, j]
+        if with_tilt:
+            squares[k, 1] = see_tilt(x, p, sight, slow, k, m, rest)
+        if with_load:
+            squares[k, 0] = see_load(x, p, sight, k, m, rest)
+            lost = lost + 1 if squares[k, 0] < 0.0 else 0
+            if lost > _LOST_ROWS:
+                start(x, p, sight, k, m, True)
+                lost = 0
+        for i in range(SIZE):
+            states[k, i] = x[i]
+            for j in range(SIZE):
+                covariances[k, i, j] = p[i, j]
+
+
+@kernel
+def look_ahead(
+    time: Floats,
+    drive: Floats,
+    slow: Floats,
+    sight: Floats,
+    m: LoadModel,
+    with_tilt: bool,
+    begin: int,
+    ends: Floats,
+    states: Floats,
+    covariances: Floats,
+    found: Floats,
+    work: Floats,
+) -> None:
+    """From the estimate of row `begin` on without the load: directions and their covariance at rows `ends`.
+
+    found (len(ends), 5) becomes q_x, q_y, and the covariance xx, xy, yy.
+    """
+    x, p, f, rest = work[0], work[1 : 1 + SIZE], work[1 + SIZE : 1 + 2 * SIZE], work[1 + 2 * SIZE :]
+    for i in range(SIZE):
+        x[i] = states[begin, i]
+        for j in range(SIZE):
+            p[i, j] = covariances[begin, i, j]
+    k = begin
+    for e in range(len(ends)):
+        while k < int(ends[e]):
+            k += 1
+            forecast(x, p, f, time[k] - time[k - 1], _drive(drive, k - 1), _drive(drive, k), m, rest)
+            if with_tilt:
+                see_tilt(x, p, sight, slow, k, m, rest)
+        found[e, 0], found[e, 1] = x[0], x[1]
+        found[e, 2], found[e, 3], found[e, 4] = p[0, 0], p[0, 1], p[1, 1]

@@ -1,0 +1,87 @@
+"""What the kernels of the load need of a recording, row by row."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gcs.recorded.column_map import ColumnMap
+from gcs.recorded.load_model import LoadModel
+from gcs.recorded.recording import Recording
+from gcs.recorded.row_times import RowTimes, infer_times, known_times
+from gcs.recorded.smoothing import Course, Floats, smooth
+
+_AXIS_NOISE = 3e-3  # of the body's vertical axis
+_AXIS_DENSITY = 50.0
+SLOW_DENSITY = 20.0  # the course to which the attitude is compared
+SLOW_NOISE_M = 1.5e-3
+_SLOW_AXIS_NOISE = 1e-2
+_SLOW_AXIS_DENSITY = 890.0  # as fast as the course
+
+
+class Motion(NamedTuple):
+    """A vehicle's motion as arrays of rows, and what was seen of the load."""
+
+    time_s: Floats  # (n,)
+    attachment: Course  # of the cable at the vehicle
+    thrust: Floats  # (n, 3) direction of the thrust
+    slow: Course  # of the vehicle, as slow as the attitude that is compared with it
+    tilt: Floats  # (n, 2) of the thrust's axis, x / z and y / z
+    load: Floats  # (n, 3) position of the load; nan where it is not seen
+    times: RowTimes  # and what is known of them
+
+
+def motion_of(recording: Recording, columns: ColumnMap) -> Motion:
+    """The motion of a recorded vehicle, whose rows get their times here if they have none."""
+    tracking, attachment = columns.tracking, columns.attachment
+    position = recording.position
+    if recording.time_s is not None:
+        times = known_times(recording.time_s, position, tracking.noise_m, tracking.jerk_density)
+    else:
+        rate_hz = columns.rate_hz or 0.0
+        times = infer_times(position, rate_hz, jitter_s=columns.jitter_s, noise_m=tracking.grid_noise_m)
+    time, sure = times.time_s, times.sure
+    course = smooth(time, position, tracking.noise_m**2 / sure, tracking.jerk_density)
+    turned = Rotation.from_quat(recording.quaternion_xyzw)
+    up = turned.apply(np.array([0.0, 0.0, 1.0]))
+    lean = attachment.thrust_tilt
+    thrust = turned.apply(np.array([-lean[0], -lean[1], 1.0]))
+    axis = smooth(time, up, _AXIS_NOISE**2 / sure, _AXIS_DENSITY)
+    return Motion(
+        time,
+        Course(*(a - attachment.below_m * b for a, b in zip(course, axis, strict=True))),
+        smooth(time, thrust, _AXIS_NOISE**2 / sure, _AXIS_DENSITY).position,
+        smooth(time, position, SLOW_NOISE_M**2 / sure, SLOW_DENSITY),
+        smooth(time, thrust[:, :2] / thrust[:, 2:], _SLOW_AXIS_NOISE**2 / sure, _SLOW_AXIS_DENSITY).position,
+        recording.load,
+        times,
+    )
+
+
+def distances(motion: Motion) -> Floats:
+    """(n,) from attachment to load."""
+    far: Floats = np.linalg.norm(motion.load - motion.attachment.position, axis=1)
+    return far
+
+
+def drive_rows(motion: Motion, model: LoadModel) -> Floats:
+    """(n, 8): acceleration, velocity, and the attachment's place from where the wash comes down now."""
+    then = motion.time_s - model.wash_delay_s
+    place = motion.attachment.position[:, :2]
+    from_there = place - model.length_m * motion.thrust[:, :2]
+    centre = np.stack([np.interp(then, motion.time_s, from_there[:, i]) for i in range(2)], axis=1)
+    return np.hstack([motion.attachment.acceleration, motion.attachment.velocity, place - centre])
+
+
+def slow_rows(motion: Motion) -> Floats:
+    """(n, 8): the drive that the attitude is compared with."""
+    still = np.zeros((len(motion.time_s), 2))
+    return np.hstack([motion.slow.acceleration, motion.slow.velocity, still])
+
+
+def sight_rows(motion: Motion) -> Floats:
+    """(n, 6): load from attachment, direction of the thrust, weight of the row, 1 where it is broken."""
+    seen = motion.load[:, :2] - motion.attachment.position[:, :2]
+    return np.hstack([seen, motion.tilt, motion.times.sure[:, None], motion.times.broken[:, None]])

@@ -1,0 +1,138 @@
+"""Reading a recorded flight: rows of numbers, or a telemetry log of Plumbline's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcs.analysis.tracks import Telemetry
+from gcs.recorded.column_map import ColumnMap
+from gcs.recorded.smoothing import Floats
+
+LEAST_ROWS = 200
+_MOST_BYTES = 2**30
+_UNIT = 0.1  # by which the length of a quaternion may differ from 1
+_LIFTED_M = 0.05  # above the lowest place of the load: a log begins and ends on the ground
+
+
+class RecordingError(ValueError):
+    """What is wrong with the file, in one line, beginning with its name."""
+
+
+class Recording(NamedTuple):
+    """Rows in order; world z up, SI units."""
+
+    name: str
+    time_s: Floats | None  # (n,), None if rows have no time
+    position: Floats  # (n, 3) of the vehicle
+    quaternion_xyzw: Floats  # (n, 4) of the vehicle, body to world
+    load: Floats  # (n, 3); nan where it was not measured
+
+
+def read_recording(path: Path, columns: ColumnMap) -> Recording:
+    """The recording in a file; RecordingError if it is none."""
+    try:
+        if not path.is_file():
+            raise RecordingError(f"{path}: {'not a file' if path.exists() else 'there is no such file'}")
+        found = _telemetry(path) if path.suffix == ".tlog" else _rows(path, columns)
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
+    return _valid(found, path)
+
+
+def name_of(path: Path) -> str:
+    """The file's name without what says its kind."""
+    return path.name.removesuffix(".gz").rsplit(".", 1)[0]
+
+
+def _rows(path: Path, columns: ColumnMap) -> Recording:
+    from pyarrow import ArrowInvalid, csv
+
+    if columns.vehicle is None:
+        raise RecordingError(
+            f"{path}: the column map has no [vehicle]: it says not which columns hold the pose"
+        )
+    if columns.time is None and columns.rate_hz is None:
+        raise RecordingError(f"{path}: the column map says neither time nor rate_hz")
+    if path.stat().st_size > _MOST_BYTES:
+        raise RecordingError(f"{path}: more than {_MOST_BYTES // 2**20} MiB")
+    try:
+        table = csv.read_csv(path, csv.ReadOptions(autogenerate_column_names=True))
+        values = np.column_stack([np.asarray(column, dtype=np.float64) for column in table.columns])
+    except (ArrowInvalid, ValueError, TypeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise RecordingError(f"{path}: not rows of comma-separated numbers: {reason}") from None
+    pose, load = columns.vehicle, columns.load
+    order = pose.quaternion if pose.quaternion_order == "xyzw" else [*pose.quaternion[1:], pose.quaternion[0]]
+    asked = [
+        *pose.position,
+        *order,
+        *(load.position if load else []),
+        *([columns.time] if columns.time is not None else []),
+    ]
+    if max(asked) >= values.shape[1]:
+        raise RecordingError(
+            f"{path}: {values.shape[1]} columns; the column map asks for column {max(asked)} (counted from 0)"
+        )
+    return Recording(
+        name_of(path),
+        values[:, columns.time] if columns.time is not None else None,
+        values[:, pose.position],
+        values[:, order],
+        values[:, load.position] if load else np.full((len(values), 3), np.nan),
+    )
+
+
+def _telemetry(path: Path) -> Recording:
+    from gcs.analysis.telemetry import load_telemetry
+
+    try:
+        return recording_of(load_telemetry(path), name_of(path))
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
+
+
+def recording_of(telemetry: Telemetry, name: str) -> Recording:
+    """The true states of a simulated flight while it carries its load; RecordingError if there are none."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    track, attitude = telemetry.load_truth, telemetry.attitude_truth
+    if len(track.time_s) < LEAST_ROWS or len(attitude.time_s) < LEAST_ROWS:
+        raise RecordingError("holds no true states of a simulated flight, or too few")
+    within = (track.time_s >= attitude.time_s[0]) & (track.time_s <= attitude.time_s[-1])
+    lifted = track.position_m[:, 2] > np.min(track.position_m[:, 2]) + _LIFTED_M
+    flown = _longest(within & lifted & (track.taut > 0))
+    turned = Slerp(attitude.time_s, Rotation.from_quat(np.roll(attitude.quat_wxyz, -1, axis=1)))
+    time, load = track.time_s[flown], track.position_m[flown]
+    vehicle = load - track.distance_m[flown, None] * track.q_cable[flown]
+    return Recording(name, time, vehicle, turned(time).as_quat(), load)
+
+
+def _longest(true: NDArray[np.bool_]) -> slice:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], true.astype(np.int8), [0]])))
+    begins, ends = edges[0::2], edges[1::2]
+    if not len(begins):
+        return slice(0, 0)
+    k = int(np.argmax(ends - begins))
+    return slice(int(begins[k]), int(ends[k]))
+
+
+def _valid(found: Recording, path: Path) -> Recording:
+    """The rows whose pose is one."""
+    length = np.linalg.norm(found.quaternion_xyzw, axis=1)
+    good = np.isfinite(found.position).all(axis=1) & (np.abs(length - 1.0) < _UNIT)
+    if found.time_s is not None:
+        good &= np.isfinite(found.time_s)
+    if good.sum() < LEAST_ROWS:
+        raise RecordingError(
+            f"{path}: {int(good.sum())} rows of {len(good)} with a position and a unit quaternion; "
+            f"at least {LEAST_ROWS} are needed"
+        )
+    time = None if found.time_s is None else found.time_s[good]
+    kept = Recording(found.name, time, found.position[good], found.quaternion_xyzw[good], found.load[good])
+    if kept.time_s is not None and np.any(np.diff(kept.time_s) <= 0.0):
+        raise RecordingError(f"{path}: times do not increase from row to row")
+    return kept

@@ -1,0 +1,76 @@
+"""How well a recorded load is predicted, and how well it is known from the vehicle's pose alone."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcs.recorded.estimates import Rows, filtered, load_position, predicted
+from gcs.recorded.load_model import LoadModel
+from gcs.recorded.motion import Motion
+from gcs.recorded.smoothing import Floats
+
+HORIZONS_S = (2.0, 5.0)
+EVERY_ROWS = 15  # a prediction begins
+SETTLED_ROWS = 90  # the filter has seen the load so long before the first prediction
+BOUND_95 = 5.991  # chi-square of two degrees of freedom
+
+
+class Score(NamedTuple):
+    """Errors (k,) in metres, and their normalised squares (k,) by the stated covariance of the direction."""
+
+    rows: NDArray[np.intp]  # at which
+    error_m: Floats
+    square: Floats
+
+    @property
+    def median_m(self) -> float:
+        """Median error; nan if there is none."""
+        known = self.error_m[np.isfinite(self.error_m)]
+        return float(np.median(known)) if known.size else float("nan")
+
+    @property
+    def inside(self) -> float:
+        """Share within the 95 % bounds; nan if there is none."""
+        known = self.square[np.isfinite(self.square)]
+        return float(np.mean(known < BOUND_95)) if known.size else float("nan")
+
+
+def score_ahead(motion: Motion, rows: Rows, model: LoadModel) -> tuple[Score, ...]:
+    """Predictions from every half second on, for each horizon, against the measured load.
+
+    Each begins with what the rows said so far of load and vehicle, and goes on by the vehicle's motion
+    alone. Left out are those across a break, of which nobody knows how long it was.
+    """
+    estimates = filtered(rows, model, load=True, tilt=True)
+    begins = np.arange(SETTLED_ROWS, len(rows.time_s), EVERY_ROWS)
+    windows = predicted(rows, model, estimates, begins, HORIZONS_S, tilt=True)
+    breaks = np.cumsum(motion.times.broken)
+    windows = [one for one in windows if breaks[one.begin] == breaks[one.ends[-1]]]
+    scores = []
+    for i in range(len(HORIZONS_S)):
+        at = np.array([one.ends[i] for one in windows], dtype=np.intp)
+        direction = np.array([one.direction[i] for one in windows]).reshape(-1, 2)
+        covariance = np.array([one.covariance[i] for one in windows]).reshape(-1, 3)
+        scores.append(_score(motion, model, at, direction, covariance))
+    return tuple(scores)
+
+
+def score_pose_alone(motion: Motion, rows: Rows, model: LoadModel) -> Score:
+    """Smoothed estimates of the whole flight, without a look at the load, against the measured load."""
+    found = filtered(rows, model, load=False, tilt=True, smoothed=True)
+    at = np.arange(len(rows.time_s))
+    covariance = found.covariances[:, [0, 0, 1], [0, 1, 1]]
+    return _score(motion, model, at, found.states[:, :2], covariance)
+
+
+def _score(
+    motion: Motion, model: LoadModel, at: NDArray[np.intp], direction: Floats, covariance: Floats
+) -> Score:
+    error = load_position(motion, model, at, direction) - motion.load[at]
+    x, y = (error[:, :2] / model.length_m).T
+    xx, xy, yy = covariance.T
+    square = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
+    return Score(at, np.linalg.norm(error, axis=1), square)

@@ -1,0 +1,75 @@
+"""Position, velocity and acceleration of something that is measured row by row.
+
+The motion is a triple integrator driven by white noise (a Wiener process of jerk). Its most probable course
+is a linear least squares problem with 3 x 3 blocks on three diagonals (Särkkä, *Bayesian Filtering and
+Smoothing*, 2013, section 8.2, gives the recursive form); solved here at once as a banded system.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+
+Floats = NDArray[np.float64]
+
+_HALF_BAND = 5  # entries beside the diagonal that neighbouring blocks of three reach
+_SHORTEST_S = 1e-4  # a step between rows; the motion is smooth over anything shorter
+
+
+class Course(NamedTuple):
+    """A smoothed motion, one row an instant; shapes (n, d)."""
+
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+
+
+def smooth(time_s: Floats, measured: Floats, variance: Floats | float, jerk_density: float) -> Course:
+    """The most probable course of `measured` (n, d) at increasing `time_s` (n,).
+
+    `variance` is that of the measurement, a number or one a row; infinite where a row says nothing.
+    `jerk_density` is the spectral density of the jerk's noise, in units of `measured`^2 / s^5.
+    """
+    n, d = measured.shape
+    step = np.maximum(np.diff(time_s), _SHORTEST_S)
+    unit = float(np.median(step))  # the states are position, unit x velocity, unit^2 x acceleration
+    moves, weights = _transitions(step / unit, jerk_density * unit**5)
+    carried = np.einsum("kji,kjl->kil", moves, weights)  # F' W
+    diagonal = np.zeros((n, 3, 3))
+    diagonal[:-1] += np.einsum("kij,kjl->kil", carried, moves)
+    diagonal[1:] += weights
+    sure = 1.0 / np.broadcast_to(np.asarray(variance, dtype=np.float64), (n,))
+    diagonal[:, 0, 0] += sure
+    band = np.zeros((_HALF_BAND + 1, 3 * n))  # lower form: band[i - j, j]
+    for i in range(3):
+        for j in range(3):
+            if i >= j:
+                band[i - j, j::3] = diagonal[:, i, j]
+            band[3 + i - j, j : 3 * (n - 1) : 3] = -carried[:, j, i]
+    right = np.zeros((3 * n, d))
+    right[0::3] = sure[:, None] * np.where(np.isfinite(measured), measured, 0.0)
+    x = solveh_banded(band, right, lower=True, check_finite=False).reshape(n, 3, d)
+    return Course(x[:, 0], x[:, 1] / unit, x[:, 2] / unit**2)
+
+
+def _transitions(step: Floats, density: float) -> tuple[Floats, Floats]:
+    """Transition matrices over steps (k,) and the inverse covariances of what the noise adds, (k, 3, 3)."""
+    one, zero = np.ones_like(step), np.zeros_like(step)
+    moves = np.stack([one, step, 0.5 * step**2, zero, one, step, zero, zero, one], axis=1).reshape(-1, 3, 3)
+    # inverse of the covariance [[h^5/20, h^4/8, h^3/6], [h^4/8, h^3/3, h^2/2], [h^3/6, h^2/2, h]]
+    h = step
+    terms = [
+        720 / h**5,
+        -360 / h**4,
+        60 / h**3,
+        -360 / h**4,
+        192 / h**3,
+        -36 / h**2,
+        60 / h**3,
+        -36 / h**2,
+        9 / h,
+    ]
+    return moves, np.stack(terms, axis=1).reshape(-1, 3, 3) / density

@@ -1,0 +1,103 @@
+"""An estimator of your own, in plain Python; docs/estimators.md tells all that it may do.
+
+Fly it: gcs fly hover --estimator my_name.py:MyName
+
+For rooms where trackers see vehicle and load (--sensors lab). World: x east, y north, z up. Body: x forward,
+y left, z up. Metres, seconds, newtons, radians. Vectors are tuples of three floats, which numpy takes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from plumbline.estimators import Parameter, estimated, no_estimate
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+class Memory(NamedTuple):
+    """What is remembered: the vehicle (x, v, R), errors of the inertial unit, the load (x_L, v_L)."""
+
+    x: np.ndarray
+    v: np.ndarray
+    R: Rotation  # body to world
+    accel_bias: np.ndarray
+    gyro_bias: np.ndarray
+    x_L: np.ndarray
+    v_L: np.ndarray
+    pose_s: float  # when the trackers' last readings were
+    load_s: float
+
+
+class MyName:
+    """A model, driven by the inertial unit, that is pulled to what the trackers see."""
+
+    # shown in the report; without it the name of the class
+    name = "my_name"
+
+    # become parameters of the autopilot: gcs fly ... --set MINE_W=20, gcs sweep ... --vary MINE_W=5:30:6,
+    # or from any ground station while it flies. Default, least, greatest, unit, text.
+    parameters = {
+        "MINE_W": Parameter(15.0, 1.0, 60.0, "rad/s", "How fast the vehicle's place follows the tracker"),
+        "MINE_W_TURN": Parameter(30.0, 1.0, 100.0, "rad/s", "How fast its attitude does"),
+        "MINE_W_LOAD": Parameter(25.0, 1.0, 100.0, "rad/s", "How fast the load does"),
+    }
+
+    def __init__(self, parameters):
+        """Made anew when a parameter changes; `parameters` has all of the autopilot's, by name."""
+        self.w, self.w_turn, self.w_load = (parameters[n] for n in ("MINE_W", "MINE_W_TURN", "MINE_W_LOAD"))
+        self.gravity = parameters["VEH_GRAVITY"]
+
+    def start(self, now):
+        """What the estimator remembers at its first tick: nothing yet."""
+        return
+
+    def estimate(self, memory, now):
+        """At each tick, 250 times a second: what is remembered from now on, and the estimate."""
+        pose, load, dt, zero = now.pose, now.load, now.period_s, np.zeros(3)
+        if memory is None:
+            if pose.new and load.new:
+                R = Rotation.from_matrix(pose.R)
+                at = (np.array(pose.x_quad), zero, R, zero, zero, np.array(load.x_load), zero)
+                memory = Memory(*at, pose.time_s, load.time_s)
+            return memory, no_estimate()
+        x, v, R, accel_bias, gyro_bias, x_L, v_L, pose_s, load_s = memory
+
+        # the model: the inertial unit moves the vehicle, and the load swings below it
+        omega = now.inertial.gyro - gyro_bias
+        R = R * Rotation.from_rotvec(omega * dt)
+        felt = R.apply(now.inertial.accel - accel_bias)
+        a = felt - self.gravity * UP
+        length = np.linalg.norm(x_L - x)
+        q = (x_L - x) / length
+        q_dot = (v_L - v) / length
+        q_dot = q_dot - q.dot(q_dot) * q
+        a_L = zero
+        if now.taut:
+            a_L = a - (felt - q.dot(felt) * q) - length * q_dot.dot(q_dot) * q
+        x, v, x_L, v_L = x + v * dt, v + a * dt, x_L + v_L * dt, v_L + a_L * dt
+
+        # what the trackers saw some milliseconds ago, held against where the model was then
+        if pose.new:
+            age, T, w = now.time_s - pose.time_s, pose.time_s - pose_s, self.w
+            e = pose.x_quad - (x - v * age)
+            x, v = x + 3.0 * w * T * e, v + 3.0 * w**2 * T * e
+            accel_bias = accel_bias - w**3 * T * R.inv().apply(e)
+            then = R * Rotation.from_rotvec(-omega * age)
+            turn = (then.inv() * Rotation.from_matrix(pose.R)).as_rotvec()
+            R = R * Rotation.from_rotvec(2.0 * self.w_turn * T * turn)
+            gyro_bias = gyro_bias - self.w_turn**2 * T * turn
+            pose_s = pose.time_s
+        if load.new:
+            age, T, w = now.time_s - load.time_s, load.time_s - load_s, self.w_load
+            e = load.x_load - (x_L - v_L * age)
+            x_L, v_L = x_L + 2.0 * w * T * e, v_L + w**2 * T * e
+            load_s = load.time_s
+
+        q = (x_L - x) / np.linalg.norm(x_L - x)
+        q_dot = (v_L - v) / np.linalg.norm(x_L - x)
+        q_dot = q_dot - q.dot(q_dot) * q
+        memory = Memory(x, v, R, accel_bias, gyro_bias, x_L, v_L, pose_s, load_s)
+        omega = now.inertial.gyro - gyro_bias
+        return memory, estimated(x_L, v_L, q, q_dot, x, v, R.as_matrix(), omega, a)

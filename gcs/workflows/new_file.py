@@ -1,0 +1,83 @@
+"""A new file of one's own, from a template that flies as it is.
+
+The kinds are the files in `gcs/templates`: `vehicle.toml` is the template of a vehicle. A template is itself
+such a file, with the name `my_name` (and `MyName`, where a class is named), which is replaced; a comment line
+in it that begins with `Fly it:` holds the command that flies it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from gcs.errors import GcsError, InputError
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+_FLY_IT = re.compile(r"^\W*Fly it:\s+(\S.*)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class NewFile:
+    """What was written, and the command that flies it."""
+
+    path: Path
+    fly: str
+
+
+def kinds() -> tuple[str, ...]:
+    """What there are templates of, sorted."""
+    return tuple(sorted(_suffixes()))
+
+
+def new_file(kind: str, name: str) -> NewFile:
+    """Write the template of `kind` as `name`, which may lead into another folder and may have its ending.
+
+    InputError for a name that cannot be one; GcsError if the file is there already or cannot be written.
+    """
+    suffix = _suffixes()[kind]
+    given = Path(name)
+    word = given.name.removesuffix(suffix)
+    if not _NAME.fullmatch(word):
+        raise InputError(
+            f"{name!r} cannot be the name of a {kind}: letters, digits, - and _, beginning with a letter"
+        )
+    # a module's name is an identifier
+    stem = word.replace("-", "_") if suffix == ".py" else word
+    path = given.with_name(stem + suffix)
+    text = _template(kind + suffix).replace(f"my_name{suffix}", str(path))
+    text = text.replace("my_name", stem).replace("MyName", _class_name(stem))
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise GcsError(f"{path} exists already and is left as it is; choose another name") from None
+    except OSError as error:
+        raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
+    return NewFile(path, _command(text, kind))
+
+
+def _suffixes() -> dict[str, str]:
+    names = [Path(entry.name) for entry in _folder().iterdir() if not entry.name.startswith("_")]
+    return {name.stem: name.suffix for name in names if name.suffix in (".toml", ".py")}
+
+
+def _template(name: str) -> str:
+    return _folder().joinpath(name).read_text(encoding="utf-8")
+
+
+def _folder() -> Traversable:
+    return files("gcs").joinpath("templates")
+
+
+def _class_name(stem: str) -> str:
+    return "".join(word[:1].upper() + word[1:] for word in re.split("[-_]", stem))
+
+
+def _command(text: str, kind: str) -> str:
+    found = _FLY_IT.search(text)
+    if found is None:
+        raise ValueError(f"the template of {kind} has no line that begins with `Fly it:`")
+    return found.group(1)

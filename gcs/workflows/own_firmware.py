@@ -1,0 +1,170 @@
+"""A flight by an autopilot of others, started for it on Plumbline's world, and stopped after it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from autopilot.trajectory.timeline import expected_duration_s
+from autopilot.vehicle.file import load_vehicle
+from autopilot.wire.convert import Home
+from gcs.clients.capture import Capture, FrameLog
+from gcs.clients.connection import LINK_TIMEOUT_US
+from gcs.clients.firmware_flight import FIRMWARES, Firmware, FirmwareFlight
+from gcs.clients.firmware_mission import FirmwareMissionError, firmware_items
+from gcs.errors import GcsError
+from gcs.shell.display import FlightDisplay
+from gcs.shell.link import DEFAULT_PORT, LOOPBACK, UdpSocket, free_port, unix_us
+from gcs.shell.processes import Processes
+from gcs.shell.stopping import StopRequest
+from gcs.workflows.flight_inputs import split_settings
+from gcs.workflows.flight_loops import run_wall_clock
+from gcs.workflows.flight_options import FirmwareProgram, FlightOptions, setting_of
+from gcs.workflows.own_vehicle import FIRMWARE_LOG, SIMULATOR_LOG, OwnVehicle
+from gcs.workflows.stopwatch import Stopwatch
+from missions.model import Mission
+
+if TYPE_CHECKING:
+    from gcs.workflows.flight_page import FlightPage
+
+FOLDER = "firmware"  # in the directory of the flight: where the firmware keeps what it keeps
+_PX4_PHYSICS = 4560  # TCP; its startup script knows no other
+
+
+def firmware_program(text: str) -> FirmwareProgram:
+    """KIND=PATH; GcsError says what is wrong with it."""
+    kind, _, path = text.partition("=")
+    program = Path(path).expanduser()
+    if kind not in FIRMWARES or not path:
+        known = " or ".join(f"{name}=PATH" for name in FIRMWARES)
+        raise GcsError(f"--autopilot {text}: must be {known}")
+    if not (program.is_file() and os.access(program, os.X_OK)):
+        raise GcsError(f"--autopilot {text}: no program there; see docs/autopilots.md on where to get one")
+    return FirmwareProgram(kind, program.resolve())
+
+
+def firmware_client(
+    mission: Mission, options: FlightOptions, firmware: Firmware, home: Home
+) -> FirmwareFlight:
+    """The ground station's side of the flight; GcsError if the firmware cannot fly the mission."""
+    vehicle = load_vehicle(options.vehicle)
+    try:
+        items = firmware_items(
+            mission.steps,
+            home,
+            vehicle.cable_length_m,
+            vehicle.gear_height_m,
+            firmware.begins_with_home,
+            firmware.takes_off_low,
+        )
+    except FirmwareMissionError as error:
+        raise GcsError(f"{options.mission}: {error}") from None
+    slow = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
+    expected_s = expected_duration_s(mission)
+    return FirmwareFlight(firmware, items, expected_s, options.limit_s, round(LINK_TIMEOUT_US * slow))
+
+
+@contextmanager
+def own_firmware(program: FirmwareProgram, options: FlightOptions, out: Path) -> Iterator[OwnVehicle]:
+    """Start simulator and firmware; afterwards they are gone. What the firmware wrote is left in `out`."""
+    ours, theirs = split_settings(options.vehicle, options.sensors, map(setting_of, options.settings))
+    folder = (out / FOLDER).resolve()
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    begin = _BEGINNINGS[program.kind]
+    port = DEFAULT_PORT if program.kind == "px4" else 0  # where it says to the ground what it has to say
+    with (
+        Processes() as processes,
+        closing(UdpSocket(LOOPBACK, port)) as vehicle,
+        closing(UdpSocket()) as truth,
+    ):
+        physics = _PX4_PHYSICS if program.kind == "px4" else free_port()
+        _start_simulator(processes, program.kind, options, ours, out, physics, truth.address)
+        command, environment = begin(
+            program.path, folder, _parameters(program.kind, theirs), physics, vehicle
+        )
+        title = FIRMWARES[program.kind].title
+        processes.start_program(title, command, out / FIRMWARE_LOG, folder, environment)
+        yield OwnVehicle(processes, vehicle, truth)
+
+
+def _ardupilot(
+    program: Path, folder: Path, parameters: str, physics: int, vehicle: UdpSocket
+) -> tuple[list[str], dict[str, str]]:
+    """Its command line, and what it needs in its environment: it speaks to us, and listens to nobody."""
+    file = folder / "plumbline.parm"
+    file.write_text(parameters, encoding="ascii")
+    home = Home()
+    command = [
+        *(str(program), "--model", f"JSON:{LOOPBACK}", "--sim-port-out", str(physics)),
+        *("--defaults", str(file), "--wipe"),
+        *("--home", f"{home.latitude_deg},{home.longitude_deg},{home.altitude_m},0"),
+        *("--serial0", f"udpclient:{vehicle.address}", "--serial1", "none", "--serial2", "none"),
+    ]
+    return command, {}
+
+
+def _px4(
+    program: Path, folder: Path, parameters: str, physics: int, vehicle: UdpSocket
+) -> tuple[list[str], dict[str, str]]:
+    """The same of PX4, whose startup looks for px4-rc.params in PATH; `etc` is where its build has it."""
+    etc = program.parent.parent / "etc"
+    if not etc.is_dir():
+        raise GcsError(f"--autopilot px4={program}: no folder {etc}; name bin/px4 of a build of px4_sitl")
+    lines = [line.split() for line in parameters.splitlines() if line and not line.startswith("#")]
+    text = "".join(f"param set-default {name} {value}\n" for name, value in lines)
+    (folder / "px4-rc.params").write_text(text, encoding="ascii")
+    command = [str(program), "-d", str(etc), "-s", "etc/init.d-posix/rcS", "-w", str(folder)]
+    return command, {"PATH": f"{folder}:{os.environ.get('PATH', '')}", "PX4_SIM_MODEL": "none_iris"}
+
+
+_BEGINNINGS = {"ardupilot": _ardupilot, "px4": _px4}
+
+
+def fly_firmware(
+    mission: Mission,
+    options: FlightOptions,
+    program: FirmwareProgram,
+    log: FrameLog,
+    own: OwnVehicle,
+    stop: StopRequest,
+    watch: Stopwatch,
+    page: FlightPage | None = None,
+) -> FirmwareFlight:
+    """Fly with the simulator and the firmware that were started for it."""
+    client = firmware_client(mission, options, FIRMWARES[program.kind], Home())
+    with FlightDisplay(mission.name, options.quiet) as display:
+        capture = Capture(log, unix_us())
+        run_wall_clock(
+            *(client, capture, own.vehicle, own.truth, own.processes.ended, display, stop, watch.start, page)
+        )
+        client.explain_silence(own.processes.stopped())
+        watch.stop()
+    return client
+
+
+def _start_simulator(
+    processes: Processes,
+    kind: str,
+    options: FlightOptions,
+    settings: list[tuple[str, float]],
+    out: Path,
+    physics: int,
+    truth: str,
+) -> None:
+    pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
+    world = ["--vehicle", options.vehicle, "--sensors", options.sensors, "--seed", str(options.seed)]
+    links = ["--for", kind, "--listen", f"{LOOPBACK}:{physics}", "--truth", truth]
+    changed = [word for name, value in settings for word in ("--set", f"{name}={value!r}")]
+    processes.start("sitl", [*links, *world, *pace, *changed], out / SIMULATOR_LOG)
+
+
+def _parameters(kind: str, settings: list[tuple[str, float]]) -> str:
+    """The firmware's parameters: those that are shipped, then what the user sets."""
+    shipped = (files("sitl.interfaces") / f"{kind}.parm").read_text(encoding="ascii")
+    return shipped + "".join(f"{name} {value:.9g}\n" for name, value in settings)

@@ -1,0 +1,30 @@
+"""A planner that somebody has brought, as `gcs check` has it plan."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from autopilot.own.chosen import Own, parameters_for
+from autopilot.own.planner import load_planner
+from autopilot.own.planning import planner_of
+from autopilot.own.source import OwnError
+from autopilot.shell.watched_calls import watched_calls
+from autopilot.trajectory.route import Planner
+from autopilot.vehicle.file import VehicleFileError, load_belief
+from gcs.errors import InputError, input_error
+
+
+@contextmanager
+def own_planner(reference: str, vehicle: str) -> Iterator[Planner]:
+    """The planner with the parameters that it has by default for a vehicle, its calls watched. GcsError if
+    there is no such vehicle, or if the planner cannot be loaded."""
+    try:
+        values = parameters_for(load_belief(vehicle), Own(planner=reference)).values()
+        planner = planner_of(load_planner(reference), values)
+    except OwnError as error:
+        raise InputError(str(error)) from None
+    except VehicleFileError as error:
+        raise input_error(error) from None
+    with watched_calls():
+        yield planner

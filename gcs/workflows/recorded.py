@@ -1,0 +1,128 @@
+"""`gcs identify` and `gcs replay` from their arguments to record, table and picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gcs.errors import GcsError, InputError, input_error
+
+if TYPE_CHECKING:
+    from gcs.recorded.column_map import ColumnMap
+    from gcs.recorded.identification import Identified
+    from gcs.recorded.load_model import LoadModel
+    from gcs.recorded.motion import Motion
+
+FOLDER = Path("replays")
+OWN_MAP = "telemetry"  # of Plumbline's own logs
+
+
+def identify(path: Path, columns: str | None) -> dict[str, Any]:
+    """What the recording says of cable, load and vehicle, with half the widths of the 95 % intervals."""
+    from gcs.recorded.identification import (
+        LEAST_S,
+        TooLittleMotionError,
+        identify_load,
+        identify_vehicle,
+        tracked_length,
+    )
+
+    asked, motion, model = _read(path, columns)
+    _needs_load(path, motion)
+    duration_s = float(motion.time_s[-1] - motion.time_s[0])
+    if duration_s < LEAST_S:
+        raise GcsError(
+            f"{path}: {duration_s:.1f} s; at least {LEAST_S:.0f} s are needed to identify anything"
+        )
+    try:
+        vehicle = identify_vehicle(motion, model)
+    except TooLittleMotionError as error:
+        raise GcsError(f"{path}: {error}") from None
+    found: list[Identified] = [
+        tracked_length(motion, asked.attachment.below_m),
+        *identify_load(motion, model, asked.identify.parameters),
+        *vehicle,
+    ]
+    return {
+        **_rows_record(path, motion),
+        "identified": {one.name: {"value": one.value, "half_width": one.half_width} for one in found},
+    }
+
+
+def replay(path: Path, columns: str | None, out: Path | None) -> tuple[dict[str, Any], Path]:
+    """The scores of the estimates, and the folder in which their table and picture are."""
+    from gcs.recorded.estimates import filtered, load_position, rows_of
+    from gcs.recorded.recording import name_of
+    from gcs.recorded.replay_files import write_picture, write_table
+    from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
+
+    _, motion, model = _read(path, columns)
+    rows = rows_of(motion, model)
+    seen = bool(np.isfinite(motion.load).all())
+    record: dict[str, Any] = _rows_record(path, motion)
+    if seen:
+        squares = filtered(rows, model, load=True, tilt=True).squares
+        record["innovations"] = {
+            name: {
+                "mean_square_per_axis": float(np.mean(np.abs(each)) / 2.0),
+                "refused": int(np.sum(each < 0.0)),
+            }
+            for name, each in (("load", squares[:, 0]), ("attitude", squares[:, 1]))
+        }
+        for horizon, score in zip(HORIZONS_S, score_ahead(motion, rows, model), strict=True):
+            record[f"ahead_{horizon:g}s"] = {"median_m": score.median_m, "inside_95": score.inside}
+        alone = score_pose_alone(motion, rows, model)
+        record["pose_alone"] = {
+            "median_m": alone.median_m,
+            "nees_per_axis": float(np.mean(alone.square) / 2.0),
+            "inside_95": alone.inside,
+        }
+    found = filtered(rows, model, load=False, tilt=True, smoothed=True)
+    load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
+    sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
+    folder = out or FOLDER / name_of(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_table(folder / "load.csv", motion, load, sd)
+        write_picture(folder / "load.png", motion, load, sd)
+    except OSError as error:
+        raise GcsError(f"{folder}: {error.strerror}") from None
+    return record, folder
+
+
+def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel]:
+    from gcs.recorded.column_map import MAPS, MapError, load_map
+    from gcs.recorded.motion import distances, motion_of
+    from gcs.recorded.recording import RecordingError, read_recording
+
+    if columns is None and path.suffix != ".tlog" and path.is_file():
+        raise InputError(f"{path}: say what its columns are by --columns: {MAPS.choice()}")
+    try:
+        asked = load_map(columns or OWN_MAP)
+        motion = motion_of(read_recording(path, asked), asked)
+    except MapError as error:
+        raise input_error(error) from None
+    except RecordingError as error:
+        raise GcsError(str(error)) from None
+    far = distances(motion)
+    if asked.model.length_m is None and not np.isfinite(far).any():
+        raise GcsError(f"{path}: without measured loads the column map must say model.length_m")
+    return asked, motion, asked.load_model(float(np.nanmedian(far)) if np.isfinite(far).any() else 0.0)
+
+
+def _needs_load(path: Path, motion: Motion) -> None:
+    if not np.isfinite(motion.load).all():
+        raise GcsError(f"{path}: the load was not measured in every row; nothing can be identified from it")
+
+
+def _rows_record(path: Path, motion: Motion) -> dict[str, Any]:
+    times = motion.times
+    return {
+        "file": str(path),
+        "rows": len(motion.time_s),
+        "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
+        "row_jitter_s": float(np.std(times.offset_s)),
+        "breaks": int(np.sum(times.broken)),
+    }

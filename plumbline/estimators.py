@@ -1,0 +1,42 @@
+"""What an estimator of one's own is written with: `docs/estimators.md` shows how.
+
+World ENU, body FLU, SI.
+"""
+
+from __future__ import annotations
+
+from autopilot.control.records import Cable, State
+from autopilot.estimation.desk import (
+    DirectionSample,
+    Driven,
+    Estimate,
+    FieldSample,
+    FixSample,
+    HeightSample,
+    InertialSample,
+    LoadSample,
+    PoseSample,
+    Sensed,
+)
+from autopilot.own.brought import Parameter
+from autopilot.own.compiled import kernel
+from autopilot.own.estimating import estimated, no_estimate
+
+__all__ = [
+    "Cable",
+    "DirectionSample",
+    "Driven",
+    "Estimate",
+    "FieldSample",
+    "FixSample",
+    "HeightSample",
+    "InertialSample",
+    "LoadSample",
+    "Parameter",
+    "PoseSample",
+    "Sensed",
+    "State",
+    "estimated",
+    "kernel",
+    "no_estimate",
+]

@@ -1,0 +1,28 @@
+"""What a control law of one's own is written with: `docs/laws.md` shows how.
+
+World ENU, body FLU, SI.
+"""
+
+from __future__ import annotations
+
+from autopilot.control.law_desk import Asked, Believed, Held, Now
+from autopilot.control.records import Cable, Reference, State
+from autopilot.own.asking import attitude, force, rates, wrench
+from autopilot.own.brought import Parameter
+from autopilot.own.compiled import kernel
+
+__all__ = [
+    "Asked",
+    "Believed",
+    "Cable",
+    "Held",
+    "Now",
+    "Parameter",
+    "Reference",
+    "State",
+    "attitude",
+    "force",
+    "kernel",
+    "rates",
+    "wrench",
+]

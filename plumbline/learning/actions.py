@@ -1,0 +1,118 @@
+"""What an action asks of the rotors: numbers between -1 and 1 become thrust and moment.
+
+| action | numbers | what 0 and +-1 mean |
+|---|---|---|
+| rotors | force of each rotor | 0 hovers, 1 is the greatest force, -1 the least; linear in between |
+| ctbr | thrust, body rates about x, y, z | thrust as above; rates times the greatest |
+| acceleration | acceleration of the load, ENU | times the greatest; 0 holds the load as it moves |
+
+Rates are followed by M = J k (Omega_d - Omega) + Omega x J Omega, an acceleration by the load attitude mode
+of the law `thesis`: q_d = -A/|A| with A = a + g e3, under a pull of (m_Q + m_L) |A . q|.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from autopilot.control.actuators.mixer import FORCE, MixerResult, mix, thrust_and_moment
+from autopilot.control.records import State
+from autopilot.control.thesis_cascade import ThesisMemory, load_attitude
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
+from autopilot.geometry.linear import E1, Vec3, add, cross, dot, norm, scale, sub, times
+from autopilot.vehicle.rotors import STRENGTH
+from plumbline.learning.records import ACCELERATION, RATES, ROTORS, ActionModel
+from sitl.world import Floats
+
+_LEAST_PULL = 0.2  # of the weight, so that the cable stays taut
+_LEAST_ACCEL = 1e-3  # m/s^2; a shorter A has no direction
+
+
+class Mixing(NamedTuple):
+    """The rotors that carry an action out."""
+
+    table: Floats  # (rotors + 1, 8) of the mixer
+    rotors: Floats  # its memory; forces (N) are in the row FORCE
+    hover: Floats  # (MOST,) N: force of each rotor that holds vehicle and load
+
+
+def size_of_action(kind: int, rotors: int) -> int:
+    """Numbers of an action."""
+    return {ROTORS: rotors, RATES: 4, ACCELERATION: 3}[kind]
+
+
+@kernel
+def within(number: float) -> float:
+    """A number of an action, cut to -1 ... 1; one that is no number is -1."""
+    return if_above(number, -1.0, min(number, 1.0), -1.0)
+
+
+@kernel
+def between(number: float, least: float, middle: float, most: float) -> float:
+    """What -1 ... 1 asks for: the least, the middle at 0, the most, linear in between."""
+    if number > 0.0:
+        return middle + number * (most - middle)
+    return middle + number * (middle - least)
+
+
+@kernel
+def number_of(value: float, least: float, middle: float, most: float) -> float:
+    """The number that asks for a value, -1 ... 1."""
+    if value > middle:
+        return min((value - middle) / (most - middle), 1.0)
+    return max((value - middle) / (middle - least), -1.0)
+
+
+@kernel
+def rate_moment(wanted: Vec3, state: State, model: ActionModel) -> Vec3:
+    """Moment (N m, body) that follows body rates (rad/s)."""
+    J, Omega = model.vehicle.inertia, state.omega_body
+    turning = times(J, times(model.rate_gain, sub(wanted, Omega)))
+    return add(turning, cross(Omega, times(J, Omega)))
+
+
+@kernel
+def carry_out(
+    action: Any, state: State, memory: ThesisMemory, model: ActionModel, mixing: Mixing
+) -> tuple[ThesisMemory, MixerResult]:
+    """Put the rotor forces for an action at this tick into `mixing.rotors`; the memory is that of the law
+    below an acceleration."""
+    vehicle, table, rotors = model.vehicle, mixing.table, mixing.rotors
+    if model.kind == ROTORS:
+        for i in range(table.shape[0] - 1):
+            least, most = table[i, STRENGTH] * model.least, table[i, STRENGTH] * model.most
+            rotors[FORCE, i] = between(action[i], least, mixing.hover[i], most)
+        thrust, moment = thrust_and_moment(rotors, vehicle, table)
+        return memory, MixerResult(0, thrust, moment)
+    if model.kind == RATES:
+        least, most = model.strength * model.least, model.strength * model.most
+        thrust = between(action[0], least, model.weight, most)
+        moment = rate_moment(times(model.rates, (action[1], action[2], action[3])), state, model)
+        return memory, mix(thrust, moment, vehicle, model.limited, table, rotors)
+    A = times(model.accel, (action[0], action[1], action[2]))
+    A = (A[0], A[1], A[2] + vehicle.gravity)
+    size = norm(A)
+    q_d = scale(-1.0 / size, A) if size > _LEAST_ACCEL else state.q_cable
+    mass = vehicle.quad_mass + vehicle.load_mass
+    pull = mass * max(-dot(A, state.q_cable), _LEAST_PULL * vehicle.gravity)
+    memory, command = load_attitude(memory, state, q_d, E1, pull, model.gains, model.filters, vehicle)
+    return memory, mix(command.thrust, command.moment, vehicle, model.limited, table, rotors)
+
+
+@kernel
+def numbers_for(mixed: MixerResult, state: State, model: ActionModel, mixing: Mixing, out: Any) -> None:
+    """Write the action that asks for what a law asks for at this tick: rotor forces, or thrust and body
+    rates."""
+    if model.kind == ROTORS:
+        table = mixing.table
+        for i in range(table.shape[0] - 1):
+            least, most = table[i, STRENGTH] * model.least, table[i, STRENGTH] * model.most
+            out[i] = number_of(mixing.rotors[FORCE, i], least, mixing.hover[i], most)
+        return
+    J, Omega = model.vehicle.inertia, state.omega_body
+    turning = sub(mixed.moment_done, cross(Omega, times(J, Omega)))
+    least, most = model.strength * model.least, model.strength * model.most
+    out[0] = number_of(mixed.thrust_done, least, model.weight, most)
+    for i in range(3):
+        wanted = Omega[i] + turning[i] / (J[i] * model.rate_gain[i])
+        out[1 + i] = within(wanted / model.rates[i])

@@ -1,0 +1,95 @@
+"""The world as an episode begins: the load hanging from the vehicle in the air."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from autopilot.control.actuators.mixer import FORCE as MIXED
+from autopilot.control.actuators.mixer import mix, new_rotors
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.geometry.packed import Row, packed, place_of, unpack
+from autopilot.geometry.so3 import IDENTITY_QUAT
+from autopilot.vehicle.rotors import allocate
+from plumbline.learning.scenario import Draw, Scenario
+from sitl.plant.records import PlantState, Truth
+from sitl.plant.rotors import ASKED, COMMAND, FORCE, TARGET
+from sitl.world import DUE, LENGTH, Floats, Ints, World, WorldRows
+
+_NEVER = 2**62
+
+
+def _place(field: str) -> slice:
+    first = place_of(World, "plant") + place_of(PlantState, field)
+    return slice(first, first + 3)
+
+
+X_LOAD, V_LOAD, X_QUAD, V_QUAD = (_place(name) for name in ("x_load", "v_load", "x_quad", "v_quad"))
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """All of a world but where it is and how fast it moves; the load rests at the origin."""
+
+    world: Row
+    rows: WorldRows  # model, rotors, fate and errors of the sensors
+    clock: Ints
+    commands: Floats  # (waiting, 1 + rotors) given before, and on their way yet
+    cable_length: float  # m
+
+
+def beginning_of(scenario: Scenario, draw: Draw) -> Beginning:
+    """The world of an episode. The rotors carry the weight, and have been asked to for long."""
+    rows, truth, settings = scenario.world(draw)
+    hover = hover_forces(scenario, (truth.quad_mass + truth.load_mass) * truth.gravity)
+    for row in (ASKED, COMMAND, TARGET, FORCE):
+        rows.rotors[row] = hover
+    world = unpack(World, rows.world, 0)._replace(plant=_hanging(truth))
+    clock = rows.clock.copy()
+    clock[:, LENGTH] = 0  # what was measured on the ground is lost
+    if not scenario.estimated:
+        clock[:, DUE] = _NEVER
+    waiting = settings.actuator_delay_us // settings.tick_us
+    due_us = [settings.actuator_delay_us - (waiting - k) * settings.tick_us for k in range(waiting)]
+    commands = np.zeros((waiting, rows.commands.shape[1]))
+    commands[:, 0], commands[:, 1:] = due_us, hover[: commands.shape[1] - 1]
+    return Beginning(packed(world), rows, clock, commands, truth.cable_length)
+
+
+def depends_on_chance(scenario: Scenario) -> bool:
+    """Whether two episodes differ by more than place and speed."""
+    gusts = scenario.cell.settings.gust_std != 0.0
+    return scenario.estimated or gusts or bool(scenario.options.randomise)
+
+
+def hover_forces(scenario: Scenario, weight: float) -> Floats:
+    """(MOST,) N: force of each rotor that holds a weight (N) level."""
+    setup, rotors = scenario.cell.setup, new_rotors()
+    mix(weight, ZERO, setup.vehicle, 0.0, allocate(setup.layout), rotors)
+    forces: Floats = rotors[MIXED]
+    return forces
+
+
+def _hanging(truth: Truth) -> PlantState:
+    """The load at the origin, the cable's attachment above it, the vehicle level and heading east."""
+    x, y, z = truth.attachment
+    over: Vec3 = (0.0 - x, 0.0 - y, truth.cable_length - z)
+    return PlantState(
+        x_load=ZERO,
+        v_load=ZERO,
+        q_cable=(0.0, 0.0, -1.0),
+        q_cable_dot=ZERO,
+        x_quad=over,
+        v_quad=ZERO,
+        quat_wxyz=IDENTITY_QUAT,
+        omega_body=ZERO,
+        taut=1.0,
+        slack_events=0.0,
+        vehicle_on_ground=0.0,
+        load_on_ground=0.0,
+        accel_quad=ZERO,
+        tension=truth.load_mass * truth.gravity,
+        diverged=0.0,
+        snap_speed=0.0,
+    )

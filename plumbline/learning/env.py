@@ -1,0 +1,55 @@
+"""One environment: `gymnasium.make`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from plumbline.learning.batch import Episodes
+from plumbline.learning.options import options_of
+from plumbline.learning.ready import make_ready
+from plumbline.learning.scenario import Scenario
+from plumbline.learning.spaces import action_space, observation_space
+from plumbline.learning.step import CRASHED, ENDED
+
+Array = NDArray[np.float32]
+
+
+class LoadEnv(gymnasium.Env[Array, Array]):
+    """A vehicle that carries a load on a cable, in one episode at a time.
+
+    Its options are those of `plumbline.learning.options.EnvOptions`. Observation, action and reward are
+    described in docs/learning.md.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+
+    def __init__(self, render_mode: str | None = None, **options: Any) -> None:
+        self.render_mode = render_mode
+        self.scenario = Scenario(options_of(options))
+        make_ready(self.scenario)
+        self.episodes = Episodes(self.scenario, 1, threads=1)
+        self.action_space = action_space(self.scenario)
+        self.observation_space = observation_space(self.scenario)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """The first observation of another episode; the same one after the same seed."""
+        super().reset(seed=seed)
+        self.episodes.begin([0], [self.scenario.draw(self.np_random)])
+        return self.episodes.observations[0].copy(), {}
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Observation, reward, whether it crashed, whether the path is over; no information beside."""
+        self.episodes.step(np.reshape(action, (1, -1)))
+        end = int(self.episodes.ends[0])
+        reward = float(self.episodes.rewards[0])
+        return self.episodes.observations[0].copy(), reward, end == CRASHED, end == ENDED, {}
+
+    def close(self) -> None:
+        """Nothing is left behind."""
+        self.episodes.close()

@@ -1,0 +1,87 @@
+"""What a policy sees: the same numbers in an environment and in flight.
+
+| place | numbers | unit |
+|---|---|---|
+| 0 | x_L - x_d: the load from where it is to be | m |
+| 3 | x_L' - x_d' | m/s |
+| 6 | q: unit vector from the vehicle to the load | |
+| 9 | q' | 1/s |
+| 12 | R, row by row: body to world | |
+| 21 | Omega: body rate | rad/s, body |
+| 24 | the last action | |
+
+Behind them, for each earlier step that is shown, newest first, its 24 numbers and the action before it; then,
+for each instant ahead, where the reference goes until then and its velocity there (m, m/s), by the six
+derivatives of the reference now. World ENU, body FLU. Positions are relative, so that a policy can be flown
+anywhere.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.control.records import State
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, sub
+from autopilot.trajectory.signals import Jet
+from autopilot.vehicle.layout import MOST
+from plumbline.learning.records import FEATURES, ViewModel
+
+AHEAD = 6  # numbers of an instant ahead
+
+
+def size_of(view: ViewModel) -> int:
+    """Numbers of an observation."""
+    return (FEATURES + view.actions) * (1 + view.past) + AHEAD * view.ahead
+
+
+@kernel
+def _put(vector: Vec3, out: Any, at: int) -> None:
+    for i in range(3):
+        out[at + i] = vector[i]
+
+
+@kernel
+def _features(state: State, jet: Jet, out: Any) -> None:
+    _put(sub(state.x_load, jet[0]), out, 0)
+    _put(sub(state.v_load, jet[1]), out, 3)
+    _put(state.q_cable, out, 6)
+    _put(state.q_cable_dot, out, 9)
+    for i in range(3):
+        _put(state.R[i], out, 12 + 3 * i)
+    _put(state.omega_body, out, 21)
+
+
+@kernel
+def _preview(jet: Jet, ahead: int, ahead_s: float, out: Any, at: int) -> None:
+    for k in range(ahead):
+        t = (k + 1) * ahead_s
+        for i in range(3):
+            # Horner's scheme of the two Taylor series
+            way, speed = 0.0, 0.0
+            for n in range(6, 0, -1):
+                way = (jet[n][i] + way) * t / n
+                speed = jet[n][i] + speed * t / n
+            out[at + AHEAD * k + i] = way
+            out[at + AHEAD * k + 3 + i] = speed
+
+
+@kernel
+def look(state: State, jet: Jet, action: Any, past: Any, view: ViewModel, out: Any) -> None:
+    """Write the observation after the step in which `action` was done into `out`, and note it in `past`
+    (steps, FEATURES + MOST), newest first, as the latest of the earlier steps."""
+    _features(state, jet, out)
+    for i in range(view.actions):
+        out[FEATURES + i] = action[i]
+    at = FEATURES + view.actions
+    for k in range(view.past):
+        for i in range(FEATURES + view.actions):
+            out[at + i] = past[k, i]
+        at += FEATURES + view.actions
+    _preview(jet, view.ahead, view.ahead_s, out, at)
+    for k in range(view.past - 1, -1, -1):
+        for i in range(FEATURES + MOST):
+            past[k, i] = past[k - 1, i] if k > 0 else 0.0
+    if view.past > 0:
+        for i in range(FEATURES + view.actions):
+            past[0, i] = out[i]

@@ -1,0 +1,102 @@
+"""What an environment is made with, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from gcs.errors import GcsError
+from missions.model import Mission
+from plumbline.learning.records import ACTIONS, Reward
+from plumbline.made_files import name_or_path
+from plumbline.sensors import Sensors
+from plumbline.vehicles import Vehicle
+
+OBSERVATIONS = ("truth", "estimate")
+STARTS = ("begin", "random")
+
+
+@dataclass(frozen=True)
+class EnvOptions:
+    """The options of both environments; docs/learning.md has them with their defaults and units."""
+
+    action: str = "ctbr"
+    observation: str = "truth"
+    rate_hz: float = 50.0
+    history: int = 0
+    preview: int = 0
+    preview_s: float = 0.1
+    vehicle: str | Path | Vehicle = "bebop"
+    sensors: str | Path | Sensors = "lab"
+    settings: Mapping[str, float] = field(default_factory=dict)
+    randomise: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    reward: Mapping[str, float] = field(default_factory=dict)
+    start_m: float = 0.5
+    reach_m: float = 2.0
+    max_rate_rad_s: tuple[float, float, float] = (6.0, 6.0, 2.0)
+    max_accel_m_s2: tuple[float, float, float] = (4.0, 4.0, 4.0)
+    mission: str | Path | Mission | None = None  # None: hover where the load is
+    start: str = "begin"
+
+    @cached_property
+    def vehicle_file(self) -> str:
+        """Name or path of the vehicle."""
+        return name_or_path(self.vehicle, getattr(self.vehicle, "name", "") or "vehicle")
+
+    @cached_property
+    def sensors_file(self) -> str:
+        """Name or path of the sensor profile."""
+        return name_or_path(self.sensors, "sensors")
+
+    def __post_init__(self) -> None:
+        _one_of("action", self.action, tuple(ACTIONS))
+        _one_of("observation", self.observation, OBSERVATIONS)
+        _one_of("start", self.start, STARTS)
+        for name, least in (("history", 0), ("preview", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or not least <= value <= 1000:
+                raise GcsError(f"{name} = {value!r}; must be a whole number from {least} to 1000")
+        for name in ("rate_hz", "preview_s", "reach_m"):
+            _positive(name, getattr(self, name))
+        if not 0.0 <= self.start_m < self.reach_m:
+            raise GcsError(f"start_m = {self.start_m!r}; must be at least 0 and below reach_m")
+        for name in ("max_rate_rad_s", "max_accel_m_s2"):
+            for value in getattr(self, name):
+                _positive(name, value)
+        unknown = sorted(set(self.reward) - set(Reward._fields))
+        if unknown:
+            raise GcsError(f"reward: there is no {unknown[0]!r}; there are {', '.join(Reward._fields)}")
+        for name, limits in self.randomise.items():
+            if not _is_range(limits):
+                raise GcsError(f"randomise {name}: {limits!r}; must be (least, greatest)")
+
+
+def options_of(given: Mapping[str, Any]) -> EnvOptions:
+    """The options in keyword arguments. `Error` (plumbline.Error) that names what is wrong."""
+    known = [each.name for each in fields(EnvOptions)]
+    unknown = sorted(set(given) - set(known))
+    if unknown:
+        raise GcsError(f"{unknown[0]}: there is no such option; there are {', '.join(known)}")
+    return EnvOptions(**given)
+
+
+def _one_of(name: str, value: object, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise GcsError(f"{name} = {value!r}; must be one of {', '.join(known)}")
+
+
+def _positive(name: str, value: float) -> None:
+    if not (isfinite(value) and value > 0.0):
+        raise GcsError(f"{name} = {value!r}; must be a number above 0")
+
+
+def _is_range(limits: Any) -> bool:
+    try:
+        low, high = limits
+        return bool(isfinite(low) and isfinite(high) and low <= high)
+    except (TypeError, ValueError):
+        return False

@@ -1,0 +1,49 @@
+"""The path of a mission as one table: where the load is to be at each tick while it is carried."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from autopilot.geometry.linear import ZERO, Vec3
+from autopilot.guidance.layout import COLUMNS, jets
+from autopilot.guidance.legs import LOAD_POSITION
+from autopilot.supervisor.mission import with_plan
+from autopilot.supervisor.settings import Settings
+from autopilot.supervisor.state import Flight, MissionPlan
+from autopilot.supervisor.step_legs import destination, step_legs
+from gcs.errors import GcsError
+from missions.model import AttitudeRun, Land, Release, Speed, Takeoff, Winch
+from sitl.world import Floats
+
+_LATER = (Land, Release, AttitudeRun, Winch)  # from such a step on there is no path of the load to follow
+
+
+def path_of(plan: MissionPlan, settings: Settings, speed_m_s: float, tick_s: float, name: str) -> Floats:
+    """(ticks, 21) position of the load and its six derivatives, from after the take-off on, each leg as the
+    autopilot flies it. `Error` where a mission has no such leg."""
+    flight = with_plan(Flight(), plan)
+    flight = replace(flight, mission=replace(flight.mission, speed_m_s=speed_m_s))
+    here: Vec3 = ZERO
+    tables: list[Floats] = []
+    for number, step in enumerate(plan.steps):
+        flight = replace(flight, mission=replace(flight.mission, step=number))
+        if isinstance(step, Takeoff):
+            here = destination(step, here, flight)
+        elif isinstance(step, Speed):
+            flight = replace(flight, mission=replace(flight.mission, speed_m_s=step.speed_m_s))
+        elif isinstance(step, _LATER):
+            break
+        else:
+            for leg in step_legs(step, here, flight, settings):
+                if leg.control_mode != LOAD_POSITION:
+                    break
+                tables.append(
+                    jets(leg, np.asarray(np.arange(round(leg.duration_s / tick_s)) * tick_s, np.float64))
+                )
+                here = leg.jet(leg.duration_s)[0]
+    table = np.concatenate(tables) if tables else np.zeros((0, COLUMNS))
+    if not len(table):
+        raise GcsError(f"mission {name}: there is no path of the load to follow")
+    return np.ascontiguousarray(table)

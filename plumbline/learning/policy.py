@@ -1,0 +1,145 @@
+"""A trained policy as a file of numbers, and as what flies a vehicle tick by tick.
+
+A file holds the weights of a network and the options of the environment that decide what it sees and does.
+It is read by numpy alone: what it was trained with is not needed to fly it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.control.actuators.mixer import new_rotors
+from autopilot.control.records import State
+from autopilot.control.thesis_cascade import ThesisMemory, start
+from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
+from autopilot.trajectory.signals import Jet
+from autopilot.vehicle.layout import MOST
+from autopilot.vehicle.rotors import allocate
+from gcs.errors import GcsError
+from plumbline.learning.actions import Mixing, carry_out, within
+from plumbline.learning.beginning import hover_forces
+from plumbline.learning.observations import look, size_of
+from plumbline.learning.options import options_of
+from plumbline.learning.records import FEATURES
+from plumbline.learning.scenario import Scenario
+
+Floats = NDArray[np.float32]
+Layers = Sequence[tuple[Floats, Floats]]  # (weights (outputs, inputs), biases) of each
+
+SHOWN = (  # options that decide what a policy sees and does
+    "action",
+    "rate_hz",
+    "history",
+    "preview",
+    "preview_s",
+    "vehicle",
+    "settings",
+    "max_rate_rad_s",
+    "max_accel_m_s2",
+)
+_AT_REST = State(ZERO, ZERO, (0.0, 0.0, -1.0), ZERO, ZERO, ZERO, IDENTITY, ZERO)
+
+
+class Policy:
+    """A network with tanh between its layers. `options` are those of its environment, as far as they
+    matter."""
+
+    def __init__(self, layers: Layers, options: Mapping[str, Any]) -> None:
+        self.layers = [(np.asarray(w, np.float32), np.asarray(b, np.float32)) for w, b in layers]
+        self.options = {name: options[name] for name in SHOWN if name in options}
+        if "vehicle" in self.options:
+            self.options["vehicle"] = options_of(self.options).vehicle_file
+
+    def __call__(self, observation: Floats) -> Floats:
+        """Actions for one observation, or for many (n, size)."""
+        *hidden, (last, shift) = self.layers
+        x = observation
+        for weights, biases in hidden:
+            x = np.tanh(x @ weights.T + biases)
+        actions: Floats = np.clip(x @ last.T + shift, -1.0, 1.0)
+        return actions
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a file that ends in .npz."""
+        arrays = {f"weights_{k}": w for k, (w, _) in enumerate(self.layers)}
+        arrays |= {f"biases_{k}": b for k, (_, b) in enumerate(self.layers)}
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        np.savez(path, options=np.array(json.dumps(self.options)), **arrays)  # type: ignore[arg-type]
+
+
+def load_policy(path: str | Path) -> Policy:
+    """The policy in a file. `Error` (plumbline.Error) if it holds none."""
+    try:
+        with np.load(path) as file:
+            options = json.loads(str(file["options"]))
+            count = sum(name.startswith("weights_") for name in file.files)
+            layers = [(file[f"weights_{k}"], file[f"biases_{k}"]) for k in range(count)]
+    except OSError as error:
+        raise GcsError(f"{path}: {error.strerror or error}") from None
+    except (KeyError, ValueError) as error:
+        raise GcsError(f"{path}: it holds no policy: {error}") from None
+    if not layers:
+        raise GcsError(f"{path}: it holds no policy: there are no weights")
+    return Policy(layers, options)
+
+
+def policy_of_sb3(model: Any, options: Mapping[str, Any]) -> Policy:
+    """The deterministic policy of a PPO or A2C of Stable-Baselines3 with an `MlpPolicy`.
+
+    `options` are those with which its environment was made.
+    """
+    net = model.policy
+    linear = [part for part in net.mlp_extractor.policy_net if hasattr(part, "weight")]
+    others = {type(part).__name__ for part in net.mlp_extractor.policy_net} - {"Linear", "Tanh"}
+    if others:
+        raise GcsError(f"the policy has {', '.join(sorted(others))} between its layers; must be Tanh")
+    layers = [
+        (part.weight.detach().numpy(), part.bias.detach().numpy()) for part in (*linear, net.action_net)
+    ]
+    return Policy(layers, options)
+
+
+class PolicyPilot:
+    """A policy that flies one vehicle: it is asked at each tick of the autopilot."""
+
+    def __init__(self, policy: Policy) -> None:
+        scenario = Scenario(options_of(policy.options))
+        task = scenario.task
+        self._policy, self._model, self._sight, self._ticks = policy, task.action, task.sight, task.ticks
+        size = size_of(task.sight)
+        if policy.layers[0][0].shape[1] != size or policy.layers[-1][1].shape != (task.sight.actions,):
+            raise GcsError(f"the policy does not fit its options: they show {size} numbers")
+        self._past = np.zeros((task.sight.past, FEATURES + MOST))
+        self.observation: Floats = np.zeros(size, np.float32)
+        self._action, self._tick = np.zeros(MOST), 0
+        self._memory: ThesisMemory | None = None
+        hover = hover_forces(scenario, task.action.weight)
+        self._mixing = Mixing(allocate(scenario.cell.setup.layout), new_rotors(), hover)
+        # compiled now, and not in the air
+        self.tick(_AT_REST, (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO))
+        self.start()
+
+    def start(self) -> None:
+        """Begin anew, as an episode begins."""
+        self._past[:] = 0.0
+        self._action[:] = 0.0
+        self._tick, self._memory = 0, None
+
+    def tick(self, state: State, reference: Jet) -> tuple[float, Vec3]:
+        """Thrust (N) and moment (N m, body) at this tick, for what is known of the motion and for where the
+        load is to be."""
+        if self._tick % self._ticks == 0:
+            look(state, reference, self._action, self._past, self._sight, self.observation)
+            for k, number in enumerate(self._policy(self.observation).tolist()):
+                self._action[k] = within(number)
+        self._tick += 1
+        if self._memory is None:
+            self._memory = start(state, state.x_load, state.v_load)
+        self._memory, mixed = carry_out(self._action, state, self._memory, self._model, self._mixing)
+        return mixed.thrust_done, mixed.moment_done

@@ -1,0 +1,220 @@
+"""The numbers of an environment from its options: vehicle, sensors, path, and what differs by episode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from autopilot.core.flight_core import Setup
+from autopilot.geometry.linear import Vec3
+from autopilot.geometry.packed import packed
+from autopilot.guidance.layout import COLUMNS
+from autopilot.vehicle.file import load_belief
+from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
+from autopilot.vehicle.rates import divider
+from autopilot.wire.parameter_table import ParameterError, ParameterTable
+from gcs.closed_loop import Conditions
+from gcs.errors import GcsError, input_error
+from gcs.sweep.cell import Cell, cell_of
+from gcs.sweep.plan import simulated
+from gcs.workflows.flight_inputs import check_flight_inputs
+from gcs.workflows.mission_file import load
+from missions.model import Mission
+from missions.toml_files import FileError
+from plumbline.arguments import told_in_python
+from plumbline.learning.actions import size_of_action
+from plumbline.learning.observations import size_of
+from plumbline.learning.options import EnvOptions
+from plumbline.learning.paths import path_of
+from plumbline.learning.records import ACTIONS, ActionModel, Reward, TaskModel, ViewModel
+from sitl.plant.records import Truth
+from sitl.settings import Settings, settings_of
+from sitl.vehicles.sim_parameters import apply as apply_parameters
+from sitl.vehicles.sim_parameters import sim_parameters
+from sitl.vehicles.truth import load_truth
+from sitl.world import Floats, WorldRows, command_room, new_world
+
+HOVER_AT: Vec3 = (0.0, 0.0, 3.0)  # m, of the load
+SETTLE_S = 2.0  # that the simulator flies before an episode in which the estimate is observed
+RATE_GAIN: Vec3 = (20.0, 20.0, 8.0)  # 1/s
+_LAW = "thesis"  # flies below an acceleration, and before an episode
+_FIXED = ("SIM_RATE_HZ", "SIM_LOSS_PCT")  # the same for all episodes
+
+
+@dataclass(frozen=True)
+class Draw:
+    """What chance decides about an episode."""
+
+    seed: int
+    offset: Vec3  # m, of the load from where it is to be
+    begin: int  # row of the path
+    values: tuple[float, ...]  # of what is randomised
+
+
+class Scenario:
+    """An environment's numbers. `Error` (plumbline.Error) where the options cannot be."""
+
+    def __init__(self, options: EnvOptions) -> None:
+        self.options = options
+        self.estimated = options.observation == "estimate"
+        self._names = tuple(options.randomise)
+        lows = tuple(low for low, _ in options.randomise.values())
+        highs = tuple(high for _, high in options.randomise.values())
+        self._lows, self._spans = lows, tuple(b - a for a, b in zip(lows, highs, strict=True))
+        self.cell = self._cell()
+        self.tick_us = self.cell.settings.tick_us
+        self.ticks = self._ticks()
+        for values in (lows, highs):
+            self._conditions(values)
+        self.reference, self.task = self._reference(), self._task()
+
+    # ---- what chance decides
+
+    def draw(self, rng: np.random.Generator) -> Draw:
+        """Of the next episode: as many numbers for each, whatever they decide."""
+        one, two, three, where, seed, *rest = rng.random(5 + len(self._names)).tolist()
+        width = 2.0 * self.options.start_m
+        offset = (width * (one - 0.5), width * (two - 0.5), width * (three - 0.5))
+        begin = 0
+        if self.options.start == "random":
+            begin = int(where * len(self.reference)) // self.ticks * self.ticks
+        values = tuple(low + span * u for low, span, u in zip(self._lows, self._spans, rest, strict=True))
+        return Draw(int(seed * 2**31), offset, begin, values)
+
+    def world(self, draw: Draw) -> tuple[WorldRows, Truth, Settings]:
+        """The world of an episode before it begins, the load at rest on the ground."""
+        truth, settings = self._conditions(draw.values)
+        if truth.chain.links > 0:
+            raise GcsError(
+                f"cable_links = {truth.chain.links}; must be 0, as the learning environments have no links"
+            )
+        return new_world(truth, self.cell.profile, settings, draw.seed, self.cell.layout), truth, settings
+
+    def roomiest(self) -> tuple[int, int]:
+        """Commands, and readings of one sensor, that can be on their way in any episode."""
+        rooms, queues = [], []
+        for share in (0.0, 1.0):
+            values = tuple(a + share * b for a, b in zip(self._lows, self._spans, strict=True))
+            rows, _, settings = self.world(Draw(1, HOVER_AT, 0, values))
+            rooms.append(command_room(settings))
+            queues.append(rows.queue.shape[1])
+        return max(rooms), max(queues)
+
+    def _conditions(self, values: tuple[float, ...]) -> tuple[Truth, Settings]:
+        """What is true of the vehicle and the settings of the simulator in an episode."""
+        if not values:
+            return self.cell.truth, self.cell.settings
+        table = self._simulator
+        for name, value in zip(self._names, values, strict=True):
+            if name not in table or name in _FIXED:
+                raise GcsError(f"randomise {name}: must be a parameter of the simulator that may change")
+            try:
+                table.set(name, value)
+            except ParameterError as error:
+                raise GcsError(f"randomise {error}") from None
+        return apply_parameters(self._vehicle, table), settings_of(table)
+
+    @cached_property
+    def _vehicle(self) -> Truth:
+        return load_truth(self.options.vehicle_file)
+
+    @cached_property
+    def _simulator(self) -> ParameterTable:
+        table = sim_parameters(self._vehicle)
+        for name, value in simulated(dict(self.options.settings)).items():
+            table.set(name, value)
+        return table
+
+    # ---- what is the same for all episodes
+
+    def setup_of(self, law: str) -> Setup:
+        """What the autopilot is given to fly with a law. `Error` if there is none of that name."""
+        if law not in LAWS:
+            raise GcsError(f"law {law!r}: there is none of that name; must be one of {', '.join(LAWS)}")
+        return self._cell(law).setup
+
+    def _cell(self, law: str = _LAW) -> Cell:
+        options = self.options
+        given = {name: float(value) for name, value in options.settings.items()}
+        given = {"CTL_RATE_HZ": given.get("SIM_RATE_HZ", 250.0), **given}
+        with told_in_python():
+            check_flight_inputs(options.vehicle_file, options.sensors_file, given.items())
+        every = {**given, "CTL_LAW": float(LAWS.index(law))}
+        conditions = Conditions(vehicle=options.vehicle_file, sensors=options.sensors_file, settings=every)
+        try:
+            cell = cell_of(self._mission(), conditions)
+        except FileError as error:
+            raise input_error(error) from None
+        except ValueError as error:
+            raise GcsError(str(error)) from None
+        if cell.setup.control_every != 1:
+            raise GcsError("CTL_RATE_HZ: must be SIM_RATE_HZ in an environment")
+        return cell
+
+    def _mission(self) -> Mission:
+        mission = self.options.mission
+        if isinstance(mission, Mission):
+            return mission
+        return load("hover" if mission is None else str(mission))
+
+    def _ticks(self) -> int:
+        rate = 1e6 / self.tick_us
+        try:
+            return divider(rate, self.options.rate_hz, "rate_hz")
+        except ValueError as error:
+            raise GcsError(str(error)) from None
+
+    def _reference(self) -> Floats:
+        if self.options.mission is None:
+            table = np.zeros((1, COLUMNS))
+            table[0, :3] = HOVER_AT
+            return table
+        parameters = autopilot_parameters(load_belief(self.options.vehicle_file))
+        apply_settings(parameters, self.options.settings.items())
+        setup = self.cell.setup
+        tick_s, name = self.tick_us * 1e-6, self._mission().name
+        return path_of(self.cell.plan, setup.settings, parameters["MIS_SPEED"], tick_s, name)
+
+    def _task(self) -> TaskModel:
+        options, setup = self.options, self.cell.setup
+        vehicle, kind = setup.vehicle, ACTIONS[options.action]
+        weight = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+        strength = sum(rotor.strength for rotor in setup.layout)
+        limited = setup.limited != 0.0 and np.isfinite(vehicle.rotor_max)
+        action = ActionModel(
+            kind=kind,
+            vehicle=vehicle,
+            limited=setup.limited,
+            weight=weight,
+            least=vehicle.rotor_min if limited else 0.0,
+            most=vehicle.rotor_max if limited else 2.0 * weight / strength,
+            strength=strength,
+            rates=_three(options.max_rate_rad_s),
+            rate_gain=RATE_GAIN,
+            accel=_three(options.max_accel_m_s2),
+            gains=setup.law.gains,
+            filters=setup.law.filters,
+        )
+        numbers = size_of_action(kind, len(setup.layout))
+        sight = ViewModel(numbers, options.history, options.preview, options.preview_s)
+        reward = Reward(**{name: float(value) for name, value in options.reward.items()})
+        settle = round(SETTLE_S * 1e6 / self.tick_us) if self.estimated else 0
+        return TaskModel(action, sight, reward, self.ticks, options.reach_m, settle)
+
+    @property
+    def size(self) -> int:
+        """Numbers of an observation."""
+        return size_of(self.task.sight)
+
+    @property
+    def row(self) -> Floats:
+        """The task as a row of numbers."""
+        return packed(self.task)
+
+
+def _three(values: Any) -> Vec3:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)

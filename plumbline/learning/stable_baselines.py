@@ -1,0 +1,74 @@
+"""The environments for Stable-Baselines3, which has an interface of its own for many at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecEnv
+
+from gcs.errors import GcsError
+from plumbline.learning.vector import LoadVectorEnv
+
+
+class SB3VecEnv(VecEnv):  # type: ignore[misc]
+    """The environments of a `LoadVectorEnv` as Stable-Baselines3 takes them.
+
+        SB3VecEnv(gymnasium.make_vec("plumbline/Hover-v0", 64, autoreset_mode="SameStep"))
+
+    Its autoreset mode must be SAME_STEP, for that is what Stable-Baselines3 expects.
+    """
+
+    def __init__(self, envs: Any) -> None:
+        inner = envs.unwrapped
+        if not isinstance(inner, LoadVectorEnv) or inner.autoreset_mode != AutoresetMode.SAME_STEP:
+            raise GcsError("envs: must be those of gymnasium.make_vec with autoreset_mode='SameStep'")
+        self.envs = inner
+        self.render_mode = None
+        self._actions: Any = None
+        super().__init__(inner.num_envs, inner.single_observation_space, inner.single_action_space)
+
+    def reset(self) -> Any:
+        """The first observations."""
+        seeds = self._seeds if any(seed is not None for seed in self._seeds) else None
+        self._reset_seeds()
+        return self.envs.reset(seed=seeds)[0]
+
+    def step_async(self, actions: Any) -> None:
+        """Note the actions."""
+        self._actions = actions
+
+    def step_wait(self) -> Any:
+        """Do them: observations, rewards, who is done, and information on each."""
+        seen, rewards, crashed, ended, infos = self.envs.step(self._actions)
+        done = crashed | ended
+        told: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for i in np.flatnonzero(done).tolist():
+            told[i]["terminal_observation"] = infos["final_obs"][i]
+            told[i]["TimeLimit.truncated"] = bool(ended[i] and not crashed[i])
+        return seen, rewards.astype(np.float32), done, told
+
+    def close(self) -> None:
+        """Give up the threads."""
+        self.envs.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute, the same for all."""
+        return [getattr(self.envs, attr_name)] * len(self._chosen(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """None can be set."""
+        raise GcsError(f"{attr_name}: the environments are made with their options, and keep them")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """A method of all."""
+        return [getattr(self.envs, method_name)(*args, **kwargs)] * len(self._chosen(indices))
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """None is."""
+        return [False] * len(self._chosen(indices))
+
+    def _chosen(self, indices: int | Iterable[int] | None) -> Sequence[int]:
+        return list(self._get_indices(indices))

@@ -1,0 +1,280 @@
+"""A step of many environments in one call of machine code: the tick of the world, and before each the action.
+
+`sitl.world.world_tick` moves the world, rounding and sensors included, as in every flight. Where the estimate
+is observed the readings go through the autopilot's own estimator (`autopilot.core.tick.sense`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.control.actuators.disturbance_observer import observe
+from autopilot.control.actuators.mixer import MixerResult, mix
+from autopilot.control.actuators.rotor_model import Actuation
+from autopilot.control.actuators.rotor_model import advance as actuate
+from autopilot.control.records import Reference, State, with_length
+from autopilot.control.thesis_cascade import ThesisMemory, load_position, start
+from autopilot.core.tick import CoreConstants, CoreRows, Pilot, Seen, Winch, sense
+from autopilot.estimation.records import History
+from autopilot.geometry.kernel import kernel, threaded
+from autopilot.geometry.linear import E1, ZERO, Vec3, norm, scale, sub
+from autopilot.geometry.packed import pack, unpack, with_field
+from autopilot.geometry.so3 import rotation_from_quat
+from autopilot.trajectory.signals import Jet
+from gcs.sweep.wire import Wire, deliver, put_forces
+from plumbline.learning.actions import Mixing, carry_out, within
+from plumbline.learning.observations import look
+from plumbline.learning.records import Actions, Batch, Episode, Observations, Reward, Senses, TaskModel
+from sitl.plant.records import PlantState
+from sitl.plant.rotors import ASKED
+from sitl.world import World, WorldModel, WorldRows, world_tick
+
+FLYING, CRASHED, ENDED = 0, 1, 2
+
+
+@kernel
+def _world(batch: Batch, i: int) -> WorldRows:
+    return WorldRows(
+        batch.world[i],
+        batch.model[i],
+        batch.seed[i],
+        batch.clock[i],
+        batch.fate[i],
+        batch.errors[i],
+        batch.queue[i],
+        batch.commands[i],
+        batch.ring[i],
+        batch.rotors[i],
+        batch.rotor_table[i],
+    )
+
+
+@kernel
+def _core(senses: Senses, i: int, mixing: Mixing) -> CoreRows:
+    h = senses.history
+    history = History(
+        h.ring[i],
+        h.covariance[i],
+        h.error[i],
+        h.columns[i],
+        h.shares[i],
+        h.gain[i],
+        h.scalars[i],
+        h.consistency[i],
+    )
+    return CoreRows(
+        senses.estimator[i],
+        senses.pilot[i],
+        senses.seen[i],
+        senses.commands[i],
+        history,
+        senses.inbox[i],
+        senses.constants,
+        senses.winch,
+        senses.stretch,
+        senses.none,
+        senses.none,
+        mixing.rotors,
+        mixing.table,
+    )
+
+
+@kernel
+def _mixing(batch: Batch, i: int) -> Mixing:
+    return Mixing(batch.mixer, batch.mixed[i], batch.hover)
+
+
+@kernel
+def true_state(plant: PlantState) -> State:
+    """What a law would be told if it were told the truth."""
+    return State(
+        plant.x_load,
+        plant.v_load,
+        plant.q_cable,
+        plant.q_cable_dot,
+        plant.x_quad,
+        plant.v_quad,
+        rotation_from_quat(plant.quat_wxyz),
+        plant.omega_body,
+        plant.accel_quad,
+    )
+
+
+@kernel
+def _known(senses: Any, plant: PlantState, i: int) -> State:
+    """The state that is observed."""
+    if senses is None:
+        return true_state(plant)
+    return unpack(Seen, senses.seen[i], 0).state
+
+
+@kernel
+def _vector(reference: Any, row: int, first: int) -> Vec3:
+    return (reference[row, first], reference[row, first + 1], reference[row, first + 2])
+
+
+@kernel
+def jet_at(reference: Any, row: int) -> Jet:
+    """The reference at a row of its table, or its last one."""
+    at = min(row, reference.shape[0] - 1)
+    return (
+        _vector(reference, at, 0),
+        _vector(reference, at, 3),
+        _vector(reference, at, 6),
+        _vector(reference, at, 9),
+        _vector(reference, at, 12),
+        _vector(reference, at, 15),
+        _vector(reference, at, 18),
+    )
+
+
+@kernel
+def _believe(senses: Senses, i: int, mixed: MixerResult) -> None:
+    """What the autopilot believes of rotors and disturbances after a command."""
+    constants = unpack(CoreConstants, senses.constants, 0)
+    pilot, seen = unpack(Pilot, senses.pilot[i], 0), unpack(Seen, senses.seen[i], 0)
+    cable = unpack(Winch, senses.winch, 0).cable
+    observed = observe(
+        pilot.observed,
+        seen.state,
+        1.0 if seen.taut else 0.0,
+        pilot.thrust,
+        pilot.moment,
+        constants.observer,
+        constants.drag,
+        with_length(constants.vehicle, cable.length),
+    )
+    actuation = Actuation(senses.commands[i], pilot.thrust, pilot.moment)
+    actuation = actuate(actuation, mixed.thrust_done, mixed.moment_done, constants.actuation)
+    pilot = with_field(with_field(pilot, "mixed", mixed), "observed", observed)
+    pilot = with_field(with_field(pilot, "thrust", actuation.thrust), "moment", actuation.moment)
+    pack(pilot, senses.pilot[i], 0)
+
+
+@kernel
+def _tick(senses: Any, i: int, rows: WorldRows, mixed: MixerResult, mixing: Mixing) -> PlantState:
+    """The world at the next tick, and the estimate of it; the true state."""
+    put_forces(mixing.rotors, mixing.table, rows)
+    if senses is not None:
+        _believe(senses, i, mixed)
+    world_tick(rows, rows.rotors[ASKED], False, 0.0)
+    if senses is not None:
+        now = unpack(World, rows.world, 0)
+        readings = deliver(rows, now.now_us, unpack(Wire, senses.wire, 0), senses.inbox[i])
+        dt = unpack(WorldModel, rows.model, 0).tick_us * 1e-6
+        sense(_core(senses, i, mixing), readings, now.now_us, dt)
+    return unpack(World, rows.world, 0).plant
+
+
+@kernel
+def _reward(state: State, jet: Jet, change: float, crashed: bool, weights: Reward) -> float:
+    error = norm(sub(state.x_load, jet[0]))
+    near = error / weights.width
+    reward = (
+        weights.alive
+        + weights.position / (1.0 + near * near)
+        - weights.velocity * norm(sub(state.v_load, jet[1]))
+        - weights.swing * norm(state.q_cable_dot)
+        - weights.spin * norm(state.omega_body)
+        - weights.change * change
+    )
+    return reward - weights.crash if crashed else reward
+
+
+@kernel
+def _observe(batch: Batch, i: int, task: TaskModel, episode: Episode, out: Observations) -> None:
+    plant = unpack(World, batch.world[i], 0).plant
+    jet = jet_at(batch.reference, episode.begin + episode.tick)
+    look(_known(batch.senses, plant, i), jet, batch.action[i], batch.past[i], task.sight, out[i])
+
+
+@kernel
+def _step_one(
+    batch: Batch, i: int, task: TaskModel, actions: Actions, out: Observations, rewards: Any, ends: Any
+) -> None:
+    rows = _world(batch, i)
+    episode = unpack(Episode, batch.episode[i], 0)
+    action, mixing, change = batch.action[i], _mixing(batch, i), 0.0
+    for k in range(task.sight.actions):
+        number = within(float(actions[i, k]))
+        change += (number - action[k]) * (number - action[k])
+        action[k] = number
+    memory = unpack(ThesisMemory, batch.law[i], 0)
+    plant = unpack(World, rows.world, 0).plant
+    crashed, tick = False, 0
+    while tick < task.ticks and not crashed:
+        memory, mixed = carry_out(action, _known(batch.senses, plant, i), memory, task.action, mixing)
+        plant = _tick(batch.senses, i, rows, mixed, mixing)
+        down = plant.vehicle_on_ground > 0.0 or plant.load_on_ground > 0.0
+        crashed = down or plant.diverged > 0.0
+        tick += 1
+    pack(memory, batch.law[i], 0)
+    state = true_state(plant)
+    tick = episode.tick + task.ticks
+    jet = jet_at(batch.reference, episode.begin + tick)
+    crashed = crashed or not norm(sub(plant.x_load, jet[0])) < task.reach or state.R[2][2] < 0.0
+    rewards[i] = _reward(state, jet, change, crashed, task.reward)
+    rest = batch.reference.shape[0] - episode.begin - tick
+    ends[i] = CRASHED if crashed else ENDED if rest <= 0 and batch.reference.shape[0] > 1 else FLYING
+    episode = Episode(episode.begin, tick)
+    pack(episode, batch.episode[i], 0)
+    _observe(batch, i, task, episode, out)
+
+
+@kernel
+def _settle(senses: Any, batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3) -> None:
+    """Let the simulator fly so that the load comes to `end` with `velocity` while the estimate is found."""
+    if senses is None:
+        return
+    rows, model, mixing = _world(batch, i), task.action, _mixing(batch, i)
+    tick_s = unpack(WorldModel, rows.model, 0).tick_us * 1e-6
+    plant = unpack(World, rows.world, 0).plant
+    memory = start(true_state(plant), plant.x_load, velocity)
+    for tick in range(task.settle):
+        left_s = (task.settle - tick) * tick_s
+        x_d = sub(end, scale(left_s, velocity))
+        reference = Reference((x_d, velocity, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
+        memory, command = load_position(
+            memory, true_state(plant), reference, model.gains, model.filters, model.vehicle
+        )
+        mixed = mix(command.thrust, command.moment, model.vehicle, model.limited, mixing.table, mixing.rotors)
+        plant = _tick(senses, i, rows, mixed, mixing)
+
+
+@kernel
+def _begin_one(batch: Batch, i: int, task: TaskModel, end: Vec3, velocity: Vec3, out: Observations) -> None:
+    _settle(batch.senses, batch, i, task, end, velocity)
+    plant = unpack(World, batch.world[i], 0).plant
+    pack(start(_known(batch.senses, plant, i), plant.x_load, plant.v_load), batch.law[i], 0)
+    _observe(batch, i, task, unpack(Episode, batch.episode[i], 0), out)
+
+
+@threaded
+def run_some(
+    batch: Batch,
+    chosen: Any,
+    begins: bool,
+    places: Any,
+    velocities: Any,
+    actions: Actions,
+    out: Observations,
+    rewards: Any,
+    ends: Any,
+) -> None:
+    """A step of the environments `chosen`, or the beginning of an episode in each, its world having been
+    made.
+
+    Of a step `actions` (n, size) are done, and written are observations (n, size), rewards (n,) and how the
+    episodes end: FLYING, CRASHED, or ENDED where the path is over. Of a beginning the observations are
+    written; where the estimate is observed the simulator flies until the load comes to `places` (k, 3), one
+    for each that is chosen, with `velocities` (k, 3). One function does both, for it takes long to compile.
+    """
+    task = unpack(TaskModel, batch.task, 0)
+    for k in range(chosen.shape[0]):
+        i = chosen[k]
+        if begins:
+            end = (places[k, 0], places[k, 1], places[k, 2])
+            velocity = (velocities[k, 0], velocities[k, 1], velocities[k, 2])
+            _begin_one(batch, i, task, end, velocity, out)
+        else:
+            _step_one(batch, i, task, actions, out, rewards, ends)

@@ -1,0 +1,133 @@
+"""Many environments in one: `gymnasium.make_vec`. All of them step in one call of machine code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.utils.seeding import np_random
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from gcs.errors import GcsError
+from plumbline.learning.batch import Episodes
+from plumbline.learning.options import options_of
+from plumbline.learning.ready import make_ready
+from plumbline.learning.scenario import Scenario
+from plumbline.learning.spaces import action_space, observation_space
+from plumbline.learning.step import CRASHED, ENDED
+
+Array = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+Stepped = tuple[Array, NDArray[np.float64], Flags, Flags, dict[str, Any]]
+
+
+class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
+    """`num_envs` environments, each the same to the bit as one of `LoadEnv` with the same seed.
+
+    `autoreset_mode` is one of `gymnasium.vector.AutoresetMode`, or its value. `threads`: how many share the
+    work; by default as many as there are cores, where there is enough of it. The other options are those of
+    `plumbline.learning.options.EnvOptions`.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        if num_envs < 1:
+            raise GcsError(f"num_envs = {num_envs}; must be at least 1")
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.scenario = Scenario(options_of(options))
+        make_ready(self.scenario)
+        self.episodes = Episodes(self.scenario, num_envs, threads)
+        self.single_action_space = action_space(self.scenario)
+        self.single_observation_space = observation_space(self.scenario)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._limit = max_episode_steps
+        self._steps = np.zeros(num_envs, np.int64)
+        self._over = np.zeros(num_envs, np.bool_)  # episodes that have ended and were not begun anew
+        self._randoms: list[np.random.Generator | None] = [None] * num_envs
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """The first observations of other episodes: of all, or of those that `options["reset_mask"]` marks.
+
+        `seed`: of each, or of the first, from which those of the others count on.
+        """
+        seeds = self._seeds(seed)
+        chosen = np.arange(self.num_envs)
+        if options is not None and "reset_mask" in options:
+            chosen = np.flatnonzero(_checked(options["reset_mask"], self.num_envs))
+        for i in chosen.tolist():
+            if seeds[i] is not None or self._randoms[i] is None:
+                self._randoms[i] = np_random(seeds[i])[0]
+        self._begin(chosen)
+        return self.episodes.observations.copy(), {}
+
+    def step(self, actions: Array) -> Stepped:
+        """Observations, rewards, who crashed, whose path or time is over, and what `autoreset_mode` adds."""
+        episodes, next_step = self.episodes, self.autoreset_mode == AutoresetMode.NEXT_STEP
+        if self.autoreset_mode == AutoresetMode.DISABLED and self._over.any():
+            raise GcsError("an episode is over; reset it with options={'reset_mask': ...}")
+        begun = self._over.copy()
+        episodes.step(actions, np.flatnonzero(~begun) if begun.any() else None)
+        self._steps += 1
+        rewards = np.where(begun, 0.0, episodes.rewards)
+        crashed = (episodes.ends == CRASHED) & ~begun
+        ended = (episodes.ends == ENDED) & ~begun
+        if self._limit is not None:
+            ended |= (self._steps >= self._limit) & ~begun
+        if next_step and begun.any():
+            self._begin(np.flatnonzero(begun))
+        self._over = crashed | ended
+        infos: dict[str, Any] = {}
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
+            over = np.flatnonzero(self._over)
+            for i in over.tolist():
+                final = {"final_obs": episodes.observations[i].copy(), "final_info": {}}
+                infos = self._add_info(infos, final, i)
+            self._begin(over)
+        return episodes.observations.copy(), rewards, crashed, ended, infos
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Give up the threads."""
+        self.episodes.close()
+
+    def _begin(self, chosen: NDArray[np.intp]) -> None:
+        numbers = chosen.tolist()
+        draws = []
+        for i in numbers:
+            rng = self._randoms[i]
+            assert rng is not None, "reset comes before step"
+            draws.append(self.scenario.draw(rng))
+        self.episodes.begin(numbers, draws)
+        self._steps[chosen] = 0
+        self._over[chosen] = False
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None or isinstance(seed, int | np.integer):
+            return [None if seed is None else int(seed) + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise GcsError(f"seed: {len(seed)} seeds; must be {self.num_envs}")
+        return seed
+
+
+def _checked(mask: Any, count: int) -> Flags:
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (count,):
+        raise GcsError(f"reset_mask: must be an array of {count} booleans")
+    return mask

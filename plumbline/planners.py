@@ -1,0 +1,24 @@
+"""What a path planner of one's own is written with: `docs/planners.md` shows how.
+
+World ENU from home, SI.
+"""
+
+from __future__ import annotations
+
+from autopilot.own.brought import Parameter
+from autopilot.trajectory.peaks import Body
+from autopilot.trajectory.rotor_demand import Bounds
+from autopilot.trajectory.route import Path, PlanError, Route, polynomials, samples, slower, use
+
+__all__ = [
+    "Body",
+    "Bounds",
+    "Parameter",
+    "Path",
+    "PlanError",
+    "Route",
+    "polynomials",
+    "samples",
+    "slower",
+    "use",
+]

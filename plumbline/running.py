@@ -1,0 +1,368 @@
+"""A vehicle that is running already: commanded, waited for and listened to over MAVLink.
+
+The link is that of `gcs`. A thread of its own keeps it, so that the vehicle hears its ground station, and its
+state stays the newest, whatever the script does meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+import queue
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import replace
+from os import PathLike
+from types import TracebackType
+from typing import TypeVar
+
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients import command
+from gcs.clients.operation import Operation
+from gcs.clients.parameter_transfer import ParameterGet, ParameterSet
+from gcs.clients.vehicle_view import FLOWN_MODES
+from gcs.errors import GcsError, NoVehicleError, RefusedError
+from gcs.shell.link import monotonic_us, parse_address
+from gcs.shell.session import Session
+from gcs.workflows.parameters import exchange
+from gcs.workflows.reposition import reposition
+from gcs.workflows.running_flight import vehicle_home
+from gcs.workflows.transfer import checked_upload
+from missions import model
+from plumbline.arguments import positive, told_in_python
+from plumbline.made_files import name_or_path
+from plumbline.missions import Mission
+from plumbline.state import State, state_of
+
+Value = TypeVar("Value")
+Condition = Callable[[State], bool]
+
+_LOAD_STATE_US = 50_000  # by the vehicle's clock
+_STILL_S = 60.0  # so long its clock may stand still while its heartbeats go on
+_RETRY_S = 0.1
+_NEAR_M = 0.1
+_SLOW_M_S = 0.1
+_WORDS: dict[str, Condition] = {
+    "ready": lambda state: state.ready_to_arm is True,
+    "holding": lambda state: state.phase == "hold",
+    "mission complete": lambda state: state.mission == "complete",
+    "landed": lambda state: state.armed is False,
+}
+
+
+def connect(
+    address: str = "udpin:127.0.0.1:14550", *, timeout_s: float = 10.0, signing_key: bytes | None = None
+) -> RunningVehicle:
+    """Meet a vehicle that is running: `sitl` and `autopilot` started by hand, `gcs fly --speed 1`, any other.
+
+    `address`: `udpin:HOST:PORT`, `HOST:PORT` or `PORT` to wait there for it, `udpout:HOST:PORT` to speak
+    first. `timeout_s`: how long it may be silent, now and later, by the clock of this machine. `signing_key`:
+    32 bytes with which messages are signed (docs/mavlink.md). `Error` if no vehicle is heard.
+    """
+    limit_s = positive("timeout_s", timeout_s)
+    with told_in_python():
+        where = replace(parse_address(address), signing_key=signing_key)
+        return RunningVehicle(Session(where, limit_s, round(limit_s * 1e6)), limit_s)
+
+
+class RunningVehicle:
+    """A running vehicle; `connect` makes it. Use it in a `with` block, or `close` it.
+
+    A command returns when the vehicle has accepted it; a refusal is an `Error` with the vehicle's reason.
+    `takeoff`, `goto` and `land` also wait until it is done, unless `wait=False`. Time limits of waiting are
+    seconds of the vehicle's clock, so that they hold at any speed of simulation and on a busy machine. Places
+    are those of the load: metres east, north and up from home.
+    """
+
+    def __init__(self, session: Session, timeout_s: float) -> None:
+        self._session = session
+        self._timeout_s = timeout_s
+        self._jobs: queue.Queue[Callable[[], None]] = queue.Queue()
+        self._closing = threading.Event()
+        try:
+            session.find()
+        except BaseException:
+            session.close()
+            raise
+        self._thread = threading.Thread(target=self._serve, name="plumbline link", daemon=True)
+        self._thread.start()
+        try:
+            self._ask_for_load()
+        except BaseException:
+            self.close()
+            raise
+
+    # ---- what it tells
+
+    @property
+    def state(self) -> State:
+        """The newest that it has told."""
+        return state_of(self._session.view)
+
+    @property
+    def texts(self) -> list[str]:
+        """What it has told the operators since `connect`, the oldest first."""
+        return [text.text for text in self._session.view.texts]
+
+    # ---- commands
+
+    def arm(self, *, force: bool = False, timeout_s: float = 30.0) -> None:
+        """Start the rotors. A vehicle that is not ready yet is waited for; then it refuses, and says why."""
+        if not force and self.state.ready_to_arm is not True:
+            with suppress(NoVehicleError):  # the refusal says why it is not
+                self.wait("ready", timeout_s)
+        self._command(lambda session: command.arm(session.target, force))
+        self.wait(lambda state: state.armed is True, timeout_s)
+
+    def disarm(self, *, force: bool = False) -> None:
+        """Stop the rotors; in the air only by force: it falls."""
+        self._command(lambda session: command.disarm(session.target, force))
+
+    def takeoff(self, up_m: float | None = None, *, wait: bool = True, timeout_s: float = 180.0) -> None:
+        """Lift the load to a height and hold it there, by default that of MIS_TAKEOFF_ALT.
+
+        The vehicle must be armed.
+        """
+        self._must_be_armed("takeoff")
+
+        def make(session: Session) -> Operation:
+            if up_m is None:
+                return command.takeoff(session.target)
+            return command.takeoff(session.target, vehicle_home(session).altitude_m + up_m)
+
+        self._command(make)
+        if wait:
+            self.wait("holding", timeout_s)
+
+    def goto(
+        self,
+        east_m: float,
+        north_m: float,
+        up_m: float | None = None,
+        *,
+        speed_m_s: float | None = None,
+        wait: bool = True,
+        timeout_s: float = 300.0,
+    ) -> None:
+        """Take the load to a place and hold it there, by default at the height that it has.
+
+        It has arrived when it is within 0.1 m and slower than 0.1 m/s. A mission that is being flown ends.
+        """
+        self._must_be_armed("goto")
+        self._command(lambda session: reposition(session, (east_m, north_m, up_m), False, speed_m_s))
+        place = (east_m, north_m, up_m)
+        if wait:
+            self.wait(lambda state: _is_there(state, place), timeout_s)
+
+    def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
+        """Set the load down, and the vehicle beside it."""
+        self._command(lambda session: command.land(session.target))
+        if wait:
+            self.wait("landed", timeout_s)
+
+    def upload(
+        self,
+        mission: str | PathLike[str] | model.Mission,
+        *,
+        vehicle: str | PathLike[str] = "bebop",
+        force: bool = False,
+    ) -> None:
+        """Put a mission on the vehicle: a shipped name, a file (also .plan and .waypoints), or a `Mission`.
+
+        It is checked against `vehicle` before, unless `force`.
+        """
+        if isinstance(mission, model.Mission) and not isinstance(mission, Mission):
+            mission = Mission(mission.name, mission.steps, mission.title)
+        path = name_or_path(mission, getattr(mission, "name", ""))
+        with told_in_python():
+            send = checked_upload(path, str(vehicle), force, False, lambda _: None)
+        self._patiently(lambda: send(self._session))
+
+    def start(self) -> None:
+        """Fly the mission from its first item; a disarmed vehicle begins when it is armed."""
+        self._command(lambda session: command.start_mission(session.target))
+
+    def pause(self) -> None:
+        """Hold the load where it is."""
+        self._command(lambda session: command.pause(session.target))
+
+    def resume(self) -> None:
+        """Go on with a paused mission."""
+        self._command(lambda session: command.resume(session.target))
+
+    def mode(self, name: str) -> None:
+        """Change the flight mode, in plain words: hold, mission, return, land ..."""
+        if name not in FLOWN_MODES:
+            raise GcsError(f"mode {name!r}: there is none; must be one of {', '.join(sorted(FLOWN_MODES))}")
+        main, sub = FLOWN_MODES[name]
+        armed = bool(self.state.armed)
+        self._command(lambda session: command.set_mode(session.target, name, main, sub, armed))
+
+    def parameter(self, name: str) -> float:
+        """The value of a parameter."""
+
+        def read() -> float:
+            operation = ParameterGet(self._session.target, name.upper())
+            exchange(self._session, operation)
+            assert operation.value is not None
+            return operation.value
+
+        return self._patiently(read)
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Set a parameter, and see that it was stored."""
+        self._patiently(
+            lambda: exchange(self._session, ParameterSet(self._session.target, name.upper(), value))
+        )
+
+    # ---- waiting
+
+    def wait(self, until: str | float | Condition = "landed", timeout_s: float = 600.0) -> State:
+        """Wait until something is so; the state in which it was.
+
+        `until`: one of `ready`, `holding`, `mission complete` and `landed` (disarmed), a function of the
+        state, or so many seconds of the vehicle's clock. `Error` if it is not so within `timeout_s` of the
+        vehicle's clock, if the vehicle is disarmed before, or falls silent.
+        """
+        condition, what = self._condition(until)
+        if isinstance(until, int | float):
+            timeout_s = math.inf
+        return self._in_thread(lambda: self._watch(condition, what, timeout_s))
+
+    def _condition(self, until: str | float | Condition) -> tuple[Condition, str]:
+        if isinstance(until, str):
+            if until not in _WORDS:
+                raise GcsError(f"wait {until!r}: must be one of {', '.join(_WORDS)}, a number or a function")
+            return _WORDS[until], f"{until!r}"
+        if isinstance(until, int | float):
+            clock = _Clock()
+            return lambda state: clock.passed_s(state) >= until, f"{until:g} s"
+        return until, "what was asked for"
+
+    def _watch(self, condition: Condition, what: str, timeout_s: float) -> State:
+        """In the thread of the link."""
+        session, clock = self._session, _Clock()
+        was_armed, texts_before = self.state.armed, len(session.view.texts)
+        found: list[State] = []
+        trouble: list[str] = []
+
+        def over() -> bool:
+            state = self.state
+            if condition(state):
+                found.append(state)
+            elif session.lost:
+                trouble.append(f"the vehicle fell silent for {self._timeout_s:g} s")
+            elif was_armed and not state.armed:
+                trouble.append("the vehicle was disarmed")
+            elif clock.passed_s(state) > timeout_s:
+                trouble.append(f"not within {timeout_s:g} s of the vehicle's clock")
+            elif clock.still_s > _STILL_S:
+                trouble.append(f"the vehicle's clock stands still for {_STILL_S:g} s; is sitl running?")
+            elif self._closing.is_set():
+                trouble.append("the link was closed")
+            return bool(found or trouble)
+
+        session.watch(over, None)
+        if found:
+            return found[-1]
+        said = session.view.complaints_since(texts_before)
+        raise NoVehicleError("; ".join([f"waiting for {what}: {trouble[0]}", *said]))
+
+    # ---- the thread of the link
+
+    def _serve(self) -> None:
+        while not self._closing.is_set():
+            try:
+                self._session.watch(lambda: self._closing.is_set() or not self._jobs.empty(), None)
+            except GcsError:  # whatever is asked for next meets the same, and tells it
+                self._closing.wait(_RETRY_S)
+            while not self._jobs.empty():
+                self._jobs.get()()
+
+    def _in_thread(self, work: Callable[[], Value]) -> Value:
+        if self._closing.is_set():
+            raise GcsError("the link was closed")
+        future: Future[Value] = Future()
+
+        def job() -> None:
+            try:
+                future.set_result(work())
+            except BaseException as error:
+                future.set_exception(error)
+
+        self._jobs.put(job)
+        return future.result()
+
+    def _patiently(self, work: Callable[[], Value]) -> Value:
+        """An exchange, begun anew while the vehicle does not answer, as long as it may be silent."""
+        until_us = monotonic_us() + round(self._timeout_s * 1e6)
+        while True:
+            try:
+                return self._in_thread(work)
+            except NoVehicleError:
+                if monotonic_us() >= until_us:
+                    raise
+
+    def _command(self, make: Callable[[Session], Operation]) -> None:
+        self._patiently(lambda: self._session.run(make(self._session)))
+
+    def _ask_for_load(self) -> None:
+        """The load's state often; a vehicle that has none is as welcome."""
+        number = mavlink.MAVLINK_MSG_ID_LOAD_STATE
+        session = self._session
+        with suppress(RefusedError, NoVehicleError):
+            asked = command.message_interval(session.target, number, _LOAD_STATE_US)
+            self._in_thread(lambda: session.run(asked))
+
+    def _must_be_armed(self, what: str) -> None:
+        if not self.state.armed:
+            raise GcsError(f"{what}: the vehicle is not armed; arm() first")
+
+    def close(self) -> None:
+        """End the link; the vehicle goes on with what it does."""
+        self._closing.set()
+        self._thread.join()
+        self._session.close()
+
+    def __enter__(self) -> RunningVehicle:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = self.state
+        return f"<RunningVehicle {self._session.address}: {state.mode}, {'' if state.armed else 'dis'}armed>"
+
+
+class _Clock:
+    """Time passed by the vehicle's clock, which may begin anew; and how long that has stood still."""
+
+    def __init__(self) -> None:
+        self._passed_s = 0.0
+        self._last_s: float | None = None
+        self._moved_us = monotonic_us()
+
+    def passed_s(self, state: State) -> float:
+        """Up to this state."""
+        now_s = state.time_s
+        if now_s is not None and now_s != self._last_s:
+            if self._last_s is not None:
+                self._passed_s += max(0.0, now_s - self._last_s)
+            self._last_s, self._moved_us = now_s, monotonic_us()
+        return self._passed_s
+
+    @property
+    def still_s(self) -> float:
+        """By our clock."""
+        return (monotonic_us() - self._moved_us) * 1e-6
+
+
+def _is_there(state: State, place: tuple[float, float, float | None]) -> bool:
+    if state.load_m is None or state.load_speed_m_s is None:
+        return False
+    off = [there - asked for there, asked in zip(state.load_m, place, strict=True) if asked is not None]
+    return math.hypot(*off) < _NEAR_M and state.load_speed_m_s < _SLOW_M_S

@@ -1,0 +1,21 @@
+"""Sensor profiles made in Python."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from missions.toml_files import TomlFiles
+from plumbline.tables import Table
+from sitl.sensors.profile import Profile
+from sitl.sensors.shipped import PROFILES
+
+
+class Sensors(Table, Profile):
+    """What the vehicle senses with: a table for each sensor, keys as in a profile's file (docs/sensors.md).
+
+    ```python
+    slow = Sensors.load("lab").replace(mocap={"rate_hz": 50.0, "latency_ms": 20.0})
+    ```
+    """
+
+    files: ClassVar[TomlFiles] = PROFILES

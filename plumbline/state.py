@@ -1,0 +1,53 @@
+"""What a running vehicle is known to do at this moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from gcs.clients.vehicle_view import VehicleView
+from gcs.workflows.status import status_record
+
+
+@dataclass(frozen=True)
+class State:
+    """The newest that the vehicle has told; None for what it has not told yet, or never tells.
+
+    The load's place is that of the vehicle's own estimate, from home.
+    """
+
+    mode: str | None  # in plain words: hold, mission, land ...
+    armed: bool | None
+    ready_to_arm: bool | None
+    landed: str | None  # on the ground, in the air, taking off, landing
+    phase: str | None  # as docs/architecture.md names them, in lower case
+    time_s: float | None  # since boot, by the vehicle's clock
+    mission: str | None  # none, not started, active, paused, complete
+    mission_item: int | None
+    mission_items: int | None
+    load_east_m: float | None
+    load_north_m: float | None
+    load_up_m: float | None
+    cable_tension_n: float | None
+    cable_taut: bool | None
+    load_error_m: float | None  # from where the load is meant to be, as the autopilot sees it
+    rotor_use: float | None  # the greatest rotor force over its limit
+    battery_v: float | None
+    load_speed_m_s: float | None
+
+    @property
+    def load_m(self) -> tuple[float, float, float] | None:
+        """The load: east, north and up from home."""
+        if self.load_east_m is None or self.load_north_m is None or self.load_up_m is None:
+            return None
+        return (self.load_east_m, self.load_north_m, self.load_up_m)
+
+
+_NAMES = {field.name for field in fields(State)}
+
+
+def state_of(view: VehicleView) -> State:
+    """The state that the newest messages tell."""
+    record = {name: value for name, value in status_record(view).items() if name in _NAMES}
+    load = view.latest.get("LOAD_STATE")
+    speed = None if load is None else float((load.vx**2 + load.vy**2 + load.vz**2) ** 0.5)
+    return State(**record, load_speed_m_s=speed)

@@ -1,0 +1,32 @@
+"""Vehicles made in Python."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import ClassVar, Self
+
+from autopilot.vehicle import model
+from autopilot.vehicle.file import VEHICLES, vehicle_keys
+from gcs.errors import input_error
+from missions.toml_files import FileError, TomlFiles
+from plumbline.tables import Table
+
+
+class Vehicle(Table, model.Vehicle):
+    """A vehicle with its cable and its load; the keys are those of a vehicle file (docs/vehicles.md).
+
+    ```python
+    Vehicle.load("bebop").replace(name="long", cable_length_m=1.2).save("long.toml")
+    ```
+    """
+
+    files: ClassVar[TomlFiles] = VEHICLES
+
+    @classmethod
+    def load(cls, name_or_path: str | PathLike[str]) -> Self:
+        """A shipped one by its name, or that of a file; with a `believed`, what it leaves out is as there."""
+        try:
+            keys, _ = vehicle_keys(name_or_path)
+        except FileError as error:
+            raise input_error(error) from None
+        return cls(**keys)

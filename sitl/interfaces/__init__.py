@@ -1,0 +1,1 @@
+"""How autopilots of others fly the vehicle: one file an interface, bytes in and bytes out."""

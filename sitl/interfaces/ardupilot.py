@@ -1,0 +1,128 @@
+"""ArduPilot's JSON interface (`--model JSON`): servo packets in, lines of JSON out, no socket and no clock.
+
+The firmware sends a packet of PWM for each of its frames and waits for one line. What it does not hear it
+asks for again, with the same count, every 1.1 s. A line that it did not ask for would leave it one frame
+behind for ever, so a repeated packet is answered only long after the answer to the first.
+"""
+
+from __future__ import annotations
+
+from struct import Struct
+from typing import NamedTuple
+
+from autopilot.geometry.frames import frd_from_flu, ned_from_enu, quat_ned_frd_from_enu_flu
+from autopilot.geometry.linear import Vec3
+from autopilot.geometry.so3 import Quat
+from sitl.hil import HilSimulator
+
+MOTORS = 4
+PWM_OFF, PWM_FULL = 1000, 2000  # us, MOT_PWM_MIN and MOT_PWM_MAX
+RATE_HZ = 800  # of frames: the firmware's scheduler refuses to arm with fewer at its 400 Hz
+_KINDS = ((18458, Struct("<HHI16H")), (29569, Struct("<HHI32H")))
+_PACKETS = {layout.size: (magic, layout) for magic, layout in _KINDS}
+_LOST_S = 0.5  # after an answer, until a repeated packet means that the answer was lost
+# The firmware cuts the difference of two times to whole microseconds. With this the rounding of their
+# binary numbers, which is less for the first hours, never takes one away; it adds 1 us in 100 s.
+_STRETCH = 1.0 + 1e-8
+_LINE = (
+    '\n{"timestamp":%.17g,"imu":{"gyro":[%.9g,%.9g,%.9g],"accel_body":[%.9g,%.9g,%.9g]},'
+    '"position":[%.12g,%.12g,%.12g],"quaternion":[%.9g,%.9g,%.9g,%.9g],"velocity":[%.9g,%.9g,%.9g],'
+    '"no_time_sync":1}\n'
+)
+
+
+class ServoPacket(NamedTuple):
+    """What the firmware asks of its motors in one frame."""
+
+    rate_hz: int
+    number: int  # of the frame
+    pwm: tuple[int, ...]  # us; 0: no output
+
+
+class Reply(NamedTuple):
+    """What becomes of a datagram."""
+
+    answer: bytes = b""  # to be sent; empty: nothing
+    moved: bool = False  # the world, by a tick
+    news: str = ""  # for whoever watches
+
+
+def read_servo_packet(datagram: bytes) -> ServoPacket | None:
+    """The packet in a datagram, None if there is none: another size or another first number."""
+    known = _PACKETS.get(len(datagram))
+    if known is None:
+        return None
+    magic, layout = known
+    found, rate_hz, number, *pwm = layout.unpack(datagram)
+    return ServoPacket(rate_hz, number, tuple(pwm)) if found == magic else None
+
+
+def throttles(pwm: tuple[int, ...]) -> tuple[float, ...]:
+    """Throttles of the motors, 0 ... 1, of their pulses."""
+    return tuple(min(max((us - PWM_OFF) / (PWM_FULL - PWM_OFF), 0.0), 1.0) for us in pwm[:MOTORS])
+
+
+def line(
+    now_us: int, gyro_body: Vec3, accel_body: Vec3, position: Vec3, velocity: Vec3, quat_wxyz: Quat
+) -> bytes:
+    """The answer to a frame: rates (rad/s) and specific force (m/s^2) in FLU, position (m) and velocity
+    in ENU, attitude FLU to ENU. Compact, as the firmware's reader needs it."""
+    return (
+        _LINE
+        % (
+            now_us * 1e-6 * _STRETCH,
+            *frd_from_flu(gyro_body),
+            *frd_from_flu(accel_body),
+            *ned_from_enu(position),
+            *quat_ned_frd_from_enu_flu(quat_wxyz),
+            *ned_from_enu(velocity),
+        )
+    ).encode("ascii")
+
+
+class Exchange:
+    """One firmware after the other on one world: each new frame is a tick."""
+
+    def __init__(self, simulator: HilSimulator) -> None:
+        """ValueError if the vehicle is none that the firmware flies."""
+        self._simulator = simulator
+        self._frame = simulator.frame
+        self._newest = -1  # frame's number
+        self._answer = b""  # to it
+        self._answered_s = 0.0
+
+    def receive(self, packet: ServoPacket, now_s: float) -> Reply:
+        """Take a packet that came at `now_s` of any steady clock.
+
+        A number that goes back is a firmware that began anew: so does the world.
+        """
+        if packet.number == self._newest:
+            if now_s - self._answered_s < _LOST_S:
+                return Reply()
+            self._answered_s = now_s
+            return Reply(self._answer)
+        news = ""
+        if packet.number < self._newest:
+            at_s = self._simulator.now_us / 1e6
+            news = f"the firmware began anew at t = {at_s:.3f} s, and so does the world"
+            self._simulator.begin_anew()
+        elif self._newest < 0 < packet.number:
+            news = f"the firmware has flown for {packet.number} frames; its world begins anew"
+        self._newest, self._answered_s = packet.number, now_s
+        self._answer = self._tick(packet.pwm)
+        return Reply(self._answer, True, news)
+
+    def _tick(self, pwm: tuple[int, ...]) -> bytes:
+        simulator, frame = self._simulator, self._frame
+        motors = throttles(pwm)
+        simulator.obey(frame.forces(motors), any(motors))
+        simulator.advance()
+        felt, state = simulator.inertial, simulator.core.state
+        return line(
+            simulator.now_us,
+            frame.felt(felt.gyro_body),
+            frame.felt(felt.accel_body),
+            state.x_quad,
+            state.v_quad,
+            frame.attitude(state.quat_wxyz),
+        )

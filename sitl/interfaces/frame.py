@@ -1,0 +1,90 @@
+"""The quadrotor as the firmwares know it: which rotor each of their motors drives, how the flight controller
+is mounted, and what a rotor makes of the throttle of its motor.
+
+ArduPilot and PX4 number the motors of an X alike: 1 front right, 2 rear left, both counterclockwise; 3 front
+left, 4 rear right, both clockwise. A vehicle whose arms make a plus is an X to a flight controller that is
+mounted turned by half a right angle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, inf, pi, sin
+from typing import NamedTuple
+
+from autopilot.geometry.linear import Vec3
+from autopilot.geometry.so3 import Quat, quat_multiply
+from autopilot.vehicle.layout import Layout
+
+# angle from forward to the left, and the sign of the moment about the upward axis, of motors 1 to 4
+_MOTORS = ((-0.25 * pi, -1.0), (0.75 * pi, -1.0), (0.25 * pi, 1.0), (-0.75 * pi, 1.0))
+_TURNS = (0.0, 0.25 * pi)  # of the flight controller to the left
+_WITHIN = 0.15 * pi  # a rotor stands in the direction of its motor
+_ALIKE = 0.1  # share of the arm by which the distances of the rotors may differ
+# share of the thrust that grows with the square of the throttle: propellers behind common speed controllers
+THRUST_EXPO = 0.65
+
+
+class Frame(NamedTuple):
+    """How a firmware's motors and flight controller sit on a vehicle."""
+
+    rotor_of: tuple[int, ...]  # index of the rotor that each motor drives, in the order of the motors
+    greatest_n: tuple[float, ...]  # force of that rotor at full throttle
+    least_n: float  # force of a rotor at no throttle
+    turn: float  # rad, of the flight controller to the left of the vehicle's nose
+
+    def forces(self, throttles: Sequence[float]) -> tuple[float, ...]:
+        """Forces (N) of the rotors, in the vehicle's order, at these throttles of the motors, 0 ... 1."""
+        found = [0.0] * len(self.rotor_of)
+        for rotor, greatest, throttle in zip(self.rotor_of, self.greatest_n, throttles, strict=True):
+            u = min(max(throttle, 0.0), 1.0)
+            share = (1.0 - THRUST_EXPO) * u + THRUST_EXPO * u * u
+            found[rotor] = self.least_n + (greatest - self.least_n) * share
+        return tuple(found)
+
+    def felt(self, v: Vec3) -> Vec3:
+        """A vector of the vehicle's axes in those of the flight controller, both FLU."""
+        if self.turn == 0.0:
+            return v
+        c, s = cos(self.turn), sin(self.turn)
+        return (c * v[0] + s * v[1], c * v[1] - s * v[0], v[2])
+
+    def attitude(self, quat_wxyz: Quat) -> Quat:
+        """The flight controller's attitude, given the vehicle's."""
+        if self.turn == 0.0:
+            return quat_wxyz
+        half: Quat = (cos(0.5 * self.turn), 0.0, 0.0, sin(0.5 * self.turn))
+        return quat_multiply(quat_wxyz, half)
+
+
+def frame_of(layout: Layout, least_n: float, greatest_n: float) -> Frame:
+    """The X that a vehicle is, whose rotors give `least_n` to `greatest_n`; ValueError if it is none."""
+    if not 0.0 <= least_n < greatest_n < inf:
+        raise ValueError(
+            f"rotors of {least_n:g} to {greatest_n:g} N; a throttle needs rotors from 0 N or more to a "
+            "finite force (rotor_min_n, rotor_max_n)"
+        )
+    for turn in _TURNS:
+        order = _order(layout, turn)
+        if order:
+            strengths = tuple(greatest_n * layout[rotor].strength for rotor in order)
+            return Frame(order, strengths, least_n, turn)
+    raise ValueError(
+        'rotors that make no quadrotor of the kind that firmwares fly: take frame = "x" or "plus" with four '
+        "rotors, spins in turn"
+    )
+
+
+def _order(layout: Layout, turn: float) -> tuple[int, ...]:
+    """The rotor of each motor if the flight controller is turned so; empty if they do not fit."""
+    reach = [hypot(rotor.x, rotor.y) for rotor in layout]
+    if len(layout) != len(_MOTORS) or max(reach) - min(reach) > _ALIKE * max(reach):
+        return ()
+    found = []
+    for angle, yaw in _MOTORS:
+        for i, rotor in enumerate(layout):
+            off = atan2(rotor.y, rotor.x) - angle - turn
+            if abs(atan2(sin(off), cos(off))) < _WITHIN and rotor.yaw * yaw > 0.0:
+                found.append(i)
+                break
+    return tuple(found) if len(set(found)) == len(_MOTORS) else ()

@@ -1,0 +1,124 @@
+"""PX4's simulator interface: MAVLink over TCP, on which the simulator is the server; no socket and no clock.
+
+Each tick the firmware is sent HIL_STATE_QUATERNION (the truth, which it logs), HIL_GPS when there is a fix,
+and HIL_SENSOR, whose time sets its clock. It answers with HIL_ACTUATOR_CONTROLS once all that runs by its
+clock is done. Until its first answer the world runs on; from then on it waits for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG
+from autopilot.wire.dialect import plumbline as mavlink
+from sitl.hil import HilSimulator
+from sitl.interfaces.frame import Frame
+from sitl.messages import SIMULATOR_COMPONENT, VEHICLE_SYSTEM
+
+RATE_HZ = 250
+MOTORS = 4
+_HEAD, _TAIL = 10, 2  # bytes of a MAVLink 2 frame around its payload
+_FRAME_START = 0xFD
+_TRUTH_US = 20_000
+_LARGEST = 65_536  # bytes that are kept of a stream without a whole frame
+_SENSOR, _GPS, _STATE = (
+    mavlink.MAVLINK_MSG_ID_HIL_SENSOR,
+    mavlink.MAVLINK_MSG_ID_HIL_GPS,
+    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
+)
+_CONTROLS = mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+
+
+def frames(datagram: bytes) -> Iterator[tuple[int, bytes]]:
+    """(message id, frame) of whole frames that lie one behind the other, as we write them."""
+    at = 0
+    while at + _HEAD <= len(datagram) and datagram[at] == _FRAME_START:
+        end = at + _HEAD + datagram[at + 1] + _TAIL
+        yield int.from_bytes(datagram[at + 7 : at + 10], "little"), datagram[at:end]
+        at = end
+
+
+class Stream:
+    """Frames out of a stream of bytes that is cut anywhere."""
+
+    def __init__(self) -> None:
+        self._left = b""
+
+    def feed(self, piece: bytes) -> list[bytes]:
+        """The whole frames that are there now; what is none is passed over."""
+        data = (self._left + piece)[-_LARGEST:]
+        found = []
+        while True:
+            begin = data.find(_FRAME_START)
+            data = data[begin:] if begin >= 0 else b""
+            size = _HEAD + data[1] + _TAIL if len(data) > 1 else _HEAD
+            if len(data) < size:
+                break
+            frame = data[:size]
+            if decode(frame)[0]:
+                found.append(frame)
+                data = data[size:]
+            else:
+                data = data[1:]
+        self._left = data
+        return found
+
+
+class Exchange:
+    """One firmware on one world."""
+
+    def __init__(self, simulator: HilSimulator) -> None:
+        """ValueError if the vehicle or its sensors are none that the firmware flies with."""
+        if not simulator.navigates:
+            raise ValueError(
+                "PX4 flies by GNSS, barometer and magnetometer; take a sensor profile that has them: "
+                "--sensors rtk or gps"
+            )
+        self._simulator = simulator
+        self._frame: Frame = simulator.frame
+        self._writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
+        self._stream = Stream()
+        self.in_step = False  # it has answered once
+
+    def sensors(self) -> bytes:
+        """What is sent at this tick."""
+        simulator = self._simulator
+        sensors = [pair for pair in frames(simulator.sensor_datagram()) if pair[0] in (_SENSOR, _GPS)]
+        sent = [frame for kind, frame in sensors if kind == _GPS]
+        truth = simulator.truth_datagram()
+        if truth is not None and simulator.now_us % _TRUTH_US == 0:
+            sent += [frame for kind, frame in frames(truth) if kind == _STATE]
+        sent += [self._mounted(frame) for kind, frame in sensors if kind == _SENSOR]
+        return b"".join(sent)
+
+    def receive(self, piece: bytes) -> bool:
+        """Take bytes of the firmware; True if with them the present tick is answered."""
+        for frame in self._stream.feed(piece):
+            message = decode(frame)[0][0].message
+            if message.get_msgId() != _CONTROLS:
+                continue
+            if self.in_step and message.time_usec < self._simulator.now_us:
+                continue  # an answer from before it was in step
+            self.in_step = True
+            self._simulator.obey(self._frame.forces(tuple(message.controls[:MOTORS])), _armed(message.mode))
+            return True
+        return False
+
+    def _mounted(self, frame: bytes) -> bytes:
+        """HIL_SENSOR in the axes of the flight controller."""
+        if self._frame.turn == 0.0:
+            return frame
+        m = decode(frame)[0][0].message
+        for fields, names in ((ACCEL, "acc"), (GYRO, "gyro"), (MAG, "mag")):
+            if m.fields_updated & fields:
+                x, y, z = (getattr(m, axis + names) for axis in "xyz")
+                # FRD here, FLU there
+                turned = self._frame.felt((x, -y, -z))
+                for axis, value in zip("xyz", (turned[0], -turned[1], -turned[2]), strict=True):
+                    setattr(m, axis + names, value)
+        return self._writer.frame(m)
+
+
+def _armed(mode: int) -> bool:
+    return bool(mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)

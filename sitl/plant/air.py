@@ -1,0 +1,103 @@
+"""What moving air and the near ground do to the rotors: drag, flapping, ground effect.
+
+| symbol | code | frame, unit | |
+|---|---|---|---|
+| F_i | rows[stage, i] | N | thrust of a rotor far from the ground |
+| r_i | place | body, m | its hub, from the centre of mass |
+| u_i | u | body, m/s | velocity of the hub relative to the air, R^T (x_Q' - w) + Omega x r_i |
+| k | rotor_drag | 1/s | induced drag |
+| a | rotor_flap | rad/(m/s) | backward tilt of the disc |
+| K | blade_stiffness | N m/rad | moment at the hub by tilt |
+| R_r, z | rotor_radius | m | radius, height of the hub over the ground along the rotor's axis |
+| A | | m^2 | pi R_r^2 |
+
+In the disc's plane, with u' the part of u_i there:
+
+    H_i = -(k/g + a) F_i u'              at the hub
+    M_i = K a (e3 x -u')
+
+the lumped drag of Mahony, Kumar and Corke (2012), equation (13): linear in the velocity, proportional to the
+thrust. A disc that tilts by a |u'| turns its thrust back by a F |u'|; stiff blades hand the tilt to the hub
+as a moment. A vehicle that hovers has k + a g of drag in 1/s, for each kilogram that its rotors carry.
+
+Near the ground a rotor gives more at the same power (Cheeseman and Bennett 1955; the second form with the
+wash that is blown away by forward speed):
+
+    F_i' = F_i (1 + c b / (1 - b)),   b = (R_r / 4 z)^2 / (1 + (|u'| / v_i)^2),   v_i^2 = F_i / (2 rho A)
+
+c is `ground_effect`. The formula holds from z = R_r/2 on; below, the height counts as R_r/2.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
+from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, apply_transposed, cross
+from sitl.plant.records import Air, Truth
+from sitl.plant.rotors import PITCH, ROLL, RotorRows
+
+_LEAST_HEIGHT = 0.5  # rotor radii, above which the formula holds
+_NO_WASH = 1e-9  # N, of the air that is blown away: keeps 0 / 0 out
+
+
+class Felt(NamedTuple):
+    """Force (N) and moment (N m) of the air on the rotors, body frame."""
+
+    force: Vec3
+    moment: Vec3
+
+
+@kernel
+def blows(truth: Truth) -> bool:
+    """Whether air or ground change what the rotors do."""
+    air = truth.air
+    return air.rotor_drag > 0.0 or air.rotor_flap > 0.0 or air.ground_effect > 0.0
+
+
+@kernel
+def hub_of(rotors: RotorRows, i: int, truth: Truth) -> Vec3:
+    """r_i."""
+    table = rotors.table
+    return (-truth.arm * table[i, PITCH], truth.arm * table[i, ROLL], truth.rotor_height)
+
+
+@kernel
+def ground_gain(thrust: float, height: float, across: float, air: Air) -> float:
+    """F' / F - 1 of a rotor with this thrust (N) and height (m); `across` is |u'|^2."""
+    disc = pi * air.rotor_radius * air.rotor_radius
+    lift = if_above(thrust, 0.0, thrust, 0.0)
+    least = _LEAST_HEIGHT * air.rotor_radius
+    near = air.rotor_radius / (4.0 * if_above(height, least, height, least))
+    b = near * near * lift / (lift + 2.0 * air.density * disc * across + _NO_WASH)
+    return air.ground_effect * b / (1.0 - b)
+
+
+@kernel
+def felt_by_rotors(
+    rotors: RotorRows, stage: int, x_quad: Vec3, v_quad: Vec3, R: Mat3, omega: Vec3, wind: Vec3, truth: Truth
+) -> Felt:
+    """What acts beside the rotors' thrust and torque; their forces are in the row `stage`."""
+    air = truth.air
+    through = apply_transposed(R, (v_quad[0] - wind[0], v_quad[1] - wind[1], v_quad[2] - wind[2]))
+    lag = air.rotor_drag / truth.gravity + air.rotor_flap
+    stiff = air.blade_stiffness * air.rotor_flap
+    # a rotor whose axis lies level has no ground below it
+    upright = if_above(R[2][2], 0.0, R[2][2], 0.0)
+    force, moment = ZERO, ZERO
+    for i in range(rotors.table.shape[0]):
+        thrust = rotors.rows[stage, i]
+        hub = hub_of(rotors, i, truth)
+        u = add(through, cross(omega, hub))
+        more = 0.0
+        if air.ground_effect > 0.0:
+            z = x_quad[2] + R[2][0] * hub[0] + R[2][1] * hub[1] + R[2][2] * hub[2]
+            # its height along the axis is z / upright
+            far = if_above(upright, 1e-3, z / (upright + 1e-9), 1e9)
+            more = thrust * ground_gain(thrust, far, u[0] * u[0] + u[1] * u[1], air)
+        pull = (-lag * thrust * u[0], -lag * thrust * u[1], more)
+        force = add(force, pull)
+        moment = add(moment, add(cross(hub, pull), (stiff * u[1], -stiff * u[0], 0.0)))
+    return Felt(force, moment)

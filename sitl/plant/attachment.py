@@ -1,0 +1,88 @@
+"""Where the cable is attached to the vehicle, away from its centre of mass.
+
+| symbol | code | frame, unit | |
+|---|---|---|---|
+| rho | attachment | body, m | from the centre of mass |
+| x_A | | world, m | x_Q + R rho |
+| q_b | q_body | body | R^T q, from x_A to the load |
+| n | | body, m | rho x q_b, so that the pull T q turns the vehicle by T n |
+| mu | effective_mass | kg | 1 / mu = 1/m_L + 1/m_Q + n . J^-1 n |
+
+    x_A'  = x_Q' + R (Omega x rho)
+    x_A'' = x_Q'' + R (Omega' x rho + Omega x (Omega x rho))
+
+With rho = 0 nothing here is called: the equations are those of a cable at the centre of mass, to the bit.
+"""
+
+from __future__ import annotations
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Mat3, Vec3, add, apply, apply_transposed, cross, dot, sub
+from autopilot.geometry.so3 import rotation_from_quat
+from sitl.plant.records import Motion, Truth
+
+
+@kernel
+def off_centre(truth: Truth) -> bool:
+    """Whether the cable is attached away from the centre of mass."""
+    rho = truth.attachment
+    return rho[0] != 0.0 or rho[1] != 0.0 or rho[2] != 0.0
+
+
+@kernel
+def arm_to(R: Mat3, truth: Truth) -> Vec3:
+    """x_A - x_Q."""
+    return apply(R, truth.attachment)
+
+
+@kernel
+def speed_beside(R: Mat3, omega: Vec3, truth: Truth) -> Vec3:
+    """x_A' - x_Q'."""
+    return apply(R, cross(omega, truth.attachment))
+
+
+@kernel
+def accel_beside(R: Mat3, omega: Vec3, omega_dot: Vec3, truth: Truth) -> Vec3:
+    """x_A'' - x_Q''."""
+    rho = truth.attachment
+    return apply(R, add(cross(omega_dot, rho), cross(omega, cross(omega, rho))))
+
+
+@kernel
+def turning_arm(q_cable: Vec3, R: Mat3, truth: Truth) -> Vec3:
+    """n: the torque on the vehicle for each newton of the pull."""
+    return cross(truth.attachment, apply_transposed(R, q_cable))
+
+
+@kernel
+def by_inertia(torque: Vec3, truth: Truth) -> Vec3:
+    """J^-1 torque."""
+    J = truth.inertia
+    return (torque[0] / J[0], torque[1] / J[1], torque[2] / J[2])
+
+
+@kernel
+def effective_mass(q_cable: Vec3, R: Mat3, truth: Truth) -> float:
+    """mu, the mass of the pair as the cable feels it along q."""
+    if not off_centre(truth):
+        return truth.load_mass * truth.quad_mass / (truth.load_mass + truth.quad_mass)
+    n = turning_arm(q_cable, R, truth)
+    return 1.0 / (1.0 / truth.load_mass + 1.0 / truth.quad_mass + dot(n, by_inertia(n, truth)))
+
+
+@kernel
+def attached_at(x_quad: Vec3, R: Mat3, truth: Truth) -> Vec3:
+    """x_A."""
+    return add(x_quad, arm_to(R, truth)) if off_centre(truth) else x_quad
+
+
+@kernel
+def cable_of(motion: Motion, truth: Truth) -> tuple[Vec3, Vec3]:
+    """c = x_L - x_A and c'."""
+    if not off_centre(truth):
+        return motion.apart, motion.apart_dot
+    R = rotation_from_quat(motion.quat)
+    return (
+        sub(motion.apart, arm_to(R, truth)),
+        sub(motion.apart_dot, speed_beside(R, motion.omega, truth)),
+    )

@@ -1,0 +1,62 @@
+"""Drag of a straight cable across its length, in wind and wake.
+
+A piece of the cable feels the air across itself: -1/2 rho C_D D |u_n| u_n for each metre, with u_n the part
+of its velocity through the air that is normal to the cable (the cross-flow principle; Hoerner, Fluid-Dynamic
+Drag, 1965, 3-2 and 3-11: C_D = 1.2 of a round cylinder between 300 and 3e5 of Reynolds number). A taut cable
+without mass hands it to its ends as a lever does: the piece at the share s of its length gives the share s to
+the load and 1 - s to the vehicle. The integral is Gauss's of three points. A slack cable has no shape and
+feels nothing.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import ZERO, Vec3, add, axpy, dot, norm, scale, sub
+from sitl.plant.records import Motion, Truth
+from sitl.plant.rotors import RotorRows
+from sitl.plant.wake import Wake, wake_at
+
+DRAG_COEFFICIENT = 1.2
+_NODES = (0.1127016653792583, 0.5, 0.8872983346207417)
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+
+
+class Ends(NamedTuple):
+    """Force (N, world) on the two ends of the cable."""
+
+    vehicle: Vec3
+    load: Vec3
+
+
+UNTOUCHED = Ends(ZERO, ZERO)
+
+
+@kernel
+def drag_of_cable(
+    motion: Motion,
+    cable: Vec3,
+    cable_dot: Vec3,
+    wind: Vec3,
+    wake: Wake,
+    rotors: RotorRows,
+    stage: int,
+    truth: Truth,
+) -> Ends:
+    """The force on the ends of the cable, x_L - x_A with its rate. The forces of the rotors, which make the
+    wake, are in the row `stage`."""
+    length = norm(cable)
+    q = scale(1.0 / length, cable)
+    factor = 0.5 * truth.air.density * DRAG_COEFFICIENT * truth.air.cable_diameter * length
+    above, below = ZERO, ZERO
+    for k in range(3):
+        share = _NODES[k]
+        air = wind
+        if truth.air.downwash > 0.0:
+            air = add(wind, wake_at(axpy(share - 1.0, cable, motion.x_load), wake, rotors, stage, truth))
+        u = sub(axpy(share - 1.0, cable_dot, motion.v_load), air)
+        across = axpy(-dot(u, q), q, u)
+        force = scale(-_WEIGHTS[k] * factor * norm(across), across)
+        above, below = axpy(1.0 - share, force, above), axpy(share, force, below)
+    return Ends(above, below)

@@ -1,0 +1,234 @@
+"""An implicit Euler step of vehicle, cable and load: the stage of which `sitl.plant.chain.step` takes two.
+
+With y the places and attitudes and v the velocities and body rates, and y_b, v_b from where the stage begins,
+
+    y = y_b + tau y'(y, v)        v = v_b + tau a(y, v, T(y, v))
+
+is solved by iteration. An iterate says where everything is; there the forces and the directions of the links
+are found, then all tensions at once (`sitl.plant.chain.tension`), and with them the next velocities. So all
+that is stiff, stretch, is solved for in each iteration, and what is left to the iteration, the turning of
+the links, converges by about (tau omega)^2, omega the fastest frequency of the cable across.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import (
+    ZERO,
+    Mat3,
+    Vec3,
+    add,
+    apply,
+    apply_transposed,
+    axpy,
+    cross,
+    dot,
+    norm,
+    scale,
+    sub,
+)
+from autopilot.geometry.so3 import Quat, quat_normalise, rotation_from_quat
+from sitl.plant.attachment import attached_at, by_inertia, speed_beside, turning_arm
+from sitl.plant.chain.forces import Bodies, FreeRates, free_bodies, free_points, moments_of
+from sitl.plant.chain.records import (
+    BEHIND,
+    DIAGONAL,
+    RIGHT,
+    STRETCH_BASE,
+    TENSION,
+    ChainRows,
+    LoadBody,
+    hook_of,
+    put,
+    vector,
+)
+from sitl.plant.chain.tension import find_tensions
+from sitl.plant.records import ChainModel, Truth
+from sitl.plant.rotors import RotorRows, Wrench
+
+_MOST_ITERATIONS = 25
+_CONVERGED = 1e-13  # m, that an iteration may still move a point
+
+
+class Length(NamedTuple):
+    """The cable's own length at one instant."""
+
+    length: float  # m
+    rate: float  # m/s
+
+
+@kernel
+def later(own: Length, accel: float, t: float) -> Length:
+    """The length t seconds on, reeled with `accel` in m/s^2."""
+    return Length(own.length + t * (own.rate + 0.5 * t * accel), own.rate + t * accel)
+
+
+class Solved(NamedTuple):
+    """The end of a stage."""
+
+    at: Bodies
+    free: FreeRates
+    converged: bool
+
+
+@kernel
+def _turned(base: Quat, omega: Vec3, tau: float) -> Quat:
+    """The q of q = base + tau q'(q, omega), which is linear in q."""
+    a, b, c = 0.5 * tau * omega[0], 0.5 * tau * omega[1], 0.5 * tau * omega[2]
+    s = 1.0 / (1.0 + a * a + b * b + c * c)
+    w, x, y, z = base
+    return (
+        s * (w - x * a - y * b - z * c),
+        s * (x + w * a + y * c - z * b),
+        s * (y + w * b + z * a - x * c),
+        s * (z + w * c + x * b - y * a),
+    )
+
+
+@kernel
+def placed(base: Bodies, speed: Bodies, tau: float) -> Bodies:
+    """Where the bodies are after the stage if they have the speeds of `speed` then."""
+    return Bodies(
+        axpy(tau, speed.v_quad, base.x_quad),
+        speed.v_quad,
+        _turned(base.quat, speed.omega, tau),
+        speed.omega,
+        axpy(tau, speed.v_load, base.x_load),
+        speed.v_load,
+        LoadBody(_turned(base.load.quat, speed.load.omega, tau), speed.load.omega),
+    )
+
+
+@kernel
+def _place_points(rows: ChainRows, at: Bodies, R: Mat3, hook: Vec3, truth: Truth, tau: float) -> None:
+    """The points after the stage if they have the speeds `rows.v` then; the ends are at the bodies."""
+    n = rows.link.shape[0]
+    for i in range(1, n):
+        put(rows.x, i, axpy(tau, vector(rows.v, i), vector(rows.x_base, i)))
+    R_quad = rotation_from_quat(quat_normalise(at.quat))
+    put(rows.x, 0, attached_at(at.x_quad, R_quad, truth))
+    put(rows.v, 0, add(at.v_quad, speed_beside(R_quad, at.omega, truth)))
+    put(rows.x, n, add(at.x_load, apply(R, hook)))
+    put(rows.v, n, add(at.v_load, apply(R, cross(at.load.omega, hook))))
+
+
+@kernel
+def _direction(rows: ChainRows, i: int) -> Vec3:
+    """The direction of link i, 0 ... n - 1."""
+    return vector(rows.link, i)
+
+
+@kernel
+def _equations(
+    rows: ChainRows, model: ChainModel, lightness_quad: float, lightness_load: float, own: Length, tau: float
+) -> None:
+    """The equations for the tensions: `rows.free` holds the velocities after the stage without any."""
+    link, n = rows.link, rows.link.shape[0]
+    rest, rest_rate = own.length / n, own.rate / n
+    stiffness, damping = model.stiffness / rest, model.damping / rest
+    gain = tau * (stiffness * tau + damping)
+    light = n / (model.mass * own.length) if n > 1 else 0.0
+    before = lightness_quad
+    for i in range(n):
+        q = _direction(rows, i)
+        # the rate of the stretch without tensions, and what it would make of the stretch
+        rate = dot(q, sub(vector(rows.free, i + 1), vector(rows.free, i))) - rest_rate
+        pull = stiffness * (link[i, STRETCH_BASE] + tau * rate) + damping * rate
+        after = light if i + 1 < n else lightness_load
+        link[i, DIAGONAL] = before + after + 1.0 / gain
+        link[i, RIGHT] = pull / gain
+        if i + 1 < n:
+            link[i, BEHIND] = -after * dot(q, _direction(rows, i + 1))
+        before = after
+    if rows.held[0] == 0.0:
+        # the cable hangs at the load alone: its first link ties nothing
+        link[0, RIGHT], link[0, BEHIND] = -1.0, 0.0
+
+
+@kernel
+def _point(rows: ChainRows) -> None:
+    """The directions of the links; one of no length keeps its own."""
+    for i in range(rows.link.shape[0]):
+        along = sub(vector(rows.x, i + 1), vector(rows.x, i))
+        length = norm(along)
+        if length > 0.0:
+            put(rows.link, i, scale(1.0 / length, along))
+
+
+@kernel
+def implicit_euler(
+    base: Bodies,
+    guess: Bodies,
+    rows: ChainRows,
+    wrench: Wrench,
+    rotors: RotorRows,
+    truth: Truth,
+    wind: Vec3,
+    own: Length,
+    tau: float,
+) -> Solved:
+    """A stage of length tau (s) from `base` and the bases in `rows`; its end is returned and in `rows`.
+
+    `guess` and `rows.v` hold the velocities with which the iteration begins. `own` is the cable's length at
+    the end.
+    """
+    model = truth.chain
+    n, hook = rows.link.shape[0], hook_of(model)
+    half = 0.5 * model.mass * own.length / n
+    mass_quad, mass_load = truth.quad_mass + half, truth.load_mass + half
+    light = n / (model.mass * own.length) if n > 1 else 0.0
+    turns, inertia = model.gyration > 0.0, moments_of(model, truth)
+    speed, converged = guess, False
+    for _ in range(_MOST_ITERATIONS):
+        at = placed(base, speed, tau)
+        R = rotation_from_quat(quat_normalise(at.load.quat))
+        _place_points(rows, at, R, hook, truth, tau)
+        _point(rows)
+        drags = free_points(rows, model, truth, wind, own.length)
+        free = free_bodies(at, wrench, rotors, model, truth, wind, half, drags)
+        # the velocities without any tension
+        v_quad, v_load = axpy(tau, free.quad, base.v_quad), axpy(tau, free.load, base.v_load)
+        spin = axpy(tau, free.load_spin, base.load.omega)
+        for i in range(1, n):
+            put(rows.free, i, axpy(tau, vector(rows.free, i), vector(rows.v_base, i)))
+        omega = axpy(tau, free.spin, base.omega)
+        R_quad = rotation_from_quat(quat_normalise(at.quat))
+        put(rows.free, 0, add(v_quad, speed_beside(R_quad, omega, truth)))
+        arm = turning_arm(_direction(rows, 0), R_quad, truth)
+        turn = by_inertia(arm, truth)
+        put(rows.free, n, add(v_load, apply(R, cross(spin, hook))))
+        q = _direction(rows, n - 1)
+        lever = cross(hook, apply_transposed(R, q))
+        answer = ZERO
+        if turns:
+            answer = (lever[0] / inertia[0], lever[1] / inertia[1], lever[2] / inertia[2])
+        light_quad, light_load = 1.0 / mass_quad + dot(arm, turn), 1.0 / mass_load + dot(lever, answer)
+        _equations(rows, model, light_quad, light_load, own, tau)
+        decided = find_tensions(rows.link)
+        # the velocities with them
+        first, last = rows.link[0, TENSION], rows.link[n - 1, TENSION]
+        omega = axpy(tau * first, turn, omega)
+        moved = norm(sub(omega, speed.omega))
+        v_quad = axpy(tau * first / mass_quad, _direction(rows, 0), v_quad)
+        v_load = axpy(-tau * last / mass_load, q, v_load)
+        spin = axpy(-tau * last, answer, spin)
+        moved = max(moved, norm(sub(v_quad, speed.v_quad)), norm(sub(v_load, speed.v_load)))
+        moved = max(moved, norm(sub(spin, speed.load.omega)))
+        for i in range(1, n):
+            pull = sub(
+                scale(rows.link[i, TENSION], _direction(rows, i)),
+                scale(rows.link[i - 1, TENSION], _direction(rows, i - 1)),
+            )
+            v = axpy(tau * light, pull, vector(rows.free, i))
+            moved = max(moved, norm(sub(v, vector(rows.v, i))))
+            put(rows.v, i, v)
+        speed = Bodies(at.x_quad, v_quad, at.quat, omega, at.x_load, v_load, LoadBody(at.load.quat, spin))
+        if decided and tau * moved < _CONVERGED:
+            converged = True
+            break
+    at = placed(base, speed, tau)
+    R = rotation_from_quat(quat_normalise(at.load.quat))
+    _place_points(rows, at, R, hook, truth, tau)
+    return Solved(at, free, converged)

@@ -1,0 +1,252 @@
+"""One fixed step of the plant with a cable of links: two implicit stages of second order.
+
+The method is the singly diagonally implicit Runge-Kutta method of two stages with gamma = 1 - 1/sqrt(2)
+(Alexander 1977), of order 2 and L-stable: a stretch that is too fast for the step dies away in place of
+ringing on. Each stage is an implicit Euler step of length gamma h (`sitl.plant.chain.stage`); the second
+begins from y + (1 - gamma) h y'_1 and ends at the end of the step.
+
+A stage whose iteration does not end halves the step.
+"""
+
+from __future__ import annotations
+
+from math import ceil, inf, sqrt
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.linear import Vec3, axpy, dot, norm, sub
+from autopilot.geometry.packed import pack, unpack
+from autopilot.geometry.so3 import Quat, quat_normalise
+from sitl.plant.chain.forces import Bodies
+from sitl.plant.chain.records import (
+    STRETCH_BASE,
+    TENSION,
+    ChainRows,
+    LoadBody,
+    copy,
+    lay,
+    length_of,
+    put,
+    vector,
+)
+from sitl.plant.chain.stage import Length, Solved, implicit_euler, later
+from sitl.plant.flow import Flow
+from sitl.plant.records import ChainModel, Motion, PlantState, Truth
+from sitl.plant.rotors import BEFORE, END, FORCE, RotorRows, keep, limit, wrenches
+from sitl.plant.step import held, resting, sound, state_of
+
+GAMMA = 1.0 - 1.0 / sqrt(2.0)
+LONGEST_STEP = 5e-4  # s, benchmarks/cable_convergence.py: docs/realism-cable.md has the table
+_SHORTEST_STEP = 1e-6  # s, whose last iterate is taken
+_CONTRACTION = 0.25  # of the iteration in a stage: the step is chosen for it
+# of the load's weight: taut when every link pulls by more, slack when one pulls by less than half of it
+TAUT_SHARE = 0.02
+
+
+@kernel
+def _bodies(state: PlantState, body: LoadBody) -> Bodies:
+    return Bodies(
+        state.x_quad,
+        state.v_quad,
+        state.quat_wxyz,
+        state.omega_body,
+        state.x_load,
+        state.v_load,
+        body,
+    )
+
+
+@kernel
+def _normalised(at: Bodies) -> Bodies:
+    """The same with quaternions of length 1."""
+    load = LoadBody(quat_normalise(at.load.quat), at.load.omega)
+    quat = quat_normalise(at.quat)
+    return Bodies(at.x_quad, at.v_quad, quat, at.omega, at.x_load, at.v_load, load)
+
+
+@kernel
+def _hold(rows: ChainRows, state: PlantState, truth: Truth) -> None:
+    """Note whether the vehicle holds the cable, and its length; one taken hold of anew is laid straight."""
+    if truth.cable_length == inf:
+        rows.held[0] = 0.0
+        return
+    if rows.held[0] == 0.0:
+        lay(rows, truth, state)
+    rows.held[1] = length_of(truth)
+
+
+@kernel
+def step_length(rows: ChainRows, model: ChainModel, length: float, remaining: float, longest: float) -> float:
+    """Length of the next step in s; divides `remaining` evenly.
+
+    Short enough for the iteration of the stages: it converges by (gamma h)^2 4 T / (l m) with T the greatest
+    tension and m the mass of a point.
+    """
+    n = rows.link.shape[0]
+    if n > 1:
+        greatest = 0.0
+        for i in range(n):
+            greatest = max(greatest, rows.link[i, TENSION])
+        link_length = length / n
+        fastest = 4.0 * greatest / (link_length * link_length * model.mass)
+        if fastest * longest * longest * GAMMA * GAMMA > _CONTRACTION:
+            longest = max(sqrt(_CONTRACTION / fastest) / GAMMA, _SHORTEST_STEP)
+    if not remaining > longest * (1.0 + 1e-9):
+        return remaining
+    return remaining / ceil(remaining / longest - 1e-9)
+
+
+@kernel
+def _along(s: float, begin: Vec3, end: Vec3) -> Vec3:
+    """begin + s (end - begin)."""
+    return axpy(s, sub(end, begin), begin)
+
+
+@kernel
+def _quat_along(s: float, p: Quat, q: Quat) -> Quat:
+    return (
+        p[0] + s * (q[0] - p[0]),
+        p[1] + s * (q[1] - p[1]),
+        p[2] + s * (q[2] - p[2]),
+        p[3] + s * (q[3] - p[3]),
+    )
+
+
+@kernel
+def _bodies_along(s: float, begin: Bodies, end: Bodies) -> Bodies:
+    """begin + s (end - begin), number by number."""
+    return Bodies(
+        _along(s, begin.x_quad, end.x_quad),
+        _along(s, begin.v_quad, end.v_quad),
+        _quat_along(s, begin.quat, end.quat),
+        _along(s, begin.omega, end.omega),
+        _along(s, begin.x_load, end.x_load),
+        _along(s, begin.v_load, end.v_load),
+        LoadBody(
+            _quat_along(s, begin.load.quat, end.load.quat),
+            _along(s, begin.load.omega, end.load.omega),
+        ),
+    )
+
+
+@kernel
+def _step(
+    begin: Bodies,
+    rows: ChainRows,
+    rotors: RotorRows,
+    truth: Truth,
+    wind: Vec3,
+    own: Length,
+    h: float,
+) -> Solved:
+    """A step of length h (s) from `begin` and the points in `rows`, which are at its end then. `own` is the
+    cable's length at the beginning."""
+    accel = truth.reel_accel
+    n = rows.link.shape[0]
+    copy(rows.x, rows.x_begin)
+    copy(rows.v, rows.v_begin)
+    copy(rows.x, rows.x_base)
+    copy(rows.v, rows.v_base)
+    for i in range(n):
+        distance = norm(sub(vector(rows.x, i + 1), vector(rows.x, i)))
+        rows.link[i, STRETCH_BASE] = distance - own.length / n
+    tau = GAMMA * h
+    _, _, wrench = wrenches(rotors, truth, tau)
+    first = implicit_euler(begin, begin, rows, wrench, rotors, truth, wind, later(own, accel, tau), tau)
+    if not first.converged:
+        return first
+    # y + (1 - gamma) h y'_1, with y'_1 = (y_1 - y) / tau
+    share = (1.0 - GAMMA) / GAMMA
+    for i in range(n + 1):
+        put(rows.x_base, i, _along(share, vector(rows.x_begin, i), vector(rows.x, i)))
+        put(rows.v_base, i, _along(share, vector(rows.v_begin, i), vector(rows.v, i)))
+    for i in range(n):
+        apart = sub(vector(rows.v, i + 1), vector(rows.v, i))
+        rate = dot(vector(rows.link, i), apart) - later(own, accel, tau).rate / n
+        rows.link[i, STRETCH_BASE] += (1.0 - GAMMA) * h * rate
+    _, _, wrench = wrenches(rotors, truth, h)
+    base = _bodies_along(share, begin, first.at)
+    return implicit_euler(base, first.at, rows, wrench, rotors, truth, wind, later(own, accel, h), tau)
+
+
+@kernel
+def _least_tension(rows: ChainRows) -> float:
+    """Of all links, N."""
+    least = inf
+    for i in range(rows.link.shape[0]):
+        least = min(least, rows.link[i, TENSION])
+    return least
+
+
+@kernel
+def _closing(begin: Bodies, own: Length) -> float:
+    """Speed in m/s at which vehicle and load part faster than the cable is let out."""
+    line = sub(begin.x_load, begin.x_quad)
+    return dot(line, sub(begin.v_load, begin.v_quad)) / norm(line) - own.rate
+
+
+@kernel
+def advance_chain(
+    state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: float, rows: ChainRows
+) -> PlantState:
+    """The state h seconds later, and the cable in `rows`; see `sitl.plant.step.advance`.
+
+    Direction and rate are those of the line from vehicle to load, the tension that at the vehicle.
+    `snap_speed` is the speed at which the ends parted as the cable came taut.
+    """
+    if state.diverged > 0.0 or not h > 0.0:
+        return state
+    model = truth.chain
+    half_share = 0.5 * model.mass / rows.link.shape[0]
+    _hold(rows, state, truth)
+    limit(rotors, truth)
+    keep(rotors, FORCE, BEFORE)
+    at = _bodies(state, unpack(LoadBody, rows.body, 0))
+    own = Length(rows.held[1], truth.reel_rate)
+    above = TAUT_SHARE * truth.load_mass * truth.gravity
+    taut, slack_events, snap_speed = state.taut, state.slack_events, 0.0
+    accel_quad, tension, quad_normal, load_normal = state.accel_quad, state.tension, 0.0, 0.0
+    remaining, longest = h, LONGEST_STEP
+    while remaining > 0.0:
+        t = step_length(rows, model, own.length, remaining, longest)
+        end = _step(at, rows, rotors, truth, wind, own, t)
+        if not end.converged and t > _SHORTEST_STEP:
+            copy(rows.x_begin, rows.x)
+            copy(rows.v_begin, rows.v)
+            longest = 0.5 * t
+            continue
+        keep(rotors, END, FORCE)
+        closing = _closing(at, own)
+        at = _normalised(end.at)
+        own = later(own, truth.reel_accel, t)
+        tension, least = rows.link[0, TENSION], _least_tension(rows)
+        if taut > 0.0 and least < 0.5 * above:
+            taut = 0.0
+            slack_events += 1.0
+        elif taut <= 0.0 and least > above:
+            taut = 1.0
+            snap_speed = max(snap_speed, closing)
+        q = vector(rows.link, 0)
+        accel_quad = axpy(tension / (truth.quad_mass + half_share * own.length), q, end.free.quad)
+        quad_normal, load_normal = end.free.quad_normal, end.free.load_normal
+        remaining -= t
+    rows.held[1] = own.length
+    cable, cable_dot = sub(at.x_load, at.x_quad), sub(at.v_load, at.v_quad)
+    motion = Motion(at.x_load, at.v_load, cable, cable_dot, at.quat, at.omega, own.length, own.rate)
+    if not sound(motion):
+        keep(rotors, BEFORE, FORCE)
+        return held(state)
+    pack(LoadBody(at.load.quat, resting(at.load.omega)), rows.body, 0)
+    for i in range(rows.v.shape[0]):
+        put(rows.v, i, resting(vector(rows.v, i)))
+    flown = Flow(motion, 0.0, tension, accel_quad, quad_normal, load_normal)
+    return state_of(flown, state.q_cable, taut, slack_events, snap_speed, truth)
+
+
+@kernel
+def advance_chain_many(
+    state: PlantState, truth: Truth, rotors: RotorRows, wind: Vec3, h: float, rows: ChainRows, n: int
+) -> PlantState:
+    """n steps of length h under the same commands and wind."""
+    for _ in range(n):
+        state = advance_chain(state, truth, rotors, wind, h, rows)
+    return state

@@ -1,0 +1,1 @@
+"""The side effects of `sitl`: sockets, clock and signals around `sitl.hil`."""

@@ -1,0 +1,46 @@
+"""Whose autopilots the simulator flies, and what each wants of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from autopilot.geometry.machine_code import ROOT
+from autopilot.shell.options import Address, StopRequest
+from sitl.hil import HilSimulator
+from sitl.interfaces import ardupilot, betaflight, px4
+from sitl.pacing import Pacing
+from sitl.shell.ardupilot import run_ardupilot
+from sitl.shell.betaflight import run_betaflight
+from sitl.shell.link import Link
+from sitl.shell.px4 import run_px4
+
+Run = Callable[[Link, HilSimulator, StopRequest, Callable[[str], None], Pacing | None], None]
+PLUMBLINE = "plumbline"
+
+
+class Kind(NamedTuple):
+    """What one autopilot wants, where the user says nothing else."""
+
+    awaited: str  # what the simulator says that it waits for
+    listen: Address
+    truth_every: int  # ticks
+    settings: Mapping[str, float]  # SIM_* parameters
+    run: Run | None = None  # its loop; None: those of our own
+    real_time: bool = False  # always: it does not wait for the world
+
+
+def parameter_file(name: str) -> Path:
+    """Where the parameters are that a firmware wants beside its defaults."""
+    return ROOT / "sitl" / "interfaces" / f"{name}.parm"
+
+
+AUTOPILOTS = {
+    PLUMBLINE: Kind("an autopilot", ("127.0.0.1", 4560), 2, {}),
+    "ardupilot": Kind("ArduPilot", ("127.0.0.1", 9002), 8, {"SIM_RATE_HZ": ardupilot.RATE_HZ}, run_ardupilot),
+    "px4": Kind("PX4", ("127.0.0.1", 4560), 5, {"SIM_RATE_HZ": px4.RATE_HZ}, run_px4),
+    "betaflight": Kind(
+        "Betaflight", ("127.0.0.1", 9002), 10, {"SIM_RATE_HZ": betaflight.RATE_HZ}, run_betaflight, True
+    ),
+}

@@ -1,0 +1,46 @@
+"""The loop of the simulator around Betaflight's SITL target, in real time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from autopilot.shell.options import Address, StopRequest
+from sitl.hil import HilSimulator
+from sitl.interfaces.betaflight import Exchange, read_motors
+from sitl.pacing import Pacing
+from sitl.shell.link import Link
+from sitl.shell.loops import LOOK_S, run_real_time
+
+
+def run_betaflight(
+    link: Link,
+    simulator: HilSimulator,
+    stop: StopRequest,
+    say: Callable[[str], None],
+    pacing: Pacing | None = None,
+) -> None:
+    """Tick for ever by the wall clock, once a firmware is there; the world begins anew with each."""
+    exchange = Exchange(simulator)
+
+    def ask() -> None:
+        host, _ = link.peer or link.address
+        link.send(exchange.state(), (host, link.address[1] + 1))
+
+    def take(datagram: bytes, sender: Address) -> None:
+        motors, before = read_motors(datagram), link.peer
+        if motors is None or not link.serves(sender):
+            return
+        if before not in {None, sender}:
+            say(f"the firmware began anew at t = {simulator.now_us / 1e6:.3f} s, and so does the world")
+            simulator.begin_anew()
+        link.heard()
+        exchange.receive(motors)
+
+    link.timeout(LOOK_S)
+    while link.peer is None:  # it says nothing until it is told of a state
+        stop.check()
+        ask()
+        arrived = link.receive()
+        if arrived:
+            take(*arrived)
+    run_real_time(link, simulator, pacing or Pacing(1.0), stop, say, ask, take)

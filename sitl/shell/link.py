@@ -1,0 +1,134 @@
+"""The sockets of the simulator: the one that autopilots speak to, and the one that truth leaves by."""
+
+from __future__ import annotations
+
+import errno
+import select
+import time
+from collections.abc import Callable
+
+from autopilot.shell.options import Address, datagram_socket, reason, receive, send, set_timeout, shown
+from sitl.hil import HilSimulator
+
+_TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another may take its place
+_TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
+
+
+class Link:
+    """The socket that autopilots speak to, the one that is served, and where truth goes."""
+
+    def __init__(self, listen: Address, truth: Address, say: Callable[[str], None]) -> None:
+        try:
+            self._socket = datagram_socket(listen)
+            self._socket.bind(listen)
+        except OSError as error:
+            busy = "is another sitl running? " if error.errno == errno.EADDRINUSE else ""
+            raise ValueError(
+                f"cannot listen on {shown(listen)}: {reason(error)}; {busy}choose another with --listen"
+            ) from None
+        try:
+            self._truth_socket = datagram_socket(truth)
+        except OSError as error:
+            raise ValueError(
+                f"cannot send truth to {shown(truth)}: {reason(error)}; choose another with --truth"
+            ) from None
+        self._truth = truth
+        self.address = listen
+        self._gathered: list[bytes] = []  # truth of this window
+        self._window_ends_us = 0
+        self._timeout_s = 0.0
+        self._say = say
+        self._heard = 0.0  # when the peer last answered, monotonic clock
+        self._turned_away: set[Address] = set()
+        self._met_s: float | None = None  # when the first peer was, monotonic clock
+        self.peer: Address | None = None
+
+    @property
+    def served_s(self) -> float:
+        """Wall clock time since the first autopilot was met."""
+        return 0.0 if self._met_s is None else time.monotonic() - self._met_s
+
+    def close(self) -> None:
+        self._socket.close()
+        self._tell_gathered()
+        self._truth_socket.close()
+
+    def timeout(self, seconds: float) -> None:
+        """How long `receive` waits; 0: for ever. By SO_RCVTIMEO, which costs nothing per datagram."""
+        if seconds != self._timeout_s:
+            set_timeout(self._socket, seconds)
+            self._timeout_s = seconds
+
+    def wait(self, seconds: float) -> None:
+        """Until a datagram is there, or so long."""
+        select.select([self._socket], [], [], seconds)
+
+    def receive(self, flags: int = 0) -> tuple[bytes, Address] | None:
+        """The next datagram and its sender, None after the timeout."""
+        return receive(self._socket, flags)
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        """To the autopilot that is served, or to another address. What cannot be sent counts as lost."""
+        address = address or self.peer
+        if address is not None:
+            send(self._socket, datagram, address)
+
+    def send_truth(self, simulator: HilSimulator) -> None:
+        """The truth of the present tick, if there is any."""
+        truth = _truth_of(simulator)
+        if truth:
+            send(self._truth_socket, truth, self._truth)
+
+    def gather_truth(self, simulator: HilSimulator) -> None:
+        """The truth of the present tick, if there is any; sent at the end of the window with all of it."""
+        truth, now_us = _truth_of(simulator), simulator.core.now_us
+        if truth:
+            self._gathered.append(truth)
+        if not self._window_ends_us - _TRUTH_WINDOW_US < now_us < self._window_ends_us:
+            self._window_ends_us = now_us - now_us % _TRUTH_WINDOW_US + _TRUTH_WINDOW_US
+            self._tell_gathered()
+
+    def _tell_gathered(self) -> None:
+        if self._gathered:
+            send(self._truth_socket, b"".join(self._gathered), self._truth)
+            self._gathered.clear()
+
+    def serves(self, sender: Address) -> bool:
+        """Whether an autopilot that asks to be served is: while one answers, no other takes its place."""
+        if sender == self.peer:
+            return True
+        if self.peer is not None and time.monotonic() - self._heard < _TAKE_OVER_S:
+            if sender not in self._turned_away:
+                self._turned_away.add(sender)
+                self._say(
+                    f"the autopilot at {shown(sender)} is not served: that at {shown(self.peer)} answers"
+                )
+            return False
+        self._say(f"serving the autopilot at {shown(sender)}")
+        self.peer = sender
+        self.met()
+        return True
+
+    def met(self) -> None:
+        """An autopilot is met."""
+        if self._met_s is None:
+            self._met_s = time.monotonic()
+
+    def heard(self) -> None:
+        """The autopilot that is served has answered."""
+        self._heard = time.monotonic()
+
+    def take(self, datagram: bytes, sender: Address, simulator: HilSimulator) -> bool:
+        """Hand a datagram on. True if it is a heartbeat whose sender is served from now on."""
+        if sender == self.peer and simulator.receive(datagram):
+            self.heard()
+            return False
+        if not (simulator.greets(datagram) and self.serves(sender)):
+            return False
+        simulator.introduce()
+        return True
+
+
+def _truth_of(simulator: HilSimulator) -> bytes:
+    """The truth of the present tick, behind the number of this run of the world where that is due."""
+    return (simulator.run_datagram() or b"") + (simulator.truth_datagram() or b"")

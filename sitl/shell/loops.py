@@ -1,0 +1,205 @@
+"""The loops of the simulator around Plumbline's own autopilot: in lockstep, and on the wall clock."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+
+from autopilot.shell.options import Address, StopRequest, shown
+from autopilot.wire.dialect import plumbline as mavlink
+from sitl.hil import HilSimulator
+from sitl.pacing import Pacing
+from sitl.shell.link import Link
+
+_RESEND_FIRST_S = 0.05
+_RESEND_LAST_S = 1.0
+LOOK_S = 0.2  # between two looks at a request to stop, while nothing comes
+LOST_S = 3.0  # of silence, until it is said that the autopilot is gone
+WAITED_S = 1.0  # for one answer: longer than a busy machine makes it wait, and said
+SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
+_SLOW_SHARE = 0.95  # of the clock that was asked for: a slower one is said
+_SLOW_AGAIN_NS = 10_000_000_000  # between two words about it
+_STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
+
+
+class Watch:
+    """Says when the autopilot falls silent and when it is back, once each."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._lost: Address | None = None
+
+    def heard(self, link: Link) -> None:
+        """An answer came."""
+        lost, self._lost = self._lost, None
+        if lost is not None and lost == link.peer:  # else another has taken its place, which was said
+            self._say(f"autopilot at {shown(link.peer)} answers again")
+
+    def silence(self, since: float, link: Link, simulator: HilSimulator) -> None:
+        """No answer since that time of the monotonic clock."""
+        if self._lost is None and time.monotonic() - since > LOST_S:
+            self._lost = link.peer
+            self._say(
+                f"no answer from the autopilot at {shown(link.peer)} for {LOST_S:g} s "
+                f"(t = {simulator.now_us / 1e6:.3f} s); waiting for it"
+            )
+
+
+def meet(link: Link, simulator: HilSimulator, stop: StopRequest) -> None:
+    """Wait until an autopilot speaks."""
+    link.timeout(LOOK_S)
+    while link.peer is None:
+        stop.check()
+        arrived = link.receive()
+        if arrived:
+            link.take(*arrived, simulator)
+
+
+def run_lockstep(
+    link: Link,
+    simulator: HilSimulator,
+    stop: StopRequest,
+    say: Callable[[str], None],
+    pacing: Pacing | None = None,
+) -> None:
+    """Tick for ever, each tick as soon as the one before is answered, but no faster than `pacing` says."""
+    watch = Watch(say)
+    clock = None if pacing is None else Clock(pacing, simulator, say)
+    link.timeout(_RESEND_FIRST_S)
+    while True:
+        stop.check()
+        if clock is not None:
+            clock.wait()
+        link.gather_truth(simulator)
+        link.send(simulator.sensor_datagram())
+        arrived = link.receive()
+        greeted = arrived is not None and link.take(*arrived, simulator)
+        if not simulator.answered:
+            waited_s = _insist(link, simulator, stop, watch, arrived is None or greeted)
+            if waited_s >= WAITED_S:
+                say(f"waited {waited_s:.1f} s for the autopilot")
+                if clock is not None:
+                    clock.skip(waited_s)
+        simulator.advance()
+
+
+class Clock:
+    """The wall clock that lockstep keeps to where the machine can; says where it cannot."""
+
+    def __init__(self, pacing: Pacing, simulator: HilSimulator, say: Callable[[str], None]) -> None:
+        self._pacing, self._simulator, self._say = pacing, simulator, say
+        self._period_ns = round(simulator.tick_us * 1000 / pacing.speed)
+        self._due = time.perf_counter_ns()
+        self._told_ns = 0
+
+    def skip(self, seconds: float) -> None:
+        """The clock stood for so long because nobody answered."""
+        self._due = time.perf_counter_ns()
+        self._pacing.pause(round(seconds * 1e9))
+
+    def wait(self) -> None:
+        """Until the next tick is due."""
+        # what was waited for is not caught up with
+        self._due = max(self._due, time.perf_counter_ns() - _STALL_NS) + self._period_ns
+        now = _sleep_until(self._due)
+        pacing = self._pacing
+        pacing.record(self._due, now)
+        figures = pacing.figures
+        if figures is self._simulator.pacing:
+            return
+        self._simulator.pacing = figures
+        share = figures.rate_hz * self._simulator.tick_us * 1e-6 / pacing.speed
+        if 0.0 < share < _SLOW_SHARE and now - self._told_ns > _SLOW_AGAIN_NS:
+            self._told_ns = now
+            text = f"Machine busy: clock at {share:.2f} of {pacing.speed:g} x"
+            self._say(text.lower())
+            self._simulator.parameters.say(text, mavlink.MAV_SEVERITY_NOTICE)
+
+
+def _insist(link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool) -> float:
+    """Until the present tick is answered, send it again; `again`: at once, as nothing came or a greeting.
+    Returns how long that took, in s."""
+    began = sent = time.monotonic()
+    silence_s = _RESEND_FIRST_S
+    while not simulator.answered:
+        stop.check()
+        # not for every stray datagram: the answer to one doubled tick would double all that follow
+        now = time.monotonic()
+        if again or now - sent >= silence_s:
+            link.send(simulator.sensor_datagram())
+            sent = now
+            silence_s = min(2.0 * silence_s, _RESEND_LAST_S)
+            link.timeout(silence_s)
+        watch.silence(began, link, simulator)
+        arrived = link.receive()
+        again = arrived is None or link.take(*arrived, simulator)
+    link.timeout(_RESEND_FIRST_S)
+    watch.heard(link)
+    return time.monotonic() - began
+
+
+def run_real_time(
+    link: Link,
+    simulator: HilSimulator,
+    pacing: Pacing,
+    stop: StopRequest,
+    say: Callable[[str], None],
+    ask: Callable[[], None],
+    take: Callable[[bytes, Address], object],
+) -> None:
+    """Tick for ever on an absolute schedule; a command that comes too late is missed, and counted.
+
+    `ask` tells the autopilot of the present tick, `take` is given what comes back.
+    """
+    watch = Watch(say)
+    period_ns = simulator.tick_us * 1000 / pacing.speed
+    simulator.pacing = pacing.figures
+    heard = time.monotonic()
+    start = time.perf_counter_ns()
+    tick = 0
+    while True:
+        stop.check()
+        due = start + round(tick * period_ns)
+        now = _sleep_until(due)
+        ask()
+        pacing.record(due, now)
+        simulator.pacing = pacing.figures
+        link.send_truth(simulator)
+        if now - due > _STALL_NS:
+            start += now - due
+        tick += 1
+        if _await_answer(link, simulator, start + round(tick * period_ns), take):
+            heard = time.monotonic()
+            watch.heard(link)
+        else:
+            watch.silence(heard, link, simulator)
+        simulator.advance()
+
+
+def _await_answer(
+    link: Link, simulator: HilSimulator, due_ns: int, take: Callable[[bytes, Address], object]
+) -> bool:
+    """Until the present tick is answered (True) or the next one is due."""
+    while True:
+        arrived = link.receive(socket.MSG_DONTWAIT)
+        if arrived:
+            take(*arrived)
+            if simulator.answered:
+                return True
+        left = due_ns - time.perf_counter_ns()
+        if left <= 0:
+            return False
+        if not arrived and left > SPIN_NS:
+            link.wait((left - SPIN_NS) * 1e-9)
+
+
+def _sleep_until(due_ns: int) -> int:
+    """Sleep, then spin over the last part; returns the time it is."""
+    left = due_ns - time.perf_counter_ns()
+    if left > SPIN_NS:
+        time.sleep((left - SPIN_NS) * 1e-9)
+    while True:
+        now = time.perf_counter_ns()
+        if now >= due_ns:
+            return now

@@ -1,0 +1,57 @@
+"""Rotors of different lag, asked for what makes them lag as one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from autopilot.control.actuators.mixer import FORCE, new_rotors
+from autopilot.control.actuators.rotor_model import actuation_constants
+from autopilot.control.actuators.unlike_rotors import make_alike, with_lags
+from autopilot.vehicle.layout import PLUS
+from autopilot.vehicle.rotors import allocate
+
+PERIOD, TAU = 4e-3, 0.03
+FACTORS = (1.0, 2.0, 0.5, 0.0)
+UNLIKE = tuple(rotor._replace(lag=factor) for rotor, factor in zip(PLUS, FACTORS, strict=True))
+ACTUATION = actuation_constants(0.0, TAU, PERIOD)
+
+
+def flown(layout, wanted, limited, vehicle):
+    """What rotors of their own lag give, tick by tick, and what they are asked for."""
+    table, rotors, gives = with_lags(allocate(layout), layout, ACTUATION), new_rotors(), np.zeros(len(layout))
+    found, asked = [], []
+    for force in wanted:
+        rotors[FORCE, : len(layout)] = force
+        make_alike(rotors, table, vehicle, limited)
+        command = rotors[FORCE, : len(layout)].copy()
+        kept = np.array([math.exp(-PERIOD / (r.lag * TAU)) if r.lag else 0.0 for r in layout])
+        gives = command + kept * (gives - command)
+        found.append(gives)
+        asked.append(command)
+    return np.array(found), np.array(asked)
+
+
+def test_all_lag_as_the_one_that_is_told(bebop):
+    wanted = 1.0 + 0.05 * np.sin(0.1 * np.arange(200))
+    found, _ = flown(UNLIKE, wanted, 0.0, bebop)
+    alike, kept = np.zeros(200), math.exp(-PERIOD / TAU)
+    for k in range(200):
+        alike[k] = wanted[k] + kept * ((alike[k - 1] if k else 0.0) - wanted[k])
+    assert found == pytest.approx(np.repeat(alike[:, None], 4, axis=1), abs=1e-12)
+
+
+def test_limits_are_kept_and_made_up_for(bebop):
+    """A slow rotor cannot be hurried beyond its greatest force; it gets there all the same."""
+    found, asked = flown(UNLIKE, np.full(300, 1.9), 1.0, bebop)
+    assert asked.max() <= bebop.rotor_max
+    assert asked.min() >= bebop.rotor_min
+    assert found[-1] == pytest.approx(np.full(4, 1.9), abs=1e-6)
+
+
+def test_rotors_that_are_alike_are_asked_for_what_is_wanted(bebop):
+    wanted = [0.3, 1.7, 0.1]
+    _, asked = flown(PLUS, wanted, 1.0, bebop)
+    assert (asked == np.repeat(np.array(wanted)[:, None], 4, axis=1)).all()

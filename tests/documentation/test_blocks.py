@@ -1,0 +1,329 @@
+"""Every code block of README and docs is run, or says why it is not.
+
+The blocks of a page are run one after another in a folder of their own that holds what a reader would have by
+then: a flight, and files that `gcs new` writes. Commands run in this process. What is made small, so that all
+of it takes less than a minute: a flight by `gcs fly` flies a short mission under the options of the command,
+after its own has been checked, and has the report of one flight that is made once; a sweep flies two values
+of what is varied with one seed, of the short mission too. Commands to a running vehicle meet a scripted one.
+"""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+import yaml
+from click.testing import CliRunner
+from pyarrow import Table, parquet
+
+import plumbline
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.model import Vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.wire.convert import Home
+from autopilot.wire.items import encode_mission
+from gcs.cli import gcs
+from gcs.clients.flight import Outcome
+from gcs.formats.missions import write_foreign
+from gcs.recorded.column_map import MAPS, ColumnMap
+from gcs.shell.link import free_port
+from gcs.sweep import plan as plans
+from gcs.workflows.before_flight import check_mission, check_options
+from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.fly import Flight
+from gcs.workflows.mission_file import load
+from gcs.workflows.new_file import new_file
+from missions.fileformat import parse_mission
+from plumbline import Land, Mission, Takeoff, Waypoint
+from plumbline.frames import as_frame
+from sitl.sensors.files import parse_profile
+from tests.doubles.pages import PAGES, REASONS, ROOT, Block, split
+from tests.gcs.conftest import LiveVehicle, ScriptedVehicle
+
+LANGUAGES = {"sh", "python", "toml", "yaml", "text"}
+# how many blocks are not run, by the reason: one more is a decision
+NOT_RUN = {"display": 2, "firmware": 7, "minutes": 16, "network": 14}
+SHORT = Mission("short", [Takeoff(0.4), Waypoint(0.0, 0.0, 0.4, hold_s=0.5), Land()])
+SHARED = ROOT / "tests" / "clients" / "survey.plan"
+RUN = [
+    page
+    for page in PAGES
+    if any(block.language != "text" and block.mark not in ("not run", "run by") for block in split(page)[0])
+]
+MADE = {
+    "mission": ("round", "my-mission", "my/mission", "my/flight"),
+    "vehicle": ("mine",),
+    "sensors": ("room",),
+}
+
+
+# ---- what the blocks are run with
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of one flight, as `gcs fly` leaves it."""
+    folder = tmp_path_factory.mktemp("flown")
+    plumbline.fly(SHORT, sensors="ideal", quiet=True).report(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The short mission as a file."""
+    path = tmp_path_factory.mktemp("short") / "short.toml"
+    SHORT.save(path)
+    return str(path)
+
+
+@cache
+def flies_with(
+    law: str, estimator: str, planner: str, sensors: str, vehicle: str, settings: tuple[str, ...]
+) -> str:
+    """How the short mission ends under these options."""
+    given = dict(map(setting_of, settings))
+    options = {"law": law, "sensors": sensors, "vehicle": vehicle, "settings": given}
+    options |= {"estimator": estimator or None, "planner": planner or None}
+    return plumbline.fly(SHORT, quiet=True, force=True, **options).outcome  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`gcs fly`, `gcs sweep` and `plumbline.sweep` as the head of this file says."""
+
+    def fly(options: FlightOptions, told: Callable[..., None], page: Any = None) -> Flight:
+        mission = load(options.mission)
+        if options.connect is None:
+            check_options(options)
+            check_mission(mission, options)
+            vehicle = (
+                str(Path(options.vehicle).resolve()) if Path(options.vehicle).is_file() else options.vehicle
+            )
+            sensors = (
+                str(Path(options.sensors).resolve()) if Path(options.sensors).is_file() else options.sensors
+            )
+            own = (options.law, options.estimator, options.planner)
+            assert flies_with(*own, sensors, vehicle, options.settings) == "completed"
+        number = len(list(Path("flights").glob("*")))
+        out = options.out or Path("flights") / f"{mission.name}-20260101-12000{number}"
+        shutil.copytree(flown, out, dirs_exist_ok=True)
+        record = plumbline_record(flown)
+        told(record, Outcome("completed"))
+        return Flight(Outcome("completed"), record, out, False)
+
+    make_plan = plans.make_plan
+
+    def made(mission: str, *rest: Any) -> Any:
+        make_plan(mission, *rest)  # what is wrong with the sweep itself
+        vehicle, sensors, laws, _, varied, settings, sample, own = rest
+        few = [replace(one, values=one.values[:2]) for one in varied]
+        return make_plan(short, vehicle, sensors, laws, (1,), few, settings, min(sample, 2), own)
+
+    monkeypatch.setattr("gcs.workflows.fly.fly", fly)
+    monkeypatch.setattr("gcs.workflows.sweep.make_plan", made)
+    monkeypatch.setattr("gcs.workflows.sweep.own_processes", in_this_process)
+    monkeypatch.setattr("gcs.workflows.sweep.dask_cluster", in_this_process)
+    monkeypatch.setattr("gcs.workflows.sweep.write_report", lambda out, plan: out / "report.html")
+    monkeypatch.setattr("plumbline.sweep", small_sweep)
+
+
+def plumbline_record(folder: Path) -> Any:
+    """The figures of the flight in a folder."""
+    import json
+
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
+@contextmanager
+def in_this_process(_: object) -> Iterator[tuple[Executor, int]]:
+    """What flies the flights of a sweep."""
+    with ThreadPoolExecutor(1) as executor:
+        yield executor, 1
+
+
+def small_sweep(mission: Any, *, vary: Any = None, kind: str = "pandas", **options: Any) -> Any:
+    """plumbline.sweep by the small `gcs sweep` in this process."""
+    assert not set(options) - {"seeds", "laws", "sensors", "vehicle", "settings", "out", "quiet"}
+    words = ["sweep", str(mission), "--out", "sweeps/python", "--fresh", "--quiet"]
+    for name, values in (vary or {}).items():
+        words += ["--vary", f"{name}={','.join(map(str, values))}"]
+    result = CliRunner().invoke(gcs, words)
+    assert result.exit_code == 0, result.output
+    return as_frame(parquet.read_table("sweeps/python/flights.parquet"), kind)
+
+
+class Telling(ScriptedVehicle):
+    """It also tells where its load is."""
+
+    def tick(self, now_us: int) -> list[bytes]:
+        self.tell_load(0.0, 0.0, 2.0)
+        return super().tick(now_us)
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> Iterator[str]:
+    """A vehicle that runs and does what it is told, with the parameters of ours; the port at which it is."""
+    port = free_port()
+    thread = LiveVehicle(port)
+    thread.vehicle = Telling()
+    thread.vehicle.HEARTBEAT_US = 50_000
+    thread.vehicle.parameters = autopilot_parameters(load_vehicle("bebop")).values()
+    thread.start()
+    yield str(port)
+    thread.stop()
+
+
+@pytest.fixture
+def folder(flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the blocks of a page are run."""
+    shutil.copytree(flown, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    Path("my").mkdir()
+    for kind, names in MADE.items():
+        for name in names:
+            new_file(kind, name)
+    shutil.copy(SHARED, "survey.plan")
+    swept = Path("sweeps/robustness/delay-noise")
+    swept.mkdir(parents=True)
+    rows = {"law": ["thesis"], "SIM_ACT_DELAY_MS": [12.0], "load_error_max_m": [0.1]}
+    parquet.write_table(Table.from_pydict(rows), swept / "flights.parquet")
+    items = encode_mission(SHORT, Home())
+    for name in ("theirs.waypoints", "mission.waypoints"):
+        write_foreign(Path(name), items, Home())
+    return tmp_path
+
+
+# ---- running them
+
+
+class Shell:
+    """Runs the lines of sh blocks."""
+
+    def __init__(self, flown: Path, port: str) -> None:
+        self._flown, self._port = flown, port
+
+    def run(self, block: Block) -> None:
+        """Each command must end well; `# exit code 3` and the like in its comment says how else it may."""
+        for line in block.text.replace("\\\n", " ").splitlines():
+            words = shlex.split(line, comments=True)
+            while words:
+                end = words.index("&&") if "&&" in words else len(words)
+                command, words = words[:end], words[end + 1 :]
+                self._command(command, block)
+
+    def _command(self, words: list[str], block: Block) -> None:
+        if words[:1] == ["."]:  # activates the environment
+            return
+        assert words[0] == "gcs", f"{block.place}: {words[0]} is not run here: mark the block"
+        if ">" in words:
+            words = words[: words.index(">")]
+        arguments = [name for word in words[1:] for name in self._expanded(word)]
+        if arguments[0] == "new":
+            for ending in (".toml", ".py"):
+                Path(arguments[2] + ending).unlink(missing_ok=True)
+        if arguments[0] == "sweep":
+            arguments.append("--fresh")  # one line is not the continuation of another
+        if arguments[0] in ("report", "compare"):
+            self._have_flights(arguments[1:])
+        if takes_address(arguments):
+            arguments += ["--connect", self._port]  # the last one counts
+        result = CliRunner().invoke(gcs, arguments, prog_name="gcs")
+        assert result.exit_code == 0, (
+            f"{block.place}: {shlex.join(words)}\n{result.output}{result.exception!r}"
+        )
+
+    def _expanded(self, word: str) -> list[str]:
+        found = sorted(map(str, Path().glob(word))) if "*" in word and "/" in word else []
+        return found or [word]
+
+    def _have_flights(self, arguments: list[str]) -> None:
+        for name in arguments:
+            if name.startswith("-") or Path(name).exists():
+                continue
+            if name.endswith(".tlog"):
+                Path(name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy(self._flown / "flight.tlog", name)
+            elif not name.endswith(".html"):
+                shutil.copytree(self._flown, name)
+
+
+def takes_address(arguments: list[str]) -> bool:
+    """Whether the command speaks to a running vehicle."""
+    context, command = click.Context(gcs), gcs.get_command(click.Context(gcs), arguments[0])
+    if isinstance(command, click.Group):
+        command = command.get_command(context, arguments[1])
+    return command is not None and any(option.name == "address" for option in command.params)
+
+
+def run_toml(block: Block) -> None:
+    """The file is one that is read."""
+    table = tomllib.loads(block.text)
+    if "items" in table:
+        parse_mission(block.text, "block", block.place)
+    elif "quad_mass_kg" in table:
+        Vehicle.model_validate({"name": "block", **table})
+    elif "model" in table:
+        MAPS.record(ColumnMap, table, block.place)
+    else:
+        parse_profile(block.text, block.place)
+
+
+def test_a_block_has_a_language_and_a_mark_that_is_known() -> None:
+    for page in PAGES:
+        blocks, prose = split(page)
+        for block in blocks:
+            assert block.language in LANGUAGES, block.place
+            if block.mark == "not run":
+                assert block.said.partition(":")[0] in REASONS, block.place
+            if block.mark == "run by":
+                told = (ROOT / block.said).read_text(encoding="utf-8")
+                assert page.name in told, f"{block.place}: {block.said} does not name this page"
+        # four spaces would be a block that nobody sees
+        indented = [
+            number
+            for (_, before), (number, line) in pairwise(prose)
+            if line.startswith("    ") and not before.strip()
+        ]
+        assert not indented, f"{page.name}:{indented}: write a fence with its language"
+
+
+def test_as_many_blocks_are_not_run_as_is_known() -> None:
+    found = [block for page in PAGES for block in split(page)[0] if block.mark == "not run"]
+    assert Counter(block.said.partition(":")[0] for block in found) == NOT_RUN
+
+
+@pytest.mark.usefixtures("small", "folder")
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
+def test_the_blocks_of_a_page_run(
+    page: Path, flown: Path, vehicle: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    shell, names = Shell(flown, vehicle), {"__name__": "__main__"}
+    for block in split(page)[0]:
+        if block.mark == "file":
+            Path(block.said).write_text(block.text, encoding="utf-8")
+        if block.mark in ("not run", "run by"):
+            continue
+        if block.language == "sh":
+            shell.run(block)
+        elif block.language == "python":
+            code = "\n" * (block.line - 1) + block.text
+            exec(compile(code, str(page), "exec"), names)
+        elif block.language == "toml":
+            run_toml(block)
+        elif block.language == "yaml":
+            yaml.safe_load(block.text)

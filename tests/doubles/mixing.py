@@ -1,0 +1,40 @@
+"""The mixer with its forces in its result."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from autopilot.control.actuators import mixer
+from autopilot.control.records import Vehicle
+from autopilot.geometry.linear import Vec3
+from autopilot.vehicle.layout import PLUS, Layout
+from autopilot.vehicle.rotors import allocate
+
+
+class Mixed(NamedTuple):
+    """A `MixerResult`, and the force of each rotor in N."""
+
+    forces: tuple[float, ...]
+    saturated: int
+    thrust_done: float
+    moment_done: Vec3
+
+
+def mix(
+    thrust: float,
+    moment: Vec3,
+    vehicle: Vehicle,
+    limited: float,
+    layout: Layout = PLUS,
+    lost: int = 0,
+    room: Any = mixer,
+) -> Mixed:
+    """What the rotors of a vehicle are asked for, see `autopilot.control.actuators.mixer.mix`; by the
+    functions of `room`, the mixer or a copy of it."""
+    rotors = room.new_rotors()
+    result = room.mix(thrust, moment, vehicle, limited, allocate(layout, lost), rotors)
+    x, y, z = result.moment_done
+    done = (float(x), float(y), float(z))
+    return Mixed(
+        tuple(rotors[room.FORCE, : len(layout)].tolist()), result.saturated, float(result.thrust_done), done
+    )

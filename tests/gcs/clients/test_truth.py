@@ -1,0 +1,58 @@
+"""Whose truth is heard: that of the run of the world in which the vehicle flies, and of no other."""
+
+from __future__ import annotations
+
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.truth import Truth, Worlds
+
+WRITER = FrameWriter(1, 27)
+OURS, OTHER = ("127.0.0.1", 40_001), ("127.0.0.1", 40_002)
+AT = "127.0.0.1:14560"
+
+
+def run(number: int) -> bytes:
+    return WRITER.frame(mavlink.MAVLink_sim_boot_message(0, number, [0.0] * 4, 0.0, 0, 0))
+
+
+def status(time_us: int) -> bytes:
+    return WRITER.frame(mavlink.MAVLink_sim_status_message(time_us, 0.0, 0.0, 0, 0, 0, 0, 1, 1))
+
+
+def test_of_two_worlds_at_one_port_the_vehicles_own_is_heard() -> None:
+    truth = Truth(AT, vouched=False)
+    truth.of_vehicle(7)
+    assert truth.take([(status(1), OURS)]) == [], "nobody has said yet whose it is"
+    told = [(run(8) + status(2), OTHER), (run(7) + status(3), OURS), (status(4), OTHER), (status(5), OURS)]
+    assert truth.take(told) == [told[1][0], told[3][0]]
+    assert truth.missing == ""
+    assert truth.take([(run(9), OURS), (status(6), OURS)]) == [], "the world began anew, the vehicle has not"
+
+
+def test_a_port_that_was_named_does_not_make_another_world_the_vehicles() -> None:
+    truth = Truth(AT, vouched=True)
+    truth.of_vehicle(7)
+    assert truth.take([(run(8) + status(1), OTHER), (b"\xfd garbage", OTHER)]) == []
+    assert f"the truth at UDP {AT} is refused: it is that of another simulator; --truth PORT" in truth.missing
+
+
+def test_a_vehicle_that_does_not_say_has_the_one_world_of_the_port_that_somebody_named() -> None:
+    unnamed, named = Truth(AT, vouched=False), Truth(AT, vouched=True)
+    for truth in (unnamed, named):
+        truth.of_vehicle(None)
+        assert truth.missing.startswith(f"no simulator tells its truth at UDP {AT}; --truth PORT")
+    assert unnamed.take([(run(8), OURS)]) == []
+    assert unnamed.missing.startswith("the vehicle does not say which simulator it flies in, so the truth at")
+    told = run(8)
+    assert named.take([(told, OURS)]) == [told]
+    assert named.missing == ""
+    assert named.take([(run(9), OTHER), (status(1), OURS)]) == [], "which of the two is not known"
+
+
+def test_worlds_are_told_apart_by_where_they_tell_from() -> None:
+    worlds = Worlds()
+    assert worlds.run(status(1), OURS) is None
+    assert worlds.run(run(2**63 - 1), OURS) == 2**63 - 1
+    assert worlds.run(status(2), OURS) == 2**63 - 1
+    assert worlds.run(run(3), OTHER) == 3
+    assert len(worlds) == 2

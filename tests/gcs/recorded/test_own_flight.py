@@ -1,0 +1,70 @@
+"""A flight of our own simulator, of which all is known: identified, replayed, seen from the vehicle alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from autopilot.vehicle.file import load_vehicle
+from autopilot.wire.tlog import TlogWriter
+from gcs.cli import gcs
+from gcs.closed_loop import Conditions, fly
+from gcs.errors import EXIT_ERROR
+from missions.fileformat import load_mission
+from missions.model import Delay, Land, Mission, Takeoff
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path: Path = tmp_path_factory.mktemp("flight") / "flight.tlog"
+    with path.open("wb") as file:
+        outcome = fly(load_mission("case-b"), Conditions(), TlogWriter(file))
+    assert outcome.name == "completed"
+    return path
+
+
+def test_length_mass_and_drag_of_the_truth_are_identified(flown: Path) -> None:
+    result = CliRunner().invoke(gcs, ["identify", str(flown), "--json"], prog_name="gcs")
+    found = json.loads(result.stdout)["identified"]
+    truth = load_vehicle("bebop")
+    assert found["tracked_length_m"]["value"] == pytest.approx(truth.cable_length_m, abs=1e-6)
+    # the telemetry's single precision is worth a micrometre
+    assert found["length_m"]["value"] == pytest.approx(truth.cable_length_m, abs=1e-5)
+    known = {
+        "mass_ratio": truth.load_mass_kg / truth.quad_mass_kg,
+        "drag_per_m": truth.load_drag_quadratic_n_s2_m2 / truth.load_mass_kg,
+    }
+    for name, value in known.items():
+        assert found[name]["value"] == pytest.approx(value, abs=found[name]["half_width"])
+        assert found[name]["half_width"] < 0.01 * value
+
+
+def test_the_load_is_known_from_the_vehicle_alone(flown: Path, tmp_path: Path) -> None:
+    asked = ["replay", str(flown), "--out", str(tmp_path / "replay"), "--json"]
+    record = json.loads(CliRunner().invoke(gcs, asked, prog_name="gcs").stdout)
+    alone = record["pose_alone"]
+    assert alone["median_m"] < 1e-3
+    assert alone["inside_95"] > 0.95
+    assert record["ahead_5s"]["median_m"] < 5e-3
+    table = np.loadtxt(tmp_path / "replay" / "load.csv", delimiter=",", skiprows=1)
+    assert len(table) == record["rows"]
+    error = np.linalg.norm(table[:, 1:4] - table[:, 6:9], axis=1)
+    assert np.median(error) == pytest.approx(alone["median_m"], abs=2e-6)
+    assert (tmp_path / "replay" / "load.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("hold_s", "says"), [(1.0, "at least 20 s are needed"), (20.0, "moves too little")])
+def test_a_flight_that_tells_nothing_is_told_in_one_line(hold_s: float, says: str, tmp_path: Path) -> None:
+    path = tmp_path / "flight.tlog"
+    with path.open("wb") as file:
+        mission = Mission("still", "", "", (), (Takeoff(0.4), Delay(hold_s), Land()))
+        assert fly(mission, Conditions(sensors="ideal"), TlogWriter(file)).name == "completed"
+    result = CliRunner().invoke(gcs, ["identify", str(path)], prog_name="gcs")
+    assert result.exit_code == EXIT_ERROR
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"gcs: {path}: ") and says in line

@@ -1,0 +1,118 @@
+"""Recordings and column maps as files: what is read, and the one line that says what is wrong."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from gcs.cli import gcs
+from gcs.recorded.column_map import MAPS, MapError, load_map
+from gcs.recorded.recording import RecordingError, read_recording
+
+MAP = """
+time = 0
+[vehicle]
+position = [1, 2, 3]
+quaternion = [4, 5, 6, 7]
+[load]
+position = [8, 9, 10]
+[model]
+mass_ratio = 0.2
+"""
+ROW = "{:.2f},0,0,2,1,0,0,0,0,0,1\n"
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(gcs, [str(one) for one in arguments], prog_name="gcs")
+
+
+def rows(count: int = 300) -> str:
+    return "".join(ROW.format(0.05 * k) for k in range(count))
+
+
+@pytest.fixture
+def columns(tmp_path: Path) -> Path:
+    path = tmp_path / "map.toml"
+    path.write_text(MAP, encoding="utf-8")
+    return path
+
+
+def test_columns_are_taken_as_the_map_says(tmp_path: Path, columns: Path) -> None:
+    path = tmp_path / "flight.csv.gz"
+    path.write_bytes(gzip.compress(rows().encode()))
+    found = read_recording(path, load_map(columns))
+    assert found.name == "flight"
+    assert found.time_s is not None
+    assert found.time_s[:3] == pytest.approx([0.0, 0.05, 0.1])
+    assert found.position[7] == pytest.approx([0.0, 0.0, 2.0])
+    assert found.quaternion_xyzw[7] == pytest.approx([0.0, 0.0, 0.0, 1.0])  # w first in the file
+    assert found.load[7] == pytest.approx([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "not rows of comma-separated numbers"),
+        (b"\x00\xff\xfe" * 100, "not rows of comma-separated numbers"),
+        (b"a,b,c\n" * 300, "not rows of comma-separated numbers"),
+        (b"1,2,3\n" * 300, "3 columns; the column map asks for column 10"),
+        (rows(20).encode(), "20 rows of 20 with a position and a unit quaternion"),
+        (rows().replace(",2,1,0,0,0,", ",2,0,0,0,0,").encode(), "0 rows of 300"),
+        (rows().encode() + ROW.format(1.0).encode(), "times do not increase"),
+        (rows().encode() + b"1,2\n", "not rows of comma-separated numbers"),
+    ],
+)
+@pytest.mark.parametrize("command", ["identify", "replay"])
+def test_a_broken_file_is_told_in_one_line(
+    tmp_path: Path, columns: Path, command: str, content: bytes, says: str
+) -> None:
+    path = tmp_path / "flight.csv"
+    path.write_bytes(content)
+    result = run(command, path, "--columns", columns)
+    assert result.exit_code == 1
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"gcs: {path}: ")
+    assert says in line
+
+
+def test_a_torn_archive_and_a_file_that_is_not_there(tmp_path: Path, columns: Path) -> None:
+    torn = tmp_path / "flight.csv.gz"
+    torn.write_bytes(gzip.compress(rows().encode())[:100])
+    for path in (torn, tmp_path / "nothing.csv", tmp_path, tmp_path / "nothing.tlog"):
+        with pytest.raises(RecordingError, match=str(path)):
+            read_recording(path, load_map(columns))
+
+
+def test_rows_need_a_map(tmp_path: Path) -> None:
+    path = tmp_path / "flight.csv"
+    path.write_text(rows(), encoding="utf-8")
+    result = run("identify", path)
+    assert result.exit_code == 2
+    assert "--columns: motion-capture, telemetry or a file" in result.stderr
+    assert "no [vehicle]" in run("identify", path, "--columns", "telemetry").stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (MAP.replace("quaternion =", "quaternions ="), "unknown key; write quaternion"),
+        (MAP.replace("[1, 2, 3]", "[1, 2]"), "vehicle.position"),
+        (MAP.replace("mass_ratio = 0.2", "mass_ratio = -1"), "model.mass_ratio = -1"),
+        (MAP + "[identify]\nparameters = ['mass']\n", "identify.parameters[0]"),
+    ],
+)
+def test_a_wrong_map_is_told(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "map.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(MapError) as error:
+        load_map(path)
+    assert says in str(error.value)
+
+
+@pytest.mark.parametrize("name", MAPS.names())
+def test_shipped_maps_are_read(name: str) -> None:
+    assert np.isfinite(load_map(name).load_model(1.0)).all()

@@ -1,0 +1,119 @@
+"""gcs new: what it writes flies as it is, and tells of every key that there is."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+import plumbline
+from autopilot.vehicle.model import Vehicle
+from gcs.cli import gcs
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
+from gcs.workflows.new_file import kinds
+from missions.model import Delay, Land, Mission, Takeoff
+from sitl.sensors.profile import Profile
+
+SHORT = Mission("short", "Short", "", (), (Takeoff(0.5), Delay(1.0), Land()))
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(gcs, list(words), prog_name="gcs")
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def written(kind: str, name: str = "my-own") -> Path:
+    """The file that `gcs new` has written."""
+    result = run("new", kind, name)
+    assert result.exit_code == EXIT_DONE, result.stderr
+    (path,) = Path().rglob("*.*")
+    return path
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_what_is_written_flies_as_it_is(kind: str) -> None:
+    """The options are those of the command that it says; a file that is no mission flies a short one."""
+    path = written(kind)
+    mission, *options = shlex.split(written_command(path))[2:]
+    given = dict(zip((word.removeprefix("--") for word in options[::2]), options[1::2], strict=True))
+    assert str(path) in " ".join([mission, *given.values()])
+    flight = plumbline.fly(mission if kind == "mission" else SHORT, **given, quiet=True)
+    assert (flight.outcome, flight.reason) == ("completed", "")
+    assert flight.summary["load_error_max_m"] < 0.05
+
+
+def written_command(path: Path) -> str:
+    """The command that the file itself names."""
+    (line,) = re.findall(r"Fly it:\s+(gcs fly .*)", path.read_text(encoding="utf-8"))
+    return line
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_the_next_command_is_said(kind: str) -> None:
+    said = run("new", kind, "mine").stdout
+    (path,) = Path().iterdir()
+    assert said == f"{path} is written; it flies as it is:\n\n    {written_command(path)}\n\n"
+    assert "my_name" not in path.read_text(encoding="utf-8") and "MyName" not in path.read_text()
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_a_file_that_exists_is_left_as_it_is(kind: str) -> None:
+    path = written(kind)
+    path.write_text("precious", encoding="utf-8")
+    result = run("new", kind, "my-own")
+    assert (result.exit_code, result.stdout) == (EXIT_ERROR, "")
+    assert result.stderr == f"gcs: {path} exists already and is left as it is; choose another name\n"
+    assert path.read_text(encoding="utf-8") == "precious"
+
+
+def test_a_name_may_lead_into_a_folder_and_have_its_ending() -> None:
+    Path("sub").mkdir()
+    assert "gcs fly sub/mine.toml\n" in run("new", "mission", "sub/mine.toml").stdout
+    assert tomllib.loads(Path("sub/mine.toml").read_text(encoding="utf-8"))["title"] == "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "part"),
+    [
+        (("mission", ""), EXIT_USAGE, "'' cannot be the name of a mission"),
+        (("mission", 'a"b'), EXIT_USAGE, "letters, digits, - and _"),
+        (("mission", "1st"), EXIT_USAGE, "beginning with a letter"),
+        (
+            ("mission", "none/such"),
+            EXIT_ERROR,
+            "none/such.toml: cannot be written: No such file or directory",
+        ),
+        (("aeroplane", "mine"), EXIT_USAGE, "'aeroplane' is not one of"),
+    ],
+)
+def test_what_cannot_be_is_one_line(words: tuple[str, ...], code: int, part: str) -> None:
+    result = run("new", *words)
+    assert (result.exit_code, result.stdout) == (code, "")
+    assert part in result.stderr and result.stderr.count("\n") == 1
+    assert list(Path().iterdir()) == []
+
+
+def uncommented(kind: str) -> dict[str, object]:
+    """The file with every key that stands in a comment."""
+    text = written(kind).read_text(encoding="utf-8")
+    return tomllib.loads(re.sub(r"^# (?=\[|\w+ = )", "", text, flags=re.MULTILINE))
+
+
+def test_every_key_of_a_vehicle_is_named() -> None:
+    table = uncommented("vehicle")
+    assert Vehicle.model_validate(table)
+    # those of a vehicle that is no quadrotor
+    assert set(Vehicle.model_fields) - set(table) <= {"rotors", "frame", "spin", "rotor"}
+
+
+def test_every_sensor_is_named() -> None:
+    profile = Profile.model_validate(uncommented("sensors"))
+    assert [name for name in Profile.model_fields if getattr(profile, name) is None] == []

@@ -1,0 +1,256 @@
+"""A law is called with what is, and asked for what can be done; what it does wrong is told."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable
+from math import inf, nan
+from typing import Any, NamedTuple
+
+import numba
+import pytest
+
+from autopilot.control.law_desk import Asked, Now
+from autopilot.own.asking import attitude, force, rates, wrench
+from autopilot.own.calls import CALL
+from autopilot.own.compiled import is_compiled, kernel
+from autopilot.own.law import law_of
+from autopilot.own.source import OwnError
+from autopilot.own.trial import TICKS, try_out
+from autopilot.shell.watched_calls import watched_calls
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
+
+VALUES = autopilot_parameters(load_vehicle("bebop")).values()
+UPWARD = force((0.0, 0.0, 4.9))
+
+
+def law_that(answers: Callable[[Any, Now], Any]) -> type:
+    class Own:
+        def load_position(self, memory: Any, now: Now) -> Any:
+            return answers(memory, now)
+
+    return Own
+
+
+def tried(kind: type) -> None:
+    try_out(law_of(kind, "mine.py:Own"), VALUES)
+
+
+def test_a_law_remembers_from_its_start_on() -> None:
+    seen: list[tuple[Any, bool, float]] = []
+
+    class Counts:
+        def __init__(self, parameters: Any) -> None:
+            self.first = parameters["CTL_RATE_HZ"]
+
+        def start(self, now: Now) -> float:
+            return self.first
+
+        def load_position(self, memory: float, now: Now) -> tuple[float, Asked]:
+            seen.append((memory, now.begins, now.time_s))
+            return memory + 1.0, UPWARD
+
+    tried(Counts)
+    period = 1.0 / VALUES["CTL_RATE_HZ"]
+    assert seen == [(VALUES["CTL_RATE_HZ"] + n, n == 0, n * period) for n in range(TICKS)]
+
+
+WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
+    "raises": (lambda memory, now: 1 / 0, r"ZeroDivisionError: division by zero \(test_host\.py:\d+\)"),
+    "nothing": (lambda memory, now: None, r"load_position returned None, which must be \(memory, force"),
+    "no pair": (lambda memory, now: UPWARD, r"load_position returned Asked\(kind="),
+    "no wrench": (
+        lambda memory, now: (memory, (1.0, 2.0)),
+        r"asks for \(1\.0, 2\.0\), which must be made by",
+    ),
+    "thrust": (lambda memory, now: (memory, wrench(nan, (0.0, 0.0, 0.0))), "asks for a thrust of nan N"),
+    "moment": (lambda memory, now: (memory, wrench(1.0, (0.0, inf, 0.0))), r"asks for \(0\.0, inf, 0\.0\)"),
+    "shape": (
+        lambda memory, now: (memory, wrench(1.0, (1.0, 2.0))),
+        r"ValueError: the moment has 2 numbers; must be 3 \(test_host\.py:\d+\)",
+    ),
+    "matrix": (
+        lambda memory, now: (memory, attitude(((1.0, 0.0, 0.0),), 1.0)),
+        "the attitude has 1 rows; must be 3 rows of 3 numbers",
+    ),
+    "row": (
+        lambda memory, now: (memory, attitude(((1.0, 0.0, 0.0), (0.0,), (0.0,)), 1.0)),
+        "a row of the attitude has 1 numbers; must be 3",
+    ),
+    "kind": (lambda memory, now: (memory, UPWARD._replace(kind=7)), "asks for a kind 7 that there is not"),
+    "turned": (
+        lambda memory, now: (memory, attitude(((nan, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3), 1.0)),
+        "asks for an attitude that is no number",
+    ),
+    "rate": (lambda memory, now: (memory, rates(1.0, 3.0)), "the rate has 1 numbers; must be 3"),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_a_law_does_wrong_is_told(wrong: str) -> None:
+    answers, told = WRONG[wrong]
+    with pytest.raises(OwnError, match=rf"^mine\.py:Own: Law Own failed: .*{told}"):
+        tried(law_that(answers))
+
+
+def test_a_law_that_cannot_be_made_is_told() -> None:
+    class Unmade:
+        def __init__(self, parameters: Any) -> None:
+            self.gain = parameters["NO_SUCH"]
+
+        def load_position(self, memory: Any, now: Now) -> Any:
+            return memory, UPWARD
+
+    with pytest.raises(OwnError, match=r"Law Unmade failed: KeyError: 'NO_SUCH' \(test_host\.py:\d+\)"):
+        tried(Unmade)
+
+
+def test_who_interrupts_is_not_the_laws_fault() -> None:
+    def interrupted(memory: Any, now: Now) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return memory, UPWARD
+
+    with pytest.raises(KeyboardInterrupt):
+        tried(law_that(interrupted))
+
+
+def test_nor_what_a_handler_of_signals_raises() -> None:
+    def interrupted(memory: Any, now: Now) -> Any:
+        signal.raise_signal(signal.SIGUSR1)
+        return memory, UPWARD
+
+    def ends(*_: object) -> None:
+        raise SystemExit(3)
+
+    before = signal.signal(signal.SIGUSR1, ends)
+    try:
+        with pytest.raises(SystemExit):
+            tried(law_that(interrupted))
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+
+@pytest.mark.parametrize("kind", [SystemExit, KeyboardInterrupt, GeneratorExit])
+def test_a_law_that_would_end_the_program_is_told(kind: type[BaseException]) -> None:
+    def ends(memory: Any, now: Now) -> Any:
+        raise kind("enough")
+
+    class Unmade:
+        def __init__(self, parameters: Any) -> None:
+            raise kind("enough")
+
+        def load_position(self, memory: Any, now: Now) -> Any:
+            return memory, UPWARD
+
+    for law in (law_that(ends), Unmade):
+        with pytest.raises(OwnError, match=rf"failed: {kind.__name__}: enough \(test_host\.py:\d+\)$"):
+            tried(law)
+
+
+def test_a_call_that_does_not_come_back_is_broken_off() -> None:
+    def hangs(memory: Any, now: Now) -> Any:
+        while now.begins:
+            pass
+        return memory, UPWARD
+
+    with pytest.raises(OwnError, match=r"TooSlow: .* \(test_host\.py:\d+\)$"), watched_calls(longest_s=0.05):
+        tried(law_that(hangs))
+
+
+def test_one_that_sleeps_is_woken() -> None:
+    def sleeps(memory: Any, now: Now) -> Any:
+        threading.Event().wait(60.0)
+        return memory, UPWARD
+
+    began_s = time.monotonic()
+    with pytest.raises(OwnError, match=r"TooSlow: .* \(test_host\.py:\d+\)$"), watched_calls(longest_s=0.05):
+        tried(law_that(sleeps))
+    assert time.monotonic() - began_s < 30.0
+
+
+def test_in_real_time_a_law_must_keep_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    period = 1.0 / VALUES["CTL_RATE_HZ"]
+    clock = iter(0.5 * n * 1.01 * period for n in range(10**6))
+    monkeypatch.setattr(CALL, "clock", lambda: next(clock))
+    quick = law_of(law_that(lambda memory, now: (memory, UPWARD)), "mine.py:Own")
+    try_out(quick, VALUES)
+    monkeypatch.setattr(CALL, "clock", lambda: next(clock) * 3.0)
+    with pytest.raises(OwnError, match=r"load_position takes \d\.\d ms, and there are 4\.0 ms: too slow"):
+        try_out(quick, VALUES, ticks=300)
+
+
+# ---- compiled
+
+
+class Memory(NamedTuple):
+    ticks: float
+
+
+class Gain(NamedTuple):
+    gain: float
+
+
+class Compiled(Gain):
+    @classmethod
+    def build(cls, parameters: Any) -> Compiled:
+        return cls(parameters["CTL_RATE_HZ"])
+
+    @kernel
+    def start(self, now: Now) -> Memory:
+        return Memory(self.gain)
+
+    @kernel
+    def load_position(self, memory: Memory, now: Now) -> tuple[Memory, Asked]:
+        return Memory(memory.ticks + 1.0), force((memory.ticks, 1.0 if now.begins else 0.0, now.time_s))
+
+    @kernel
+    def quad_attitude(self, memory: Memory, now: Now) -> tuple[Memory, Asked]:
+        return memory, wrench(nan, (0.0, 0.0, 0.0))
+
+
+class Steady(Compiled):
+    quad_attitude = None  # type: ignore[assignment]
+
+
+needs_compiler = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+
+
+@needs_compiler
+def test_a_compiled_law_is_called_without_python() -> None:
+    assert is_compiled(law_of(Steady, "mine.py:Steady"), ("load_position",))
+    assert not is_compiled(law_of(law_that(lambda memory, now: (memory, UPWARD)), "mine.py:Own"), ())
+    before = CALL.count
+    tried(Steady)
+    assert before == CALL.count
+
+
+def test_a_compiled_law_answers_as_python_would() -> None:
+    answers = []
+    law = law_of(Steady, "mine.py:Steady")
+    try_out(law, VALUES, told=answers.append)
+    rate = VALUES["CTL_RATE_HZ"]
+    wanted = [(rate + n, 1.0 if n == 0 else 0.0, n / rate) for n in range(TICKS)]
+    assert [asked.vector for asked in answers] == wanted
+
+
+def test_a_compiled_law_that_asks_for_nothing_is_told() -> None:
+    with pytest.raises(OwnError, match=r"Law Compiled failed: asks for a thrust of nan N \(test_host\.py"):
+        tried(Compiled)
+
+
+@needs_compiler
+def test_what_cannot_be_compiled_is_told_with_its_line() -> None:
+    class Uncompiled(Gain):
+        @classmethod
+        def build(cls, parameters: Any) -> Uncompiled:
+            return cls(1.0)
+
+        @kernel
+        def load_position(self, memory: Any, now: Now) -> Any:
+            return memory, now.no_such_field  # type: ignore[attr-defined]
+
+    with pytest.raises(OwnError, match=r"Law Uncompiled failed: cannot be compiled: .*\(test_host\.py:\d+\)"):
+        tried(Uncompiled)

@@ -1,0 +1,201 @@
+"""The Gymnasium environments: what gymnasium asks of them, and that they are the simulator's own flight."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
+import plumbline.learning
+from missions.model import Land, Mission, Takeoff
+from plumbline.learning import HOVER, LOAD_TRACKING
+
+CHANGING = {"SIM_LOAD_MASS": (0.08, 0.12), "SIM_ACT_DELAY_MS": (0.0, 15.0), "SIM_WIND_E": (-2.0, 2.0)}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "rotors": {"action": "rotors", "history": 2, "preview": 3},
+    "acceleration": {"action": "acceleration", "randomise": CHANGING, "settings": {"SIM_GUST_STD": 0.5}},
+    "estimate": {"observation": "estimate", "randomise": {"SIM_NOISE_SCALE": (0.5, 2.0)}},
+}
+COUNT, STEPS = 5, 40
+UP_AND_DOWN = Mission("up", "Up", "", (), (Takeoff(1.0), Land()))
+
+
+def actions_of(space: gymnasium.Space[Any], seed: int) -> Callable[[], Any]:
+    space.seed(seed)
+    return space.sample
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.parametrize("name", [HOVER, LOAD_TRACKING])
+def test_gymnasium_finds_nothing_wrong(name: str, options: dict[str, Any]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(name, **options).unwrapped)
+
+
+@pytest.mark.parametrize("options", OPTIONS.values(), ids=OPTIONS)
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_many_are_the_same_to_the_bit_as_one_after_another(
+    mode: AutoresetMode, options: dict[str, Any]
+) -> None:
+    # short episodes, far from the path's beginning: some crash, some end, all begin again
+    given = {"start": "random", "start_m": 0.2, "reach_m": 0.23, "mission": "case-b", **options}
+    alone = SyncVectorEnv(
+        [lambda: gymnasium.make(LOAD_TRACKING, max_episode_steps=15, **given)] * COUNT, autoreset_mode=mode
+    )
+    together = gymnasium.make_vec(
+        LOAD_TRACKING,
+        COUNT,
+        vectorization_mode="vector_entry_point",
+        max_episode_steps=15,
+        autoreset_mode=mode,
+        threads=2,
+        **given,
+    )
+    assert together.single_observation_space == alone.single_observation_space
+    assert together.observation_space == alone.observation_space
+    assert together.action_space == alone.action_space
+    assert together.metadata["autoreset_mode"] == mode
+    first, second = alone.reset(seed=7), together.reset(seed=7)
+    assert np.array_equal(first[0], second[0]) and second[0] in together.observation_space
+    crashes = ends = 0
+    sample = actions_of(together.action_space, 1)
+    for _ in range(STEPS):
+        actions = sample()
+        one, many = alone.step(actions), together.step(actions)
+        for expected, found in zip(one[:4], many[:4], strict=True):
+            assert np.array_equal(expected, found) and expected.dtype == found.dtype
+        assert one[4].keys() == many[4].keys()
+        if "final_obs" in one[4]:
+            assert np.array_equal(one[4]["_final_obs"], many[4]["_final_obs"])
+            for i in np.flatnonzero(one[4]["_final_obs"]):
+                assert np.array_equal(one[4]["final_obs"][i], many[4]["final_obs"][i])
+        crashes, ends = crashes + int(many[2].sum()), ends + int(many[3].sum())
+    assert ends > 0 and crashes > 0
+
+
+def test_episodes_that_are_not_begun_by_themselves() -> None:
+    envs = gymnasium.make_vec(HOVER, 3, autoreset_mode="Disabled", max_episode_steps=4)
+    first, _ = envs.reset(seed=1)
+    actions = np.zeros(envs.action_space.shape, np.float32)
+    for _ in range(4):
+        *_, truncated, _ = envs.step(actions)
+    assert truncated.all()
+    with pytest.raises(plumbline.Error, match="reset_mask"):
+        envs.step(actions)
+    kept, _ = envs.reset(seed=[1, None, None], options={"reset_mask": np.array([True, False, True])})
+    assert np.array_equal(kept[0], first[0]) and not np.array_equal(kept[2], first[2])
+    with pytest.raises(plumbline.Error, match="3 booleans"):
+        envs.reset(options={"reset_mask": np.array([True])})
+
+
+def test_the_same_seed_is_the_same_episode() -> None:
+    def episode(seed: int) -> list[bytes]:
+        env = gymnasium.make(HOVER, observation="estimate", randomise=CHANGING)
+        sample = actions_of(env.action_space, 3)
+        seen = [env.reset(seed=seed)[0].tobytes()]
+        return seen + [env.step(sample())[0].tobytes() for _ in range(20)]
+
+    assert episode(4) == episode(4)
+    assert episode(4)[0] != episode(5)[0]
+
+
+def test_statistics_of_gymnasium_count_episodes() -> None:
+    envs = RecordEpisodeStatistics(gymnasium.make_vec(HOVER, 4, max_episode_steps=10))
+    envs.reset(seed=2)
+    for _ in range(10):
+        *_, infos = envs.step(np.zeros(envs.action_space.shape, np.float32))
+    assert infos["episode"]["l"].tolist() == [10, 10, 10, 10]
+
+
+def test_no_action_hovers_and_a_rotor_that_is_off_does_not() -> None:
+    env = gymnasium.make(HOVER, action="rotors", start_m=0.0)
+    start, _ = env.reset(seed=1)
+    for _ in range(100):
+        seen, _, crashed, _, _ = env.step(np.zeros(4, np.float32))
+    assert not crashed and np.abs(seen[:3] - start[:3]).max() < 1e-3
+    steps = 0
+    while not crashed:
+        *_, crashed, _, _ = env.step(np.array([-1.0, 0.0, 0.0, 0.0], np.float32))
+        steps += 1
+    assert 5 < steps < 100
+
+
+def test_a_vehicle_has_an_action_for_each_of_its_rotors() -> None:
+    env = gymnasium.make(HOVER, action="rotors", vehicle="hexarotor", start_m=0.0)
+    assert env.action_space.shape == (6,)
+    start, _ = env.reset(seed=1)
+    for _ in range(50):
+        seen, *_ = env.step(np.zeros(6, np.float32))
+    assert np.abs(seen[:3] - start[:3]).max() < 1e-3
+    for _ in range(10):
+        seen, *_ = env.step(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5], np.float32))
+    assert np.linalg.norm(seen[21:24]) > 0.2  # rad/s: one of them turns it
+
+
+def test_a_rotor_that_fails_can_be_drawn_by_episode() -> None:
+    env = gymnasium.make(HOVER, settings={"SIM_ENGINE_FAIL": 1}, randomise={"SIM_ENGINE_MUL": (0.0, 0.2)})
+    env.reset(seed=1)
+    crashed = False
+    for _ in range(100):
+        _, _, crashed, _, _ = env.step(np.zeros(4, np.float32))
+        if crashed:
+            break
+    assert crashed
+
+
+def test_a_rate_and_an_acceleration_are_what_is_asked_for() -> None:
+    env = gymnasium.make(HOVER, start_m=0.0)
+    env.reset(seed=1)
+    for _ in range(25):
+        seen, *_ = env.step(np.array([0.0, 0.0, 0.0, 0.25], np.float32))
+    assert seen[21:24] == pytest.approx([0.0, 0.0, 0.5], abs=0.02)  # rad/s, a quarter of 2 about the nose
+    env = gymnasium.make(HOVER, action="acceleration", start_m=0.0, reach_m=20.0)
+    env.reset(seed=1)
+    speeds = []
+    for _ in range(100):
+        seen, *_ = env.step(np.array([0.25, 0.0, 0.0], np.float32))
+        speeds.append(float(seen[3]))
+    # a quarter of 4 m/s^2, less the air's drag, after the cable has turned there
+    assert (speeds[99] - speeds[89]) / 0.2 == pytest.approx(1.0, abs=0.1)
+
+
+BAD: dict[str, tuple[dict[str, Any], str]] = {
+    "action": ({"action": "thrust"}, "must be one of rotors, ctbr, acceleration"),
+    "option": ({"histroy": 1}, "histroy: there is no such option"),
+    "rate": ({"rate_hz": 60.0}, "rate_hz = 60 Hz does not divide"),
+    "history": ({"history": -1}, "history = -1"),
+    "reward": ({"reward": {"speed": 1.0}}, "reward: there is no 'speed'"),
+    "range": ({"randomise": {"SIM_WIND_E": (2.0, -2.0)}}, "must be \\(least, greatest\\)"),
+    "belief": ({"randomise": {"VEH_LOAD_MASS": (0.1, 0.2)}}, "must be a parameter of the simulator"),
+    "value": ({"randomise": {"SIM_ACT_DELAY_MS": (0.0, 900.0)}}, "SIM_ACT_DELAY_MS = 900.0 ms; must be"),
+    "setting": ({"settings": {"SIM_WIND": 1.0}}, "SIM_WIND: no such parameter"),
+    "vehicle": ({"vehicle": "zeppelin"}, "zeppelin"),
+    "sensors": ({"sensors": "eyes"}, "eyes"),
+    "mission": ({"mission": UP_AND_DOWN}, "mission up: there is no path of the load"),
+    "start": ({"start_m": 3.0}, "start_m = 3.0"),
+}
+
+
+@pytest.mark.parametrize(("options", "told"), BAD.values(), ids=BAD)
+def test_what_is_wrong_is_told_in_one_line(options: dict[str, Any], told: str) -> None:
+    with pytest.raises(plumbline.Error, match=told) as caught:
+        gymnasium.make(HOVER, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gymnasium", None)
+    monkeypatch.delitem(sys.modules, "plumbline.learning")
+    with pytest.raises(plumbline.Error, match=r"pip install 'plumbline\[gym\]'"):
+        import_module("plumbline.learning")

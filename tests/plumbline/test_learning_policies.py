@@ -1,0 +1,166 @@
+"""Policies outside of the environment that they were trained in, and laws inside of one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+import plumbline.learning
+from plumbline import Land, Takeoff, Waypoint
+from plumbline.learning import HOVER, LOAD_TRACKING
+from plumbline.learning.baseline import LawPolicy
+from plumbline.learning.policy import Policy, PolicyPilot, load_policy, policy_of_sb3
+
+TICK_HZ = 250.0
+
+
+def made(size: int, actions: int, options: dict[str, Any]) -> Policy:
+    """A policy that does small things."""
+    rng = np.random.default_rng(1)
+    shapes = [(8, size), (actions, 8)]
+    return Policy([(0.05 * rng.normal(size=shape), np.zeros(shape[0])) for shape in shapes], options)
+
+
+@pytest.mark.parametrize("action", ["rotors", "ctbr", "acceleration"])
+def test_in_flight_it_sees_and_does_the_same_as_in_its_environment(action: str) -> None:
+    # an environment whose steps are single ticks, so that each of them can be seen
+    options: dict[str, Any] = {"action": action, "rate_hz": TICK_HZ, "history": 2, "preview": 2}
+    env = gymnasium.make(LOAD_TRACKING, observation="estimate", **options)
+    policy = made(env.observation_space.shape[0], env.action_space.shape[0], options)  # type: ignore[index]
+    pilot, episodes = PolicyPilot(policy), env.unwrapped.episodes  # type: ignore[attr-defined]
+    seen, _ = env.reset(seed=1)
+    for _ in range(30):
+        pilot.tick(episodes.state(0), episodes.jet(0))
+        assert np.array_equal(pilot.observation, seen)
+        seen, *_ = env.step(policy(seen))
+
+
+def test_an_action_is_held_for_a_step_and_rotors_get_what_was_asked_for() -> None:
+    env = gymnasium.make(HOVER, action="rotors", start_m=0.3)
+    policy = made(28, 4, {"action": "rotors"})
+    pilot, episodes = PolicyPilot(policy), env.unwrapped.episodes  # type: ignore[attr-defined]
+    env.reset(seed=1)
+    hover = pilot.tick(episodes.state(0), episodes.jet(0))[0]
+    first = pilot.observation.copy()
+    env.step(np.ones(4, np.float32))
+    for _ in range(4):
+        assert pilot.tick(episodes.state(0), episodes.jet(0))[0] == hover
+        assert np.array_equal(pilot.observation, first)
+    pilot.tick(episodes.state(0), episodes.jet(0))
+    assert not np.array_equal(pilot.observation, first)
+    numbers = policy(first)
+    weight, most = 0.5 * 9.81, 4 * 1.96  # N, of the Bebop with its load
+    low, high = numbers < 0, numbers > 0
+    expected = weight + 0.25 * (numbers[low].sum() * weight + numbers[high].sum() * (most - weight))
+    assert hover == pytest.approx(expected, rel=1e-6)
+
+
+def test_begun_anew_it_has_forgotten_what_it_did() -> None:
+    options = {"history": 3}
+    policy = made(28 * 4, 4, options)
+    pilot = PolicyPilot(policy)
+    env = gymnasium.make(HOVER, **options)  # type: ignore[arg-type]
+    env.reset(seed=1)
+    episodes = env.unwrapped.episodes  # type: ignore[attr-defined]
+    for _ in range(11):
+        pilot.tick(episodes.state(0), episodes.jet(0))
+    assert np.abs(pilot.observation[28:56]).max() > 0.0
+    pilot.start()
+    pilot.tick(episodes.state(0), episodes.jet(0))
+    assert not pilot.observation[24:28].any() and not pilot.observation[28:].any()
+
+
+def test_a_file_holds_all_of_it(tmp_path: Path) -> None:
+    policy = made(28, 4, {"action": "rotors", "randomise": {"SIM_WIND_E": (0.0, 1.0)}})
+    policy.save(tmp_path / "out" / "policy.npz")
+    again = load_policy(tmp_path / "out" / "policy.npz")
+    seen = np.linspace(-1.0, 1.0, 28, dtype=np.float32)
+    assert np.array_equal(again(seen), policy(seen)) and again(np.stack([seen, seen])).shape == (2, 4)
+    assert again.options == {"action": "rotors"}
+
+
+def test_what_is_no_policy_is_told(tmp_path: Path) -> None:
+    with pytest.raises(plumbline.Error, match="No such file"):
+        load_policy(tmp_path / "none.npz")
+    np.savez(tmp_path / "other.npz", numbers=np.zeros(3))
+    with pytest.raises(plumbline.Error, match="it holds no policy"):
+        load_policy(tmp_path / "other.npz")
+    with pytest.raises(plumbline.Error, match="does not fit its options: they show 28 numbers"):
+        PolicyPilot(made(12, 4, {}))
+
+
+class Tensor:
+    def __init__(self, values: Any) -> None:
+        self._values = np.asarray(values, np.float32)
+
+    def detach(self) -> Tensor:
+        return self
+
+    def numpy(self) -> Any:
+        return self._values
+
+
+class Linear:
+    def __init__(self, weight: Any, bias: Any) -> None:
+        self.weight, self.bias = Tensor(weight), Tensor(bias)
+
+
+class Tanh:
+    pass
+
+
+class ReLU:
+    pass
+
+
+class Model:
+    def __init__(self, between: Any) -> None:
+        self.policy = self.mlp_extractor = self
+        self.policy_net = [Linear([[2.0]], [0.0]), between, Linear([[1.0]], [0.5]), between]
+        self.action_net = Linear([[1.0], [3.0]], [0.0, 0.0])
+
+
+def test_a_network_of_stable_baselines_becomes_one() -> None:
+    policy = policy_of_sb3(Model(Tanh()), {})
+    inner = np.tanh(np.tanh(2.0 * 0.1) + 0.5)
+    assert policy(np.array([0.1], np.float32)) == pytest.approx([inner, 1.0])  # the second is cut
+    with pytest.raises(plumbline.Error, match="ReLU between its layers"):
+        policy_of_sb3(Model(ReLU()), {})
+
+
+@pytest.mark.parametrize(("action", "rate_hz", "limit_m"), [("rotors", TICK_HZ, 0.004), ("ctbr", 50.0, 0.01)])
+def test_a_law_is_a_baseline(action: str, rate_hz: float, limit_m: float) -> None:
+    env = gymnasium.make_vec(LOAD_TRACKING, 2, action=action, rate_hz=rate_hz, observation="truth")
+    law = LawPolicy(env)
+    seen, _ = env.reset(seed=3)
+    for step in range(round(6 * rate_hz)):
+        actions, _ = law.predict(seen)
+        seen, _, crashed, _, _ = env.step(actions)
+        assert not crashed.any()
+        if step > 5 * rate_hz:
+            assert np.linalg.norm(seen[:, :3], axis=1).max() < limit_m
+
+
+def test_a_law_cannot_ask_for_what_is_below_it() -> None:
+    with pytest.raises(plumbline.Error, match="must be rotors or ctbr"):
+        LawPolicy(gymnasium.make(HOVER, action="acceleration"))
+    with pytest.raises(plumbline.Error, match="law 'best': there is none of that name"):
+        LawPolicy(gymnasium.make(HOVER), "best")
+
+
+def test_a_trained_policy_flies_a_mission_as_a_law() -> None:
+    up = plumbline.Mission("up", [Takeoff(0.6), Waypoint(0.0, 0.0, 0.6, hold_s=2.0), Land()])
+    flight = plumbline.fly(up, law="plumbline.examples.hover_policy:HoverPolicy", quiet=True)
+    assert (flight.outcome, flight.reason) == ("completed", "")
+    assert 0.002 < flight.summary["load_error_max_m"] < 0.05  # what no shipped law leaves, and no more
+
+
+def test_a_law_without_its_policy_is_told(tmp_path: Path) -> None:
+    text = 'from plumbline.learning.law import PolicyLaw\n\n\nclass Lost(PolicyLaw):\n    file = "lost.npz"\n'
+    (tmp_path / "lost.py").write_text(text, encoding="utf-8")
+    with pytest.raises(plumbline.Error, match=r"lost.npz: No such file"):
+        plumbline.fly("hover", law=f"{tmp_path / 'lost.py'}:Lost", quiet=True)

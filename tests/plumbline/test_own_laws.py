@@ -1,0 +1,117 @@
+"""Laws of one's own as scripts and the command line name them: the same flight, told in the same way."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import plumbline
+from gcs.cli import gcs
+from gcs.errors import EXIT_USAGE
+from missions.model import Delay, Land, Mission, Takeoff
+from plumbline.examples.load_pid import LoadPid
+from plumbline.laws import Asked, Now
+
+SHORT = Mission("short", "Short", "", (), (Takeoff(0.5), Delay(1.0), Land()))
+FAILS = """
+from plumbline.examples.load_pid import LoadPid
+
+class Fails(LoadPid):
+    def load_position(self, memory, now):
+        if now.time_s > 3.0:
+            return memory, now.no_such_field
+        return super().load_position(memory, now)
+"""
+
+
+class Heavier(LoadPid):
+    name = "heavier"
+
+    def load_position(self, memory: Any, now: Now) -> tuple[Any, Asked]:
+        believed = now.believed._replace(load_mass=1.02 * now.believed.load_mass)
+        return super().load_position(memory, now._replace(believed=believed))
+
+
+def run(*words: str) -> Result:
+    return CliRunner().invoke(gcs, list(words), prog_name="gcs")
+
+
+def test_a_class_a_file_and_a_module_fly_the_same() -> None:
+    by_class = plumbline.fly(SHORT, law=Heavier, quiet=True)
+    by_file = plumbline.fly(SHORT, law=f"{__file__}:Heavier", quiet=True)
+    assert by_class.tlog == by_file.tlog
+    assert by_class.outcome == "completed"
+    assert by_class.summary["law"] == by_file.summary["law"] == "heavier"
+    assert by_class.tlog != plumbline.fly(SHORT, law="plumbline.examples.load_pid:LoadPid", quiet=True).tlog
+
+
+def test_its_parameters_are_set() -> None:
+    stiff = plumbline.fly(SHORT, law=Heavier, settings={"PID_KP": 8.0}, quiet=True)
+    assert stiff.outcome == "completed"
+    assert stiff.tlog != plumbline.fly(SHORT, law=Heavier, quiet=True).tlog
+    with pytest.raises(plumbline.Error, match=r"PID_KP = 80\.0 1/s\^2; must be 0 \.\.\. 50"):
+        plumbline.fly(SHORT, law=Heavier, settings={"PID_KP": 80.0}, quiet=True)
+
+
+def test_one_that_fails_in_flight_leaves_a_report(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(FAILS)
+    flight = plumbline.fly(SHORT, law=f"{path}:Fails", quiet=True)
+    assert flight.outcome == "diverged"
+    assert flight.reason == (
+        "Law Fails failed: AttributeError: 'Now' object has no attribute 'no_such_field' (mine.py:7);"
+        " landing by law plumbline"
+    )
+    page = flight.report(tmp_path / "out").read_text(encoding="utf-8")
+    assert "has no attribute" in page
+
+
+def test_one_that_fails_beforehand_does_not_fly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(FAILS.replace("now.time_s > 3.0", "True"))
+    told = "Law Fails failed: AttributeError: 'Now' object has no attribute 'no_such_field' (mine.py:7)"
+    with pytest.raises(plumbline.Error) as error:
+        plumbline.fly(SHORT, law="mine.py", quiet=True)
+    assert str(error.value) == f"law mine.py: {told}"
+    for command in ("fly", "sweep"):
+        result = run(command, "hover", "--law", "mine.py:Fails", "--quiet", "--out", "out")
+        assert result.exit_code == EXIT_USAGE
+        assert f"--law mine.py:Fails: {told}" in result.stderr
+        assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("command", ["fly", "sweep", "warmup"])
+def test_one_that_there_is_not_is_told(command: str) -> None:
+    words = [command, *(["hover"] if command != "warmup" else []), "--law", "nofile.py:Mine"]
+    result = run(*words)
+    assert result.exit_code == EXIT_USAGE
+    assert "nofile.py: no such file" in result.output
+
+
+def test_a_sweep_tells_laws_apart(tmp_path: Path) -> None:
+    """And flies each as `fly` does."""
+    path = tmp_path / "mine.py"
+    path.write_text(FAILS)
+    laws = (f"{__file__}:Heavier", f"{path}:Fails")
+    out = tmp_path / "out"
+    rows = plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True, kind="arrow").to_pylist()
+    assert [(row["law"], row["outcome"]) for row in rows] == [("heavier", "completed"), ("Fails", "diverged")]
+    error_m = plumbline.fly("hover", law=Heavier, quiet=True).summary["load_error_max_m"]
+    assert rows[0]["load_error_max_m"] == pytest.approx(error_m, rel=1e-3)
+    plan = json.loads((out / "plan.json").read_text())
+    assert plan["origin"]["settings"]["plan"]["laws"] == list(laws)
+    path.write_text(FAILS.replace("3.0", "2.0"))
+    with pytest.raises(plumbline.Error, match="holds another sweep"):
+        plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True)
+
+
+def test_two_laws_of_one_name_are_not_swept(tmp_path: Path) -> None:
+    for name in ("one.py", "two.py"):
+        (tmp_path / name).write_text(FAILS)
+    laws = [str(tmp_path / name) for name in ("one.py", "two.py")]
+    with pytest.raises(plumbline.Error, match="another law has the name Fails, too"):
+        plumbline.sweep("hover", laws=laws, quiet=True)

@@ -1,0 +1,110 @@
+"""The last texts of the vehicle, told again to who asks."""
+
+from __future__ import annotations
+
+import re
+
+from autopilot.services.kept_texts import MOST, PACE_US, KeptText, KeptTexts
+from autopilot.services.statustext import TextWriter
+from autopilot.services.streams import NEVER_US
+from autopilot.wire.dialect import plumbline as mavlink
+from tests.services.conftest import TICK_US, Rig
+
+WARNING, CRITICAL = mavlink.MAV_SEVERITY_WARNING, mavlink.MAV_SEVERITY_CRITICAL
+ASK = mavlink.MAVLink_command_long_message(
+    1, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, mavlink.MAVLINK_MSG_ID_STATUSTEXT, 0, 0, 0, 0, 0, 0
+)
+HEAD = re.compile(r"\[(\d+)/(\d+), (\d+\.\d) s ago\] (.*)")
+
+
+def texts(received):
+    """(severity, text) of each text, chunks joined."""
+    whole, number = [], 0
+    for message in (one.message for one in received if one.message.get_type() == "STATUSTEXT"):
+        if message.id and message.id == number:
+            whole[-1] = (message.severity, whole[-1][1] + message.text)
+        else:
+            whole.append((message.severity, message.text))
+        number = message.id
+    return whole
+
+
+def asked(rig: Rig, link: str = "gcs", seconds: float = 0.5):
+    rig.send(ASK, link=link)
+    return texts(rig.run(round(seconds * 1e6), link))
+
+
+def test_what_was_said_before_is_told_with_its_age_to_the_asker_alone(rig: Rig) -> None:
+    rig.endpoint.add_link("other")
+    rig.endpoint.say(CRITICAL, "tilt 122 deg exceeds FS_TILT_DEG 60: rotors off, and more than fits into one")
+    rig.run(2_000_000)
+    rig.endpoint.say(WARNING, "Machine busy")
+    rig.run(1_000_000)
+    rig.send(ASK)
+    told, others = [], []
+    for _ in range(100):
+        out = rig.poll()
+        told += out.get("gcs", [])
+        others += out.get("other", [])
+    found = [(severity, *HEAD.fullmatch(text).groups()) for severity, text in texts(told)]
+    reason = "tilt 122 deg exceeds FS_TILT_DEG 60: rotors off, and more than fits into one"
+    assert found == [(CRITICAL, "1", "2", "3.0", reason), (WARNING, "2", "2", "1.0", "Machine busy")]
+    assert texts(others) == []
+
+
+def test_a_text_that_comes_back_crowds_out_no_other(rig: Rig) -> None:
+    rig.endpoint.say(CRITICAL, "the reason")
+    for _ in range(10 * MOST):
+        rig.endpoint.say(WARNING, "Machine busy")
+        rig.poll()
+    assert [HEAD.fullmatch(text)[4] for _, text in asked(rig)] == ["the reason", "Machine busy"]
+
+
+def test_no_more_than_the_last_are_kept(rig: Rig) -> None:
+    for number in range(3 * MOST):
+        rig.endpoint.say(WARNING, f"text {number}")
+        rig.poll()
+    said = [HEAD.fullmatch(text)[4] for _, text in asked(rig)]
+    assert said == [f"text {number}" for number in range(2 * MOST, 3 * MOST)]
+
+
+def test_who_asks_without_end_is_sent_no_more_for_it(rig: Rig) -> None:
+    for number in range(MOST):
+        rig.endpoint.say(WARNING, f"text {number}")
+    rig.poll()
+    sent = 0
+    for _ in range(50):
+        for _ in range(40):
+            rig.send(ASK)
+        sent += len(texts(rig.poll().get("gcs", [])))
+    assert sent <= 50 * max(1, TICK_US // PACE_US)
+
+
+def test_another_component_keeps_none(rig: Rig) -> None:
+    rig.endpoint.say(WARNING, "a text")
+    rig.poll()
+    ask = mavlink.MAVLink_command_long_message(
+        1, 25, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, mavlink.MAVLINK_MSG_ID_STATUSTEXT, 0, 0, 0, 0, 0, 0
+    )
+    acks = [m for m in rig.replies(ask) if m.get_type() == "COMMAND_ACK"]
+    assert [ack.result for ack in acks] == [mavlink.MAV_RESULT_UNSUPPORTED]
+
+
+def test_a_run_inherits_what_the_one_before_has_said() -> None:
+    kept = KeptTexts(TextWriter())
+    kept.keep(WARNING, "again", 0)
+    before = [KeptText(1_000_000, CRITICAL, "the reason"), KeptText(9_000_000, WARNING, "again")]
+    kept.inherit(before, 10_000_000)
+    assert kept.texts == (KeptText(-9_000_000, CRITICAL, "the reason"), KeptText(0, WARNING, "again"))
+    kept.inherit([KeptText(number, WARNING, str(number)) for number in range(MOST)], MOST)
+    assert len(kept.texts) == MOST
+    assert kept.texts[-1].text == "again"
+
+
+def test_a_link_that_is_gone_is_told_nothing() -> None:
+    kept = KeptTexts(TextWriter())
+    kept.keep(WARNING, "a text", 0)
+    kept.ask("gone", 0)
+    kept.forget("gone")
+    assert kept.poll(10 * PACE_US) == []
+    assert kept.next_timer() == NEVER_US

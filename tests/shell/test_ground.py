@@ -1,0 +1,173 @@
+"""The sockets towards ground stations: a flood must not stop the clock, and everybody has a turn."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import count
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from autopilot.shell.ground import GroundStations, listen
+from autopilot.shell.options import StopRequest
+from autopilot.shell.storing import Storing
+from autopilot.shell.tcp_server import MAX_CLIENTS, SILENCE_US, TcpServer
+from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.dialect import plumbline as m
+from gcs.shell.link import LOOPBACK, free_port
+
+SLOW_S = 1e-3  # for one message: longer than there is for all
+
+
+def pings(first: int, count: int) -> bytes:
+    writer = FrameWriter(255, 190)
+    return b"".join(writer.frame(m.MAVLink_ping_message(0, seq, 0, 0)) for seq in range(first, first + count))
+
+
+class Slow:
+    """An onboard that takes its time with each datagram."""
+
+    def __init__(self) -> None:
+        self.now_us = 0
+        self.heard: list[tuple[Any, list[int]]] = []
+        self.links: list[Any] = []
+        self.said: list[tuple[Any, bytes]] = []
+        self.endpoint = SimpleNamespace(remove_link=self.links.remove)
+
+    def add_link(self, link: Any, program: bool = False) -> None:
+        self.links.append(link)
+
+    def receive_ground(self, datagram: bytes, link: Any, program: bool = False) -> list[Any]:
+        until = time.perf_counter() + SLOW_S
+        while time.perf_counter() < until:
+            pass
+        self.heard.append((link, [received.message.seq for received in decode(datagram)[0]]))
+        return []
+
+    def ground_datagrams(self) -> list[tuple[Any, bytes]]:
+        said, self.said = self.said, []
+        return said
+
+
+class Ground:
+    """Sockets of an autopilot for two ground stations and TCP."""
+
+    def __init__(self, tcp: TcpServer, address: tuple[str, int]) -> None:
+        self.onboard: Any = Slow()
+        self.address = address
+        self.peers = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
+        for peer in self.peers:
+            peer.bind((LOOPBACK, 0))
+            peer.settimeout(5.0)
+        stations = tuple(peer.getsockname() for peer in self.peers)
+        self.stations = GroundStations(stations, (), tcp, Storing(aside=False))
+        self.stations.join(self.onboard)
+        self.onboard.said = [((i, address), b"hello") for i, address in enumerate(stations)]
+        self.exchange()
+        self.theirs = [peer.recvfrom(100)[1] for peer in self.peers]
+
+    def exchange(self) -> None:
+        self.stations.exchange(self.onboard, lambda events: None, StopRequest())
+
+    def connect(self) -> socket.socket:
+        """A client by TCP, accepted or refused."""
+        client = socket.create_connection(self.address, 5.0)
+        self.exchange()
+        return client
+
+    @property
+    def heard(self) -> list[int]:
+        return [seq for _, seqs in self.onboard.heard for seq in seqs]
+
+
+@pytest.fixture
+def ground() -> Iterator[Callable[[], Ground]]:
+    made: list[Ground] = []
+
+    def make() -> Ground:
+        address = (LOOPBACK, free_port())
+        made.append(Ground(listen(address), address))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.stations.close()
+        for peer in one.peers:
+            peer.close()
+
+
+def test_a_datagram_of_many_messages_is_handed_over_tick_by_tick(ground: Callable[[], Ground]) -> None:
+    autopilot = ground()
+    autopilot.peers[0].sendto(pings(0, 40), autopilot.theirs[0])
+    autopilot.exchange()
+    assert autopilot.heard == [0], "the time is over with it"
+    for _ in range(39):
+        autopilot.exchange()
+    assert autopilot.heard == list(range(40))
+
+
+def test_what_is_no_message_is_passed_over_and_what_follows_is_heard(ground: Callable[[], Ground]) -> None:
+    autopilot = ground()
+    for datagram in (b"\xfd" * 1500, pings(7, 1)):
+        autopilot.peers[0].sendto(datagram, autopilot.theirs[0])
+    for _ in range(2):
+        autopilot.exchange()
+    assert autopilot.heard == [7]
+
+
+def test_a_flood_by_one_way_leaves_the_others_their_turn(ground: Callable[[], Ground]) -> None:
+    autopilot = ground()
+    client = autopilot.connect()
+    for _ in range(50):
+        autopilot.peers[0].sendto(pings(0, 30), autopilot.theirs[0])
+    client.sendall(pings(100, 2000))
+    autopilot.peers[1].sendto(pings(5000, 1), autopilot.theirs[1])
+    autopilot.exchange()
+    assert autopilot.heard == [0, 5000, 100]
+    client.close()
+
+
+def test_clients_by_tcp_are_bounded_and_the_most_silent_makes_room(ground: Callable[[], Ground]) -> None:
+    autopilot = ground()
+    clients = [autopilot.connect() for _ in range(MAX_CLIENTS)]
+    refused = autopilot.connect()
+    assert refused.recv(100) == b"", "closed"
+    assert len(autopilot.onboard.links) == 2 + MAX_CLIENTS
+    autopilot.onboard.now_us += SILENCE_US
+    for number, client in enumerate(clients[1:]):
+        client.sendall(pings(number, 1))
+        autopilot.exchange()
+    late = autopilot.connect()
+    assert clients[0].recv(100) == b""
+    late.sendall(pings(999, 1))
+    for _ in range(2 * MAX_CLIENTS):
+        autopilot.exchange()
+    assert sorted(autopilot.heard) == [*range(MAX_CLIENTS - 1), 999]
+    assert len(autopilot.onboard.links) == 2 + MAX_CLIENTS
+    for client in (*clients, refused, late):
+        client.close()
+
+
+def test_much_that_has_waited_is_sent_tick_by_tick(
+    ground: Callable[[], Ground], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    autopilot = ground()
+    looks = count(0.0, 1e-4)
+    monkeypatch.setattr(time, "perf_counter", lambda: next(looks))  # each datagram takes 0.1 ms
+    link = (0, autopilot.peers[0].getsockname())
+    autopilot.onboard.said = [(link, bytes((number,))) for number in range(50)]
+    autopilot.peers[0].settimeout(0.0)
+    received, most = b"", 0
+    for _ in range(10):
+        autopilot.exchange()
+        before = len(received)
+        with suppress(BlockingIOError):
+            while True:
+                received += autopilot.peers[0].recv(100)
+        most = max(most, len(received) - before)
+    assert received == bytes(range(50))
+    assert most <= 10

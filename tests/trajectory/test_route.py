@@ -1,0 +1,134 @@
+"""Paths of a planner of one's own: what they are made of, and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from autopilot.trajectory.feasibility import VehicleLimits
+from autopilot.trajectory.route import (
+    Path,
+    PlanError,
+    Route,
+    check_path,
+    passages,
+    polynomials,
+    samples,
+    slower,
+    trouble_of,
+    use,
+)
+from autopilot.trajectory.waypoint_path import evaluate_path, passage_jets
+from autopilot.vehicle.file import load_vehicle
+
+LIMITS = VehicleLimits(load_vehicle("bebop")).shaping
+POINTS = ((0.0, 0.0, 1.0), (2.0, 0.0, 1.0))
+ROUTE = Route(POINTS, 1.5, 1.5, False, LIMITS.body, LIMITS.bounds)
+# s^5 (126 - 420 s + 540 s^2 - 315 s^3 + 70 s^4): from 0 to 1 with four derivatives 0 at both ends
+REST_TO_REST = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0])
+EXACT = 1e-9  # of numbers of the size of 1, through polynomials of degree 9
+SAMPLED = 1e-5  # m, of 41 samples of such a path: the spline between them
+
+
+def straight(duration: float) -> Path:
+    coefficients = np.zeros((1, 10, 3))
+    coefficients[0, :, 0] = 2.0 * REST_TO_REST / duration ** np.arange(10)
+    coefficients[0, 0, 2] = 1.0
+    return polynomials([0.0, duration], coefficients, [0.0, duration])
+
+
+def test_a_polynomial_is_the_path_and_its_derivatives() -> None:
+    path = straight(4.0)
+    check_path(path, ROUTE)
+    jets = passage_jets(path.table, np.array([0.0, 2.0, 4.0]))
+    assert jets[0, :, 0] == pytest.approx([0.0, 1.0, 2.0], abs=EXACT)
+    assert jets[1, 1, 0] == pytest.approx(2.0 / 4.0 * 630.0 / 256.0, abs=EXACT)  # 630 s^4 (1 - s)^4 at 1/2
+    assert np.abs(jets[1:5, [0, 2], :]).max() < EXACT
+    (one,) = passages(path, ROUTE)
+    assert (one.begin_s, one.end_s, one.start) == (0.0, 4.0, POINTS[0])
+
+
+def test_samples_are_passed_from_rest_to_rest() -> None:
+    exact = straight(4.0)
+    times = np.linspace(0.0, 4.0, 41)
+    path = samples(times, passage_jets(exact.table, times)[0], [0.0, 4.0])
+    check_path(path, ROUTE)
+    between = np.linspace(0.0, 4.0, 333)
+    off = passage_jets(path.table, between)[0] - passage_jets(exact.table, between)[0]
+    assert np.abs(off).max() < SAMPLED
+
+
+def test_a_slower_path_is_the_same_path() -> None:
+    quick, slow = straight(4.0), slower(straight(4.0), 1.5)
+    assert slow.passes_s == (0.0, 6.0)
+    a, b = evaluate_path(quick.table, 1.0), evaluate_path(slow.table, 1.5)
+    for order in range(7):
+        assert np.array(b[order]) * 1.5**order == pytest.approx(np.array(a[order]), abs=1e-6)
+
+
+def test_use_tells_how_much_longer_a_path_must_take() -> None:
+    peak = 2.0 / 4.0 * 630.0 / 256.0  # m/s
+    fast = ROUTE._replace(accel_m_s2=100.0)
+    assert use(straight(4.0), fast) == pytest.approx(peak / 1.5, rel=1e-3)
+    assert trouble_of(straight(4.0), ROUTE) == ""
+    assert use(straight(0.8), ROUTE) > 1.0
+    assert trouble_of(straight(0.8), ROUTE).startswith("a rotor would have to give ")
+
+
+def changed(change: Callable[[Path], Path]) -> Path:
+    return change(straight(4.0))
+
+
+def with_table(at: tuple[int, int], value: float) -> Callable[[Path], Path]:
+    def change(path: Path) -> Path:
+        table = path.table.copy()
+        table[at] = value
+        return path._replace(table=table)
+
+    return change
+
+
+def jumping(path: Path) -> Path:
+    """Two halves, the second 1 cm beside."""
+    table = np.vstack([path.table, path.table])
+    table[1] = 0.0
+    jets = passage_jets(path.table, np.array([2.0]))
+    table[0, 1] = table[1, 0] = 2.0
+    table[1, 1] = 4.0
+    factorials = np.cumprod([1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    table[1, 2:9] = jets[:, 0, 0] / factorials
+    table[1, 22] = 1.01
+    return path._replace(table=table)
+
+
+WRONG = {
+    "times": (lambda p: p._replace(passes_s=(0.0, 2.0, 4.0)), r"passes_s are 3 times; must be 2"),
+    "number": (with_table((0, 5), np.nan), "what is no number"),
+    "begin": (with_table((0, 0), 0.5), r"begins at 0\.5 s; must be 0"),
+    "end": (lambda p: p._replace(passes_s=(0.0, 3.0)), "ends at 4 s and passes its last point at 3 s"),
+    "order": (with_table((0, 1), -1.0), "do not rise"),
+    "rest": (with_table((0, 3), 0.1), r"begins or ends with a velocity of 0\.1 m/s; must be at rest"),
+    "jump": (jumping, r"position of the path jumps by 0\.01 m at 2\.00 s"),
+    "beside": (with_table((0, 2), 0.1), r"passes point 0 0\.10 m beside it"),
+    "ground": (lambda p: polynomials([0.0, 1.0], [[(0.0, 0.0, -1.0)]], [0.0, 1.0]), "beside it"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_is_wrong_with_a_path_is_told(wrong: str) -> None:
+    change, told = WRONG[wrong]
+    with pytest.raises(PlanError, match=told):
+        check_path(changed(change), ROUTE)
+
+
+def test_shapes_that_do_not_fit_are_told() -> None:
+    with pytest.raises(ValueError, match=r"coefficients are of shape \(1, 11, 3\); must be"):
+        polynomials([0.0, 1.0], np.zeros((1, 11, 3)), [0.0, 1.0])
+    with pytest.raises(ValueError, match=r"breaks_s are of shape \(2,\); must be \(3,\)"):
+        polynomials([0.0, 1.0], np.zeros((2, 4, 3)), [0.0, 1.0])
+    with pytest.raises(ValueError, match=r"positions are of shape \(2, 2\); must be \(2, 3\)"):
+        samples([0.0, 1.0], np.zeros((2, 2)), [0.0, 1.0])
+    with pytest.raises(ValueError, match="times_s must rise"):
+        samples([1.0, 1.0], np.zeros((2, 3)), [0.0, 1.0])

@@ -1,0 +1,33 @@
+"""BATTERY_STATUS written and read."""
+
+from __future__ import annotations
+
+from math import isnan, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from autopilot.wire.convert import BatteryReading, battery_status_message, read_battery_status
+from autopilot.wire.dialect import plumbline as mavlink
+
+
+@given(st.floats(0.0, 130.0), st.floats(0.0, 327.0), st.floats(0.0, 1e6), st.floats(0.0, 1.0))
+def test_read_as_written(voltage, current, used_mah, remaining):
+    """To a millivolt, ten milliampere, a mAh and a per cent; packs of more than 65 V take two entries."""
+    found = read_battery_status(battery_status_message(BatteryReading(voltage, current, used_mah, remaining)))
+    assert found.voltage == pytest.approx(voltage, abs=0.001)
+    assert found.current == pytest.approx(current, abs=0.005001)
+    assert found.used_mah == pytest.approx(used_mah, abs=0.500001)
+    assert found.remaining == pytest.approx(remaining, abs=0.005001)
+
+
+def test_what_is_not_known_is_not_told():
+    assert all(map(isnan, read_battery_status(battery_status_message(BatteryReading(nan, nan, nan, nan)))))
+
+
+def test_cells_that_are_measured_one_by_one_are_added_up():
+    message = battery_status_message(BatteryReading(voltage=12.0))
+    message.voltages = [4000, 3900, 4100, *[0xFFFF] * 7]
+    assert read_battery_status(message).voltage == pytest.approx(12.0)
+    assert message.type == mavlink.MAV_BATTERY_TYPE_LIPO
