@@ -29,7 +29,7 @@ def real(*rows: str) -> str:
     """The same in a lab or outdoors as they are, and how many flights were lost there."""
     found = [RECORD["rows"][f"{row}, real"] for row in rows]
     home = [row[ERROR] for row in found if ERROR in row]
-    lost = sum(row.get("lost", 0) for row in found)
+    lost = round(sum(row.get("lost", 0) for row in found))
     text = f"{math.ceil(1e3 * max(home) - 1e-9)} mm" if home else ""
     return text + (f"{'; ' if home else ''}{lost} of {len(rows) * RECORD['seeds']} lost" if lost else "")
 
