@@ -11,6 +11,7 @@ from autopilot.shell.options import Address, datagram_socket, reason, receive, s
 from sitl.hil import HilSimulator
 
 _TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another may take its place
+_MOST_NAMED = 8  # of the autopilots that are turned away
 _TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
 
 
@@ -98,16 +99,20 @@ class Link:
         if sender == self.peer:
             return True
         if self.peer is not None and time.monotonic() - self._heard < _TAKE_OVER_S:
-            if sender not in self._turned_away:
-                self._turned_away.add(sender)
-                self._say(
-                    f"the autopilot at {shown(sender)} is not served: that at {shown(self.peer)} answers"
-                )
+            self._turn_away(sender, self.peer)
             return False
         self._say(f"serving the autopilot at {shown(sender)}")
         self.peer = sender
         self.met()
         return True
+
+    def _turn_away(self, sender: Address, peer: Address) -> None:
+        """Say so, once to each of the first of them: a flood has as many addresses as it likes."""
+        if sender in self._turned_away or len(self._turned_away) == _MOST_NAMED:
+            return
+        self._turned_away.add(sender)
+        others = "; others are not named" if len(self._turned_away) == _MOST_NAMED else ""
+        self._say(f"the autopilot at {shown(sender)} is not served: that at {shown(peer)} answers{others}")
 
     def met(self) -> None:
         """An autopilot is met."""

@@ -7083,8 +7083,9 @@ class MAVLink_sim_boot_message(MAVLink_message):
     """
     Which run of the simulated world this is, and how rotors, winch
     and gripper are, for an autopilot that has just started. On the
-    simulator link only: at the first tick, each second, and when an
-    autopilot announces itself.
+    simulator link: at the first tick, each second, and when an
+    autopilot announces itself. An autopilot tells the ground on
+    request in which run it flies.
     """
 
     id = MAVLINK_MSG_ID_SIM_BOOT
@@ -18628,8 +18629,9 @@ class MAVLink(object):
         """
         Which run of the simulated world this is, and how rotors, winch and
         gripper are, for an autopilot that has just started. On the
-        simulator link only: at the first tick, each second, and when
-        an autopilot announces itself.
+        simulator link: at the first tick, each second, and when an
+        autopilot announces itself. An autopilot tells the ground on
+        request in which run it flies.
 
         time_usec                 : The tick, clock of the vehicle. [us] (type:uint64_t)
         boot_id                   : Number of this run of the world; another one after every start. (type:uint64_t)
@@ -18646,8 +18648,9 @@ class MAVLink(object):
         """
         Which run of the simulated world this is, and how rotors, winch and
         gripper are, for an autopilot that has just started. On the
-        simulator link only: at the first tick, each second, and when
-        an autopilot announces itself.
+        simulator link: at the first tick, each second, and when an
+        autopilot announces itself. An autopilot tells the ground on
+        request in which run it flies.
 
         time_usec                 : The tick, clock of the vehicle. [us] (type:uint64_t)
         boot_id                   : Number of this run of the world; another one after every start. (type:uint64_t)
