@@ -38,7 +38,7 @@ def step_of(row: str) -> str:
     """Of README."""
     found = RECORD["rows"][row]
     if "settling_time_5pct_s" not in found:
-        return f"{found.get('lost', RECORD['seeds'])} of {RECORD['seeds']} lost"
+        return f"{round(found.get('lost', RECORD['seeds']))} of {RECORD['seeds']} lost"
     return (
         f"rise {figure(row, 'rise_time_90_s', 2)} s, overshoot {figure(row, 'overshoot_pct', 1)} %, "
         f"settled in {figure(row, 'settling_time_5pct_s', 2)} s"
