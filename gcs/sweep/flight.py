@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import nan, sqrt
+from typing import Any
 
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, commanded_rate
+from autopilot.core.tick import any_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.packed import packed, place_of, unpack
@@ -45,8 +47,7 @@ _NO_ROWS = np.zeros((0, COLUMNS))
 _NEVER = 2**62
 _TICK, _NOW = place_of(World, "tick"), place_of(World, "now_us")
 _SLACK_EVENTS = place_of(World, "plant") + place_of(PlantState, "slack_events")
-# machine code of `fly_stretch`, by the types of the law's rows and of the cable's
-_ENTRIES: dict[tuple[type, type], Callable[..., bool]] = {}
+_ENTRIES: dict[type, Callable[..., bool]] = {}  # machine code of `fly_stretch`, by the type of the cable's rows
 _LOAD_CARRIED = (Phase.HOLD, Phase.MISSION, Phase.RETURN)
 
 
@@ -157,26 +158,23 @@ class SweptFlight:
         self._judge(self.now_us)
 
     def _fly(self, begun: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int) -> bool:
-        law = type(self.core.law_rows)
-        arguments = (
-            self.world,
-            self.core.rows,
-            self.core.law_rows,
-            self.cell.wire,
-            self.figures,
-            self.asked,
-            self.trace,
-            begun,
-            decided,
-            gripper_open,
-            reel_rate,
-            stop_tick,
-            self.chain,
-        )
-        entry = (law, type(self.chain))
-        if entry not in _ENTRIES:
-            _ENTRIES[entry] = entry_of(fly_stretch, *arguments)
-        return _ENTRIES[entry](*arguments)
+        rest = (begun, decided, gripper_open, reel_rate, stop_tick, self.chain)
+        return self._entry()(self.world, self.core.rows, self.core.law, *self._own, *rest)
+
+    @property
+    def _own(self) -> tuple[Any, ...]:
+        return self.cell.wire, self.figures, self.asked, self.trace
+
+    def _entry(self) -> Callable[..., bool]:
+        kind = type(self.chain)
+        if kind not in _ENTRIES:
+            law, rest = any_law(self.core.law_rows), (False, False, False, 0.0, 0, self.chain)
+            _ENTRIES[kind] = entry_of(fly_stretch, self.world, self.core.rows, law, *self._own, *rest)
+        return _ENTRIES[kind]
+
+    def compile(self) -> None:
+        """Have that machine code ready that is the same with all laws."""
+        self._entry()
 
     @property
     def tick(self) -> int:
