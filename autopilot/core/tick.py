@@ -4,9 +4,9 @@ readings -> estimate -> (may the supervisor have something to decide?) -> law ->
 
 All that is carried from tick to tick lies in `CoreRows`, flat arrays that `fly_tick` reads and writes. The
 law's half of it, `control_tick`, is compiled for each law, which the compiler sees by the type of the law's
-rows, and called by its address: what is common to all laws is compiled once. Where the supervisor may have something to decide
-the tick stops behind the estimate and says so: `autopilot.core.flight_core` then lets it decide, in Python,
-and calls again for the rest of the tick. No clock, no socket, no hidden state.
+rows, and called by its address: what is common to all laws is compiled once. Where the supervisor may have
+something to decide the tick stops behind the estimate and says so: `autopilot.core.flight_core` then lets it
+decide, in Python, and calls again for the rest of the tick. No clock, no socket, no hidden state.
 """
 
 from __future__ import annotations
@@ -395,16 +395,19 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
 
 
 def law_at(rows: CoreRows, law_rows: Any) -> Any:
-    """A law's rows as `fly_tick` and `fly_stretch` take them: with its machine code, which is compiled or loaded
-    where need be. Where nothing is compiled, the rows themselves."""
+    """A law's rows as `fly_tick` takes them: with its machine code, compiled or loaded where need be. Where
+    nothing is compiled, the rows themselves."""
     if not hasattr(control_tick, "overloads"):
         return law_rows
-    return LawAt(*law_rows, native_address_of(control_tick, rows, law_rows, 0))
+    control = native_address_of(control_tick, rows, law_rows, 0)
+    return LawAt(law_rows.constants, law_rows.memory, control)
 
 
 def any_law(law_rows: Any) -> Any:
     """The same of no law in particular, to compile for; it cannot be flown."""
-    return LawAt(*law_rows, 0) if hasattr(control_tick, "overloads") else law_rows
+    if not hasattr(control_tick, "overloads"):
+        return law_rows
+    return LawAt(law_rows.constants, law_rows.memory, 0)
 
 
 def control_by(rows: CoreRows, law_rows: Any, now_us: int) -> None:
@@ -414,13 +417,13 @@ def control_by(rows: CoreRows, law_rows: Any, now_us: int) -> None:
 
 @overload(control_by, jit_options=INSIDE)
 def _control_by(rows: Any, law_rows: Any, now_us: Any) -> Any:
-    if getattr(law_rows, "instance_class", None) is not LawAt:
-        return control_by
-
     def called(rows: Any, law_rows: Any, now_us: Any) -> None:
         call_kernel_at(law_rows.control, (rows, law_rows.constants, law_rows.memory, now_us))
 
-    return called
+    def linked(rows: Any, law_rows: Any, now_us: Any) -> None:
+        control_tick(rows, law_rows, now_us)
+
+    return called if getattr(law_rows, "instance_class", None) is LawAt else linked
 
 
 @kernel

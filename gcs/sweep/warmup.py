@@ -21,7 +21,7 @@ _MODULE = "gcs.sweep.warmup"
 def sweep_parts(laws: Sequence[str]) -> list[Part]:
     """What a sweep with these laws needs to fly one flight after another."""
     source = ROOT / "gcs" / "sweep" / "flight.py"
-    alone = Part("the sweep's flight", _MODULE, ("alone", compiled_for(laws)[0]), source, "alone", 25.0)
+    alone = Part("the sweep's flight", _MODULE, ("alone", compiled_for(laws)[0]), source, "alone", 8.0)
     return [alone, *autopilot_parts(*laws), SIMULATOR]
 
 
