@@ -32,7 +32,9 @@ from autopilot.core.tick import (
     Pilot,
     Seen,
     Winch,
+    any_law,
     fly_tick,
+    law_at,
 )
 from autopilot.estimation.filter import NO_LOAD, NO_POSE, complaints, loss
 from autopilot.estimation.inbox import new_inbox
@@ -118,7 +120,8 @@ class FlightCore:
         self._reeling: tuple[tuple[Leg, ...], bool] = ((), False)  # legs, and whether the first of them reels
         self._host: Host | None = None
         self._seat: Seat | None = None
-        self._fly: Callable[..., int] | None = None  # the tick's machine code for this law, once it was run
+        self._fly: Callable[..., int] | None = None  # the tick's machine code, once it was run
+        self._law: Any = None  # `law`, once it was asked for
         self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
         pilot = Pilot(NO_COMMAND, STOPPED, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
@@ -240,15 +243,35 @@ class FlightCore:
         if self._seat is not None:
             self._seat.bind(self.rows)
 
+    @property
+    def law_rows(self) -> Any:
+        """Constants and memory of the law that flies."""
+        return self._law_rows
+
+    @law_rows.setter
+    def law_rows(self, rows: Any) -> None:
+        self._law_rows, self._law = rows, None
+
+    @property
+    def law(self) -> Any:
+        """The law's rows as a tick takes them, with its machine code."""
+        if self._law is None:
+            self._law = law_at(self.rows, self._law_rows)
+        return self._law
+
+    def compile(self) -> Callable[..., int]:
+        """Have that machine code of a tick ready that is the same with all laws."""
+        self._fly = entry_of(fly_tick, self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
+        return self._fly
+
     def step(self, count: int, now_us: int, tick: int, dt: float) -> Report:
         """One tick of `dt` seconds with the first `count` readings of the inbox."""
         self.move_cable(now_us)
-        if self._fly is None:
-            self._fly = entry_of(fly_tick, self.rows, self.law_rows, count, now_us, tick, dt, False)
+        fly = self._fly or self.compile()
         report = _NOTHING
-        if self._fly(self.rows, self.law_rows, count, now_us, tick, dt, False) == TO_DECIDE:
+        if fly(self.rows, self.law, count, now_us, tick, dt, False) == TO_DECIDE:
             report = self.decide(now_us, round(dt * 1e6))
-            self._fly(self.rows, self.law_rows, count, now_us, tick, dt, True)
+            fly(self.rows, self.law, count, now_us, tick, dt, True)
         self.raise_interruption()
         return report
 
@@ -437,7 +460,6 @@ class FlightCore:
             pilot = self.pilot._replace(control_mode=RESTING)
             pack(pilot, self.rows.pilot, 0)
         self.law_rows = rows
-        self._fly = None
         self._follow_cable()
         self.interrupt()
 

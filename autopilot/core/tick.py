@@ -2,16 +2,19 @@
 
 readings -> estimate -> (may the supervisor have something to decide?) -> law -> mixer -> rotors
 
-All that is carried from tick to tick lies in `CoreRows`, flat arrays that `fly_tick` reads and writes; which
-law flies, the compiler sees by the type of the law's rows. Where the supervisor may have something to decide
-the tick stops behind the estimate and says so: `autopilot.core.flight_core` then lets it decide, in Python,
-and calls again for the rest of the tick. No clock, no socket, no hidden state.
+All that is carried from tick to tick lies in `CoreRows`, flat arrays that `fly_tick` reads and writes. The
+law's half of it, `control_tick`, is compiled for each law, which the compiler sees by the type of the law's
+rows, and called by its address: what is common to all laws is compiled once. Where the supervisor may have
+something to decide the tick stops behind the estimate and says so: `autopilot.core.flight_core` then lets it
+decide, in Python, and calls again for the rest of the tick. No clock, no socket, no hidden state.
 """
 
 from __future__ import annotations
 
 from math import isnan
 from typing import Any, NamedTuple
+
+from numba.extending import overload
 
 from autopilot.control.actuators.disturbance_observer import (
     Observed,
@@ -46,7 +49,9 @@ from autopilot.estimation.records import (
     History,
     ImuReading,
 )
-from autopilot.geometry.addresses import call_at, numbers_at
+from autopilot.geometry.addresses import call_at, call_kernel_at, numbers_at
+from autopilot.geometry.compiler import INSIDE
+from autopilot.geometry.entry import native_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above, rows_in, taken
 from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, norm, scale, sub
@@ -137,6 +142,14 @@ class CoreRows(NamedTuple):
     references: Array  # the same as the law is told it: later by its preview
     rotors: Array  # (7, MOST) forces of the rotors and what they are watched by, rows as in the mixer
     table: Array  # (rotors + 1, 10) of the mixer, and what makes the rotors alike
+
+
+class LawAt(NamedTuple):
+    """The rows of any law, and where the machine code of `control_tick` for it is."""
+
+    constants: Row
+    memory: Row
+    control: int
 
 
 @kernel
@@ -381,6 +394,38 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     pack(pilot, rows.pilot, 0)
 
 
+def law_at(rows: CoreRows, law_rows: Any) -> Any:
+    """A law's rows as `fly_tick` takes them: with its machine code, compiled or loaded where need be. Where
+    nothing is compiled, the rows themselves."""
+    if not hasattr(control_tick, "overloads"):
+        return law_rows
+    control = native_address_of(control_tick, rows, law_rows, 0)
+    return LawAt(law_rows.constants, law_rows.memory, control)
+
+
+def any_law(law_rows: Any) -> Any:
+    """The same of no law in particular, to compile for; it cannot be flown."""
+    if not hasattr(control_tick, "overloads"):
+        return law_rows
+    return LawAt(law_rows.constants, law_rows.memory, 0)
+
+
+def control_by(rows: CoreRows, law_rows: Any, now_us: int) -> None:
+    """`control_tick` of the law with these rows."""
+    control_tick(rows, law_rows, now_us)
+
+
+@overload(control_by, jit_options=INSIDE)
+def _control_by(rows: Any, law_rows: Any, now_us: Any) -> Any:
+    def called(rows: Any, law_rows: Any, now_us: Any) -> None:
+        call_kernel_at(law_rows.control, (rows, law_rows.constants, law_rows.memory, now_us))
+
+    def linked(rows: Any, law_rows: Any, now_us: Any) -> None:
+        control_tick(rows, law_rows, now_us)
+
+    return called if getattr(law_rows, "instance_class", None) is LawAt else linked
+
+
 @kernel
 def _to_decide(rows: CoreRows, now_us: int) -> bool:
     stretch, seen = unpack(Stretch, rows.stretch, 0), unpack(Seen, rows.seen, 0)
@@ -419,5 +464,5 @@ def fly_tick(
             return ESTIMATED
         if _to_decide(rows, now_us):
             return TO_DECIDE
-    control_tick(rows, law_rows, now_us)
+    control_by(rows, law_rows, now_us)
     return FLOWN

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, Setup
-from autopilot.core.tick import fly_tick
+from autopilot.core.tick import law_at
 from autopilot.geometry.frames import enu_from_ned
 from autopilot.geometry.linear import E3, ZERO
 from autopilot.geometry.s2 import tangent
@@ -21,9 +21,14 @@ from missions.model import Signals, Sine, Term, Waypoint
 
 
 def rehearse_tick(setup: Setup) -> None:
-    """Run a tick."""
+    """What is the same with all laws."""
+    FlightCore(setup).compile()
+
+
+def rehearse_law(setup: Setup) -> None:
+    """The law's half of a tick."""
     core = FlightCore(setup)
-    fly_tick(core.rows, core.law_rows, 0, 0, 0, 0.0, False)
+    law_at(core.rows, core.law_rows)
 
 
 def rehearse_paths(setup: Setup) -> None:
@@ -51,7 +56,7 @@ def rehearse_paths(setup: Setup) -> None:
     demand(np.zeros((7, 1, 3)), limits.body)  # of paths through waypoints
 
 
-PARTS = {"tick": rehearse_tick, "paths": rehearse_paths}
+PARTS = {"tick": rehearse_tick, "law": rehearse_law, "paths": rehearse_paths}
 
 
 def rehearse(setup: Setup) -> None:

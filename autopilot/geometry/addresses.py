@@ -3,6 +3,11 @@
 `numbers_at(address, size)` are the numbers (float64) at an address, as an array that nobody owns;
 `call_at(function, address)` calls the C function `void f(void *)` at an address with another address. Both
 work in kernels, and where nothing is compiled in Python.
+
+`call_kernel_at(address, arguments)` calls a kernel that was compiled apart and returns nothing,
+`ask_kernel_at` one that returns a whole number. Nothing is checked: the arguments, a tuple, must be of the
+types for which it was compiled (`autopilot.geometry.entry.native_address_of`), or the members of its tuples
+one after another. Both work in kernels alone.
 """
 
 from __future__ import annotations
@@ -42,6 +47,25 @@ def _numbers(context: Any, address: Any, size: Any) -> Any:
     return kind(types.int64, types.int64), lower
 
 
+def _calling(returned: Any) -> Any:
+    """Calls a kernel that returns this type by numba's own convention."""
+
+    def typed(_: Any, address: Any, arguments: Any) -> Any:
+        def lower(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            kinds, caller = signature.args[1].types, context.call_conv
+            function = builder.inttoptr(given[0], caller.get_function_type(returned, kinds).as_pointer())
+            status, found = caller.call_function(
+                builder, function, returned, kinds, cgutils.unpack_tuple(builder, given[1])
+            )
+            with cgutils.if_unlikely(builder, status.is_error):
+                caller.return_status_propagate(builder, status)
+            return context.get_dummy_value() if returned is types.none else found
+
+        return returned(types.int64, arguments), lower
+
+    return intrinsic(typed)
+
+
 def _call(context: Any, function: Any, address: Any) -> Any:
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t])
@@ -54,3 +78,5 @@ def _call(context: Any, function: Any, address: Any) -> Any:
 
 numbers_at: Any = _numbers_in_python if numba.config.DISABLE_JIT else intrinsic(_numbers)
 call_at: Any = _call_in_python if numba.config.DISABLE_JIT else intrinsic(_call)
+call_kernel_at: Any = _calling(types.none)
+ask_kernel_at: Any = _calling(types.int64)

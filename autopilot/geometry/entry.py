@@ -29,6 +29,15 @@ def entry_of(kernel: Callable[..., T], *arguments: Any) -> Callable[..., T]:
     return entry
 
 
+def native_address_of(kernel: Callable[..., T], *arguments: Any) -> int:
+    """The address at which `autopilot.geometry.addresses.call_kernel_at` finds a kernel for arguments of the
+    types of these, compiled or loaded where need be; it stays there as long as the kernel lives."""
+    types = tuple(map(typeof, arguments))
+    kernel.compile(types)  # type: ignore[attr-defined]
+    found = kernel.overloads[types]  # type: ignore[attr-defined]
+    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
+
+
 def address_of(kernel: Callable[..., T], *arguments: Any) -> int:
     """The address of a compiled kernel as a C function of such numbers, compiled or loaded where need be."""
     types = tuple(map(typeof, arguments))

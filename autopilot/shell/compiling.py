@@ -54,8 +54,9 @@ def autopilot_parts(*laws: str) -> tuple[Part, ...]:
     """What the autopilot needs to fly with these laws, the longest first; what they share is there once."""
     module, any_law = "autopilot.shell.warmup", compiled_for(laws)[0]
     return (
+        Part("the autopilot", module, ("tick", any_law), _AUTOPILOT, "tick", 34.0),
         *(
-            Part(f"the {law} autopilot", module, ("tick", law), _AUTOPILOT, f"tick-{law}", 33.0)
+            Part(f"the law {law}", module, ("law", law), _AUTOPILOT, f"law-{law}", 15.0)
             for law in compiled_for(laws)
         ),
         Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 18.0),

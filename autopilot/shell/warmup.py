@@ -1,4 +1,4 @@
-"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|messages|paths LAW."""
+"""Compiles one part of the autopilot: python -m autopilot.shell.warmup tick|law|messages|paths LAW."""
 
 from __future__ import annotations
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import nan, sqrt
+from typing import Any
 
 import numpy as np
 
 from autopilot.core.flight_core import FlightCore, commanded_rate
+from autopilot.core.tick import any_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.packed import packed, place_of, unpack
@@ -30,7 +32,7 @@ from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.cell import Cell, cell_of
-from gcs.sweep.kernel import NO_FIGURES, Figures, fly_stretch
+from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of, fly_stretch
 from gcs.sweep.wire import most_readings, wire_rate
 from missions.model import Mission
 from sitl.hil import HilSimulator
@@ -45,8 +47,8 @@ _NO_ROWS = np.zeros((0, COLUMNS))
 _NEVER = 2**62
 _TICK, _NOW = place_of(World, "tick"), place_of(World, "now_us")
 _SLACK_EVENTS = place_of(World, "plant") + place_of(PlantState, "slack_events")
-# machine code of `fly_stretch`, by the types of the law's rows and of the cable's
-_ENTRIES: dict[tuple[type, type], Callable[..., bool]] = {}
+# machine code of `fly_stretch` and of what it calls, by the type of the cable's rows
+_ENTRIES: dict[type, tuple[Callable[..., bool], Code]] = {}
 _LOAD_CARRIED = (Phase.HOLD, Phase.MISSION, Phase.RETURN)
 
 
@@ -157,26 +159,26 @@ class SweptFlight:
         self._judge(self.now_us)
 
     def _fly(self, begun: bool, decided: bool, gripper_open: bool, reel_rate: float, stop_tick: int) -> bool:
-        law = type(self.core.law_rows)
-        arguments = (
-            self.world,
-            self.core.rows,
-            self.core.law_rows,
-            self.cell.wire,
-            self.figures,
-            self.asked,
-            self.trace,
-            begun,
-            decided,
-            gripper_open,
-            reel_rate,
-            stop_tick,
-            self.chain,
-        )
-        entry = (law, type(self.chain))
-        if entry not in _ENTRIES:
-            _ENTRIES[entry] = entry_of(fly_stretch, *arguments)
-        return _ENTRIES[entry](*arguments)
+        fly, code = self._entry()
+        rest = (begun, decided, gripper_open, reel_rate, stop_tick, self.chain)
+        return fly(code, self.world, self.core.rows, self.core.law, *self._own, *rest)
+
+    @property
+    def _own(self) -> tuple[Any, ...]:
+        return self.cell.wire, self.figures, self.asked, self.trace
+
+    def _entry(self) -> tuple[Callable[..., bool], Code]:
+        kind = type(self.chain)
+        if kind not in _ENTRIES:
+            world, core, law = self.world, self.core.rows, any_law(self.core.law_rows)
+            code = code_of(world, core, law, self.chain)
+            rest = (False, False, False, 0.0, 0, self.chain)
+            _ENTRIES[kind] = entry_of(fly_stretch, code, world, core, law, *self._own, *rest), code
+        return _ENTRIES[kind]
+
+    def compile(self) -> None:
+        """Have that machine code ready that is the same with all laws."""
+        self._entry()
 
     @property
     def tick(self) -> int:

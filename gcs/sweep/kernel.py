@@ -1,15 +1,21 @@
 """A stretch of flight in one call of machine code: the tick of the world and the tick of the autopilot, in
 turn.
 
-Both are the functions that fly in the processes (`sitl.world.world_tick`, `autopilot.core.tick.fly_tick`);
-what is added is the rounding of the wire between them, and the figures of the flight.
+Both are the functions that fly in the processes (`sitl.world.world_tick`, `autopilot.core.tick.fly_tick`),
+and their very machine code; what is added is the rounding of the wire between them, and the figures of the
+flight.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from numba.extending import overload
+
 from autopilot.core.tick import FLOWN, TO_DECIDE, CoreRows, Pilot, Seen, fly_tick, row_at, vector_at
+from autopilot.geometry.addresses import ask_kernel_at, call_kernel_at
+from autopilot.geometry.compiler import INSIDE
+from autopilot.geometry.entry import native_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack
@@ -73,6 +79,62 @@ def count(figures: Row, world: WorldRows, core: CoreRows, target: Vec3, asked: V
     pack(after, figures, 0)
 
 
+class Code(NamedTuple):
+    """Where the machine code of the two ticks is; 0 where nothing is compiled."""
+
+    world: int
+    fly: int
+
+
+def code_of(world: WorldRows, core: CoreRows, law_rows: Any, chain: ChainRows | None) -> Code:
+    """The code of the two ticks for such rows, compiled or loaded where need be; of any law."""
+    if not hasattr(fly_tick, "overloads"):
+        return Code(0, 0)
+    return Code(
+        native_address_of(world_tick, world, world.rotors[ASKED], False, 0.0, chain),
+        native_address_of(fly_tick, core, law_rows, 0, 0, 0, 0.0, False),
+    )
+
+
+def _move_world(
+    code: Code, world: WorldRows, gripper_open: bool, reel_rate: float, chain: ChainRows | None
+) -> None:
+    world_tick(world, world.rotors[ASKED], gripper_open, reel_rate, chain)
+
+
+@overload(_move_world, jit_options=INSIDE)
+def _world_moved(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> Any:
+    def called(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> None:
+        call_kernel_at(code.world, (world, world.rotors[ASKED], gripper_open, reel_rate, chain))
+
+    return called
+
+
+def _step(
+    code: Code,
+    core: CoreRows,
+    law_rows: Any,
+    readings: int,
+    now_us: int,
+    tick: int,
+    dt: float,
+    decided: bool,
+) -> int:
+    return fly_tick(core, law_rows, readings, now_us, tick, dt, decided)
+
+
+@overload(_step, jit_options=INSIDE)
+def _stepped(
+    code: Any, core: Any, law_rows: Any, readings: Any, now_us: Any, tick: Any, dt: Any, decided: Any
+) -> Any:
+    def called(
+        code: Any, core: Any, law_rows: Any, readings: Any, now_us: Any, tick: Any, dt: Any, decided: Any
+    ) -> Any:
+        return ask_kernel_at(code.fly, (core, law_rows, readings, now_us, tick, dt, decided))
+
+    return called
+
+
 @kernel
 def _trace(trace: Floats, world: World, rotors: Floats, count: int) -> None:
     if world.tick < trace.shape[0]:
@@ -88,6 +150,7 @@ def _trace(trace: Floats, world: World, rotors: Floats, count: int) -> None:
 
 @kernel
 def fly_stretch(
+    code: Code,
     world: WorldRows,
     core: CoreRows,
     law_rows: Any,
@@ -114,13 +177,13 @@ def fly_stretch(
     while True:
         if begun and not decided:
             put_forces(core.rotors, core.table, world)
-            world_tick(world, world.rotors[ASKED], gripper_open, reel_rate, chain)
+            _move_world(code, world, gripper_open, reel_rate, chain)
         begun = True
         now = unpack(World, world.world, 0)
         _trace(trace, now, world.rotors, world.rotor_table.shape[0])
         readings = 0 if decided else deliver(world, now.now_us, link, core.inbox)
         dt = 0.0 if now.tick == 0 else tick_us * 1e-6
-        came = fly_tick(core, law_rows, readings, now.now_us, now.tick, dt, decided)
+        came = _step(code, core, law_rows, readings, now.now_us, now.tick, dt, decided)
         decided = False
         if came == TO_DECIDE:
             return True

@@ -119,7 +119,7 @@ def fingerprints() -> dict[str, str]:
             for tick in range(4):
                 now_us = begin_us + tick * TICK_US
                 count = put_hover(core, now_us, 8 + tick)
-                came = fly_tick(core.rows, core.law_rows, count, now_us, 8 + tick, TICK_US * 1e-6, False)
+                came = fly_tick(core.rows, core.law, count, now_us, 8 + tick, TICK_US * 1e-6, False)
                 assert came == FLOWN
             for array, row in rows_of(core).items():
                 found[f"{law.name}, {name}: {array}"] = hashlib.sha256(row.tobytes()).hexdigest()[:12]
@@ -175,10 +175,10 @@ def test_no_reading_makes_the_estimate_or_a_force_no_number(begun: bool, script:
         now_us = begin_us + tick * TICK_US
         count = put_rows(core, script[tick % len(script)], now_us)
         flown = (count, now_us, 8 + tick, TICK_US * 1e-6)
-        came = fly_tick(core.rows, core.law_rows, *flown, False)
+        came = fly_tick(core.rows, core.law, *flown, False)
         assert np.isfinite(numbers_of(core)).all()
         if came == TO_DECIDE:
-            fly_tick(core.rows, core.law_rows, *flown, True)
+            fly_tick(core.rows, core.law, *flown, True)
         assert all(0.0 <= force <= core.setup.vehicle.rotor_max for force in core.forces)
 
 

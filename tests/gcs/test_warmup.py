@@ -29,15 +29,15 @@ def nothing_compiled(tmp_path, monkeypatch):
 
 def test_a_flight_needs_its_law_alone():
     marks = [part.mark for part in flight_parts(["lqr"])]
-    assert set(marks) == {"tick-lqr", "messages", "paths", "world", "check", "report"}
+    assert set(marks) == {"tick", "law-lqr", "messages", "paths", "world", "check", "report"}
     both = [part.mark for part in flight_parts(["lqr", "thesis"])]
-    assert sorted(both) == sorted({*marks, "tick-thesis"})
+    assert sorted(both) == sorted({*marks, "law-thesis"})
 
 
 def test_a_sweep_needs_no_report_but_flights_of_its_own():
     marks = [part.mark for part in sweep_parts(["lqr", "thesis"])]
-    fly = {"tick-lqr", "tick-thesis", "messages", "paths", "world"}
-    assert sorted(marks) == sorted({*fly, "alone-lqr", "alone-thesis"})
+    fly = {"tick", "law-lqr", "law-thesis", "messages", "paths", "world"}
+    assert sorted(marks) == sorted({*fly, "alone"})
 
 
 def test_what_is_compiled_is_not_compiled_again_and_the_longest_part_comes_first(tmp_path):
