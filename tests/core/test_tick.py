@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from autopilot.control.laws import LAWS
 from autopilot.core.flight_core import FlightCore
-from autopilot.core.tick import FLOWN, TO_DECIDE, fly_tick, sense
+from autopilot.core.tick import FLOWN, TO_DECIDE, fly_tick
 from autopilot.estimation import inbox as box
 from autopilot.estimation.filter import complaints
 from autopilot.estimation.records import ImuReading, LoadReading, PoseReading
@@ -83,12 +83,17 @@ def hold(core: FlightCore, mode: int, now_us: int) -> None:
     pack(stretch, core.rows.stretch, 0)
 
 
+def sense(core: FlightCore, count: int, now_us: int, tick: int, dt: float = TICK_US * 1e-6) -> None:
+    """The first half of a tick, behind which the supervisor is asked: nothing was decided yet."""
+    assert fly_tick(core.rows, core.law, count, now_us, tick, dt, False) == TO_DECIDE
+
+
 def settled(law: int = 2, ticks: int = 8) -> FlightCore:
     """A core whose estimate has begun."""
     core = new_core(CTL_LAW=law)
     for tick in range(ticks):
         now_us = BEGIN_US + tick * TICK_US
-        sense(core.rows, put_hover(core, now_us, tick), now_us, 0.0 if tick == 0 else TICK_US * 1e-6)
+        sense(core, put_hover(core, now_us, tick), now_us, tick, 0.0 if tick == 0 else TICK_US * 1e-6)
     return core
 
 
@@ -188,10 +193,10 @@ def test_behind_any_readings_honest_ones_settle_the_estimate_again(script: list[
     core = settled()
     for tick in range(8, 8 + REPEATS):
         now_us = BEGIN_US + tick * TICK_US
-        sense(core.rows, put_rows(core, script[tick % len(script)], now_us), now_us, TICK_US * 1e-6)
+        sense(core, put_rows(core, script[tick % len(script)], now_us), now_us, tick)
     for tick in range(8 + REPEATS, 8 + REPEATS + 750):
         now_us = BEGIN_US + tick * TICK_US
-        sense(core.rows, put_hover(core, now_us, tick), now_us, TICK_US * 1e-6)
+        sense(core, put_hover(core, now_us, tick), now_us, tick)
     assert complaints(core.estimator, core.settings.failsafe.sensor_age_limit_s) == ()
     assert core.state.x_load == pytest.approx((0.0, 0.0, HOVER_M), abs=0.02)
 
