@@ -65,7 +65,7 @@ class Witness:
     tilt: float = 0.0  # greatest of all, rad
     yaw: float = 0.0  # the last one, rad from north
     texts: list[str] = field(default_factory=list)
-    attitudes: list[float] = field(default_factory=list)  # wall clock at which ATTITUDE came, s
+    attitudes: list[tuple[float, float]] = field(default_factory=list)  # ATTITUDE: wall, vehicle's clock, s
     _over: threading.Event = field(default_factory=threading.Event)
 
     def watch(self) -> None:
@@ -85,7 +85,7 @@ class Witness:
                 if self.phases[-1:] != [message.phase]:
                     self.phases.append(message.phase)
             case mavlink.MAVLINK_MSG_ID_ATTITUDE:
-                self.attitudes.append(time.monotonic())
+                self.attitudes.append((time.monotonic(), 1e-3 * message.time_boot_ms))
                 self.tilt = max(self.tilt, abs(message.roll), abs(message.pitch))
                 self.yaw = message.yaw
             case mavlink.MAVLINK_MSG_ID_STATUSTEXT:
@@ -104,10 +104,12 @@ class Witness:
         true = np.stack([np.interp(asked_times, times, track) for track in tracks], axis=1)
         return float(np.linalg.norm(true - asked, axis=1).max())
 
-    def longest_silence(self, begin: float, end: float) -> float:
-        """Of ATTITUDE, s of the wall clock."""
-        times = [begin, *(t for t in self.attitudes if begin < t < end), end]
-        return max(after - before for before, after in pairwise(times))
+    def longest_silence(self, begin: float, end: float) -> tuple[float, float]:
+        """Of ATTITUDE, between two times of the wall clock: s of that, and s of the vehicle's clock."""
+        heard = [(wall, own) for wall, own in self.attitudes if begin < wall < end]
+        walls = [begin, *(wall for wall, _ in heard), end]
+        of_wall = max(after - before for before, after in pairwise(walls))
+        return of_wall, max(after - before for (_, before), (_, after) in pairwise(heard))
 
     def close(self) -> None:
         self._over.set()
