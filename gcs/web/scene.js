@@ -4,6 +4,8 @@
 (() => {
   const GROUND_D = 0;
   const PROCESSOR_MS = 100;
+  const PROCESSOR_REST = 4; // times as long as a picture took, before the next
+  const LONGEST_MS = 1000;
   const CLICK_PX = 4; // a pointer that moved further turns the camera and picks nothing
   // x east, y up, z south are the axes of three.js
   const NED_TO_SCENE = new THREE.Matrix4().set(0, 1, 0, 0, 0, 0, -1, 0, -1, 0, 0, 0, 0, 0, 0, 1);
@@ -24,8 +26,9 @@
         rotors: options.rotors || Plumbline.frameOf(arm, 4),
       };
       this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+      this.byProcessor = drawnByProcessor(this.renderer.getContext());
       /** The least time between two pictures of what moves, ms: the flights run on the processor too. */
-      this.interval = drawnByProcessor(this.renderer.getContext()) ? PROCESSOR_MS : 0;
+      this.interval = this.byProcessor ? PROCESSOR_MS : 0;
       this.scene = new THREE.Scene();
       this.world = new THREE.Group();
       this.world.quaternion.setFromRotationMatrix(NED_TO_SCENE);
@@ -337,7 +340,13 @@
       this.scene.fog.near = 3 * distance + 2;
       this.scene.fog.far = 14 * distance + 12;
       this.places.spreadGround(this.controls.target, distance);
+      const began = performance.now();
       this.renderer.render(this.scene, this.eye);
+      if (!this.byProcessor) return;
+      const gl = this.renderer.getContext();
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // back once the picture is drawn
+      const rest = PROCESSOR_REST * (performance.now() - began);
+      this.interval = Math.min(Math.max(PROCESSOR_MS, rest), LONGEST_MS);
     }
 
     dispose() {
