@@ -35,7 +35,7 @@ fly: $(STAMP) ## fly Case B through three real processes and show the report
 	$(BIN)/gcs fly case-b --sensors lab
 
 test: $(DEV_STAMP) ## run the tests
-	@$(BIN)/pytest --numprocesses 2 --dist loadfile -m processes & clocked=$$!; \
+	@$(BIN)/pytest --numprocesses 2 --dist loadfile -m processes $$(grep -rl --include="*.py" mark.processes tests) & clocked=$$!; \
 	$(BIN)/pytest --numprocesses auto --maxprocesses 4 --dist worksteal -m 'not processes'; others=$$?; \
 	wait $$clocked && exit $$others # those of processes keep to the wall clock and mostly wait
 

@@ -32,7 +32,7 @@ from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
 from gcs.sweep.cell import Cell, cell_of
-from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of, fly_stretch
+from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of_autopilot, code_of_world, fly_stretch
 from gcs.sweep.wire import most_readings, wire_rate
 from missions.model import Mission
 from sitl.hil import HilSimulator
@@ -171,7 +171,7 @@ class SweptFlight:
         kind = type(self.chain)
         if kind not in _ENTRIES:
             world, core, law = self.world, self.core.rows, any_law(self.core.law_rows)
-            code = code_of(world, core, law, self.chain)
+            code = Code(code_of_world(world, self.chain), code_of_autopilot(core, law))
             rest = (False, False, False, 0.0, 0, self.chain)
             _ENTRIES[kind] = entry_of(fly_stretch, code, world, core, law, *self._own, *rest), code
         return _ENTRIES[kind]

@@ -86,23 +86,28 @@ class Code(NamedTuple):
     fly: int
 
 
-def code_of(world: WorldRows, core: CoreRows, law_rows: Any, chain: ChainRows | None) -> Code:
-    """The code of the two ticks for such rows, compiled or loaded where need be; of any law."""
+def code_of_world(world: WorldRows, chain: ChainRows | None = None) -> int:
+    """The address of the world's tick for such rows, compiled or loaded where need be."""
+    if not hasattr(world_tick, "overloads"):
+        return 0
+    return native_address_of(world_tick, world, world.rotors[ASKED], False, 0.0, chain)
+
+
+def code_of_autopilot(core: CoreRows, law_rows: Any) -> int:
+    """The address of the autopilot's tick for such rows, of any law, compiled or loaded where need be."""
     if not hasattr(fly_tick, "overloads"):
-        return Code(0, 0)
-    return Code(
-        native_address_of(world_tick, world, world.rotors[ASKED], False, 0.0, chain),
-        native_address_of(fly_tick, core, law_rows, 0, 0, 0, 0.0, False),
-    )
+        return 0
+    return native_address_of(fly_tick, core, law_rows, 0, 0, 0, 0.0, False)
 
 
-def _move_world(
+def move_world(
     code: Code, world: WorldRows, gripper_open: bool, reel_rate: float, chain: ChainRows | None
 ) -> None:
+    """`world_tick` by its address."""
     world_tick(world, world.rotors[ASKED], gripper_open, reel_rate, chain)
 
 
-@overload(_move_world, jit_options=INSIDE)
+@overload(move_world, jit_options=INSIDE)
 def _world_moved(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> Any:
     def called(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain: Any) -> None:
         call_kernel_at(code.world, (world, world.rotors[ASKED], gripper_open, reel_rate, chain))
@@ -110,7 +115,7 @@ def _world_moved(code: Any, world: Any, gripper_open: Any, reel_rate: Any, chain
     return called
 
 
-def _step(
+def fly_autopilot(
     code: Code,
     core: CoreRows,
     law_rows: Any,
@@ -120,10 +125,11 @@ def _step(
     dt: float,
     decided: bool,
 ) -> int:
+    """`fly_tick` by its address."""
     return fly_tick(core, law_rows, readings, now_us, tick, dt, decided)
 
 
-@overload(_step, jit_options=INSIDE)
+@overload(fly_autopilot, jit_options=INSIDE)
 def _stepped(
     code: Any, core: Any, law_rows: Any, readings: Any, now_us: Any, tick: Any, dt: Any, decided: Any
 ) -> Any:
@@ -177,13 +183,13 @@ def fly_stretch(
     while True:
         if begun and not decided:
             put_forces(core.rotors, core.table, world)
-            _move_world(code, world, gripper_open, reel_rate, chain)
+            move_world(code, world, gripper_open, reel_rate, chain)
         begun = True
         now = unpack(World, world.world, 0)
         _trace(trace, now, world.rotors, world.rotor_table.shape[0])
         readings = 0 if decided else deliver(world, now.now_us, link, core.inbox)
         dt = 0.0 if now.tick == 0 else tick_us * 1e-6
-        came = _step(code, core, law_rows, readings, now.now_us, now.tick, dt, decided)
+        came = fly_autopilot(code, core, law_rows, readings, now.now_us, now.tick, dt, decided)
         decided = False
         if came == TO_DECIDE:
             return True

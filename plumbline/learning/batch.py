@@ -14,7 +14,7 @@ from autopilot.control.actuators.mixer import new_rotors
 from autopilot.control.records import State
 from autopilot.control.thesis_cascade import ThesisMemory
 from autopilot.core.flight_core import FlightCore
-from autopilot.core.tick import Seen
+from autopilot.core.tick import CoreConstants, Seen, any_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.estimation.records import History, new_history
 from autopilot.geometry.entry import entry_of
@@ -23,6 +23,7 @@ from autopilot.guidance.layout import COLUMNS
 from autopilot.trajectory.signals import Jet
 from autopilot.vehicle.layout import MOST
 from autopilot.vehicle.rotors import allocate
+from gcs.sweep.kernel import Code, code_of_autopilot, code_of_world
 from plumbline.learning.actions import Mixing
 from plumbline.learning.beginning import (
     V_LOAD,
@@ -43,7 +44,7 @@ from plumbline.learning.records import (
     Senses,
 )
 from plumbline.learning.scenario import Draw, Scenario
-from plumbline.learning.step import jet_at, run_some, true_state
+from plumbline.learning.step import LAW_EVERY, jet_at, run_some, true_state
 from sitl.plant.records import PlantState
 from sitl.world import Floats, World
 
@@ -165,9 +166,11 @@ class Episodes:
         scenario, n = self.scenario, self.count
         room, capacity = scenario.roomiest()
         rows = scenario.world(scenario.draw(np.random.default_rng(0)))[0]
-        senses = None
+        senses, autopilot = None, 0
         if scenario.estimated:
-            senses = self._senses(rows.queue.shape[0] * capacity + len(rows.rotor_table))
+            core = FlightCore(scenario.cell.setup)
+            senses = self._senses(core, rows.queue.shape[0] * capacity + len(rows.rotor_table))
+            autopilot = code_of_autopilot(core.rows, senses.law)
         return Batch(
             world=np.zeros((n, width(World))),
             model=np.zeros((n, len(rows.model))),
@@ -190,16 +193,19 @@ class Episodes:
             task=scenario.row,
             reference=scenario.reference,
             senses=senses,
+            code=Code(code_of_world(rows), autopilot),
         )
 
-    def _senses(self, readings: int) -> Senses:
-        """The estimators, which know nothing yet."""
+    def _senses(self, core: FlightCore, readings: int) -> Senses:
+        """The estimators, which know nothing yet, for an autopilot whose law has its turn every second
+        tick."""
         n = self.count
-        core = FlightCore(self.scenario.cell.setup)
         pilot = core.pilot
         weight = self.scenario.task.action.weight
         core.rows.commands[:, 0] = weight
         pack(pilot._replace(thrust=weight, observed=pilot.observed._replace(support=0.0)), core.rows.pilot, 0)
+        constants = unpack(CoreConstants, core.rows.constants, 0)
+        pack(constants._replace(control_every=LAW_EVERY), core.rows.constants, 0)
         self._blank = core.rows
         inbox = new_inbox(readings)
 
@@ -217,6 +223,7 @@ class Episodes:
             winch=core.rows.winch,
             stretch=core.rows.stretch,
             none=np.zeros((1, COLUMNS)),
+            law=any_law(core.law_rows),
             wire=self.scenario.cell.wire,
         )
 

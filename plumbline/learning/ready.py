@@ -11,7 +11,7 @@ from plumbline.learning.options import EnvOptions
 from plumbline.learning.scenario import Scenario
 
 _SOURCE = ROOT / "plumbline" / "learning" / "batch.py"
-_COST_S = {"truth": 15.0, "estimate": 30.0}
+_COST_S = {"truth": 9.0, "estimate": 17.0}
 
 
 def part_of(observation: str) -> Part:

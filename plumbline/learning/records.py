@@ -16,6 +16,7 @@ from autopilot.control.thesis_cascade import ThesisFilters, ThesisGains
 from autopilot.estimation.records import History
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import Row
+from gcs.sweep.kernel import Code
 from sitl.world import Floats, Ints
 
 ROTORS, RATES, ACCELERATION = range(3)  # what an action means
@@ -93,6 +94,7 @@ class Senses(NamedTuple):
     winch: Row
     stretch: Row
     none: Floats  # no setpoints: (1, 21)
+    law: Any  # of no law in particular, as `autopilot.core.tick.any_law` makes it
     wire: Row
 
 
@@ -121,6 +123,7 @@ class Batch(NamedTuple):
     task: Row  # TaskModel
     reference: Floats  # (ticks, 21) where the load is to be
     senses: Any  # Senses; None: the truth is observed
+    code: Code  # of the ticks of world and autopilot
 
 
 Actions = NDArray[np.float32]

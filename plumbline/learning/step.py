@@ -1,7 +1,8 @@
 """A step of many environments in one call of machine code: the tick of the world, and before each the action.
 
 `sitl.world.world_tick` moves the world, rounding and sensors included, as in every flight. Where the estimate
-is observed the readings go through the autopilot's own estimator (`autopilot.core.tick.sense`).
+is observed the readings go through the autopilot's own estimator, in ticks of `autopilot.core.tick.fly_tick`
+in which the law has no turn. Both are the very machine code of a flight, so that there is little to compile.
 """
 
 from __future__ import annotations
@@ -14,22 +15,24 @@ from autopilot.control.actuators.rotor_model import Actuation
 from autopilot.control.actuators.rotor_model import advance as actuate
 from autopilot.control.records import Reference, State, with_length
 from autopilot.control.thesis_cascade import ThesisMemory, load_position, start
-from autopilot.core.tick import CoreConstants, CoreRows, Pilot, Seen, Winch, sense
+from autopilot.core.tick import CoreConstants, CoreRows, Pilot, Seen, Winch
 from autopilot.estimation.records import History
 from autopilot.geometry.kernel import kernel, threaded
 from autopilot.geometry.linear import E1, ZERO, Vec3, norm, scale, sub
 from autopilot.geometry.packed import pack, unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.signals import Jet
+from gcs.sweep.kernel import Code, fly_autopilot, move_world
 from gcs.sweep.wire import Wire, deliver, put_forces
 from plumbline.learning.actions import Mixing, carry_out, within
 from plumbline.learning.observations import look
 from plumbline.learning.records import Actions, Batch, Episode, Observations, Reward, Senses, TaskModel
 from sitl.plant.records import PlantState
-from sitl.plant.rotors import ASKED
-from sitl.world import World, WorldModel, WorldRows, world_tick
+from sitl.world import World, WorldModel, WorldRows
 
 FLYING, CRASHED, ENDED = 0, 1, 2
+LAW_EVERY = 2  # ticks; of these the estimator has the odd one
+_ODD = 1
 
 
 @kernel
@@ -152,17 +155,17 @@ def _believe(senses: Senses, i: int, mixed: MixerResult) -> None:
 
 
 @kernel
-def _tick(senses: Any, i: int, rows: WorldRows, mixed: MixerResult, mixing: Mixing) -> PlantState:
+def _tick(senses: Any, code: Code, i: int, rows: WorldRows, mixed: MixerResult, mixing: Mixing) -> PlantState:
     """The world at the next tick, and the estimate of it; the true state."""
     put_forces(mixing.rotors, mixing.table, rows)
     if senses is not None:
         _believe(senses, i, mixed)
-    world_tick(rows, rows.rotors[ASKED], False, 0.0)
+    move_world(code, rows, False, 0.0, None)
     if senses is not None:
         now = unpack(World, rows.world, 0)
         readings = deliver(rows, now.now_us, unpack(Wire, senses.wire, 0), senses.inbox[i])
         dt = unpack(WorldModel, rows.model, 0).tick_us * 1e-6
-        sense(_core(senses, i, mixing), readings, now.now_us, dt)
+        fly_autopilot(code, _core(senses, i, mixing), senses.law, readings, now.now_us, _ODD, dt, False)
     return unpack(World, rows.world, 0).plant
 
 
@@ -204,7 +207,7 @@ def _step_one(
     crashed, tick = False, 0
     while tick < task.ticks and not crashed:
         memory, mixed = carry_out(action, _known(batch.senses, plant, i), memory, task.action, mixing)
-        plant = _tick(batch.senses, i, rows, mixed, mixing)
+        plant = _tick(batch.senses, batch.code, i, rows, mixed, mixing)
         down = plant.vehicle_on_ground > 0.0 or plant.load_on_ground > 0.0
         crashed = down or plant.diverged > 0.0
         tick += 1
@@ -238,7 +241,7 @@ def _settle(senses: Any, batch: Batch, i: int, task: TaskModel, end: Vec3, veloc
             memory, true_state(plant), reference, model.gains, model.filters, model.vehicle
         )
         mixed = mix(command.thrust, command.moment, model.vehicle, model.limited, mixing.table, mixing.rotors)
-        plant = _tick(senses, i, rows, mixed, mixing)
+        plant = _tick(senses, batch.code, i, rows, mixed, mixing)
 
 
 @kernel

@@ -100,7 +100,7 @@ def mavsdk_and_two_ground_stations(stage: Stage) -> Watched:
         "log",
     )
     finished = stage.program("mavsdk_flight.py", f"udpin://{LOOPBACK}:{stage.api}", *steps, *more)
-    stays.expect("Cable taut, lifting the load")
+    stage.wait_for("Cable taut, lifting the load")
     vanishes.type("wp list")
     said = vanishes.end()
     killed = time.monotonic()
@@ -136,7 +136,8 @@ def test_a_ground_station_that_vanishes_disturbs_nobody(
     flight = mavsdk_and_two_ground_stations()
     assert complaints(flight.stays) == complaints(flight.vanishes) == []
     assert "COMMAND_ACK" not in flight.stays, "an answer to somebody else"
-    assert "Landed, disarmed" in flight.stays
+    # a text is said once, and a busy MAVProxy can miss it; this it takes from the heartbeats
+    assert "DISARMED" in flight.stays.partition("TAKEOFF>")[2]
     assert [text for text in flight.witness.texts if complaints(text)] == []
     assert FAILSAFE not in flight.witness.phases
     # measured 3.5 mm, with motion capture
