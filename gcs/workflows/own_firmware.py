@@ -124,6 +124,7 @@ def _px4(
 
 
 _BEGINNINGS = {"ardupilot": _ardupilot, "px4": _px4}
+_IN_TURN = ("ardupilot",)  # whose flight is done by one thread, which waits while the simulator works
 
 
 def fly_firmware(
@@ -138,10 +139,16 @@ def fly_firmware(
 ) -> FirmwareFlight:
     """Fly with the simulator and the firmware that were started for it."""
     client = firmware_client(mission, options, FIRMWARES[program.kind], Home())
+
+    def begun() -> None:
+        watch.start()
+        if options.speed is None and program.kind in _IN_TURN:
+            own.processes.share_one_core()
+
     with FlightDisplay(mission.name, options.quiet) as display:
         capture = Capture(log, unix_us())
         run_wall_clock(
-            *(client, capture, own.vehicle, own.truth, own.processes.ended, display, stop, watch.start, page)
+            *(client, capture, own.vehicle, own.truth, own.processes.ended, display, stop, begun, page)
         )
         client.explain_silence(own.processes.stopped())
         watch.stop()
