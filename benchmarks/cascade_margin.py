@@ -218,7 +218,7 @@ def plumbline_law(settings: Settings, vehicle: Vehicle) -> tuple[Callable[[Array
         queue = np.zeros((rows + 1, 4))
         queue[:rows] = numbers[LAW_MEMORY:-MOTION].reshape(rows, 4)
         actuation = Actuation(queue, float(numbers[1]), _vec(numbers[2:5]))
-        position = plumbline.PlumblineMemory(float(numbers[0]), _vec(numbers[5:8]))
+        position = plumbline.PlumblineMemory(float(numbers[0]), _vec(numbers[5:8]), 1.0)
         memory, command = load_position(
             built, PlumblineMemory(position, others), state, reference, actuation, observed, cable
         )

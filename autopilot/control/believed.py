@@ -60,6 +60,12 @@ def believed_rotor_watch(table: ParameterTable) -> float:
     return period / (ROTOR_PATIENCE * silent + period)
 
 
+def believed_factor_share(table: ParameterTable) -> float:
+    """Share of a period in the time constant with which the speeds of the rotors tell their thrust factor."""
+    period, time = 1.0 / table["CTL_RATE_HZ"], table["CTL_T_THRUST"]
+    return min(1.0, period / time) if time > 0.0 else 0.0
+
+
 def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:
     """The gains of `plumbline` for the vehicle that the parameters describe."""
     lag, shown = 1e-3 * table["VEH_ROTOR_TAU"], 1e-3 * table["PLB_LAG_TO_MS"]

@@ -24,6 +24,9 @@ What the thesis filters is computed here:
   three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
 * The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
   count.
+* Where turning the vehicle takes much of what the rotors can give, load and cable are followed more slowly
+  for a while: their bandwidths are multiplied by `pace`. Three loops inside each other hold on to what
+  saturates by turns the longer the faster they are; a slower pace asks for less.
 * f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
 
 Memory comes in and goes out. `thrust` of `load_position` is what the rotors give at this instant, which the
@@ -49,6 +52,7 @@ from autopilot.control.quad_attitude import AttitudeCommand, attitude_from_axes,
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis_cascade import attitude_towards
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import (
     Vec3,
     add,
@@ -81,6 +85,11 @@ _LEAST_LIFT = 0.2
 # of the pull along the cable: what errors may exert across it at most, besides what the reference asks for
 _GREATEST_ACROSS = 0.7
 _GREATEST_RATE = 15.0  # rad/s
+LEAST_PACE = 0.5
+# share of the moment about a level axis that counts as much; s, in which so much of it again would stop load
+# and cable, and in which they are back at their full pace
+_MUCH = 0.55
+_SLOWING_TIME, _HASTENING_TIME = 0.005, 0.3
 _FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
 
 
@@ -101,6 +110,7 @@ class PlumblineMemory(NamedTuple):
 
     thrust_rate: float  # f', N/s
     integral: Vec3  # e_i, of e_x, m s
+    pace: float  # at which load and cable are followed; 1: as designed
 
 
 class WantedForce(NamedTuple):
@@ -126,7 +136,7 @@ PLUMBLINE_GAINS = PlumblineGains(
 @kernel
 def start() -> PlumblineMemory:
     """Memory of a law that begins now: the thrust is taken for steady."""
-    return PlumblineMemory(0.0, (0.0, 0.0, 0.0))
+    return PlumblineMemory(0.0, (0.0, 0.0, 0.0), 1.0)
 
 
 @kernel
@@ -141,6 +151,31 @@ def no_longer(v: Vec3, greatest: float) -> Vec3:
     """v, shortened to `greatest` where it is longer."""
     n = norm(v)
     return v if n <= greatest else scale(greatest / n, v)
+
+
+@kernel
+def paced(gains: PlumblineGains, pace: float) -> PlumblineGains:
+    """The gains whose loops of load and cable have so many times the bandwidth."""
+    square = pace * pace
+    return PlumblineGains(
+        gains.k_R,
+        gains.k_Omega,
+        square * gains.k_q,
+        pace * gains.k_omega,
+        scale(square, gains.k_x),
+        scale(pace, gains.k_v),
+        scale(pace * square, gains.k_i),
+    )
+
+
+@kernel
+def next_pace(pace: float, moment: Vec3, period: float, vehicle: Vehicle) -> float:
+    """The pace a period (s) later, the law having asked for this moment (N m)."""
+    whole = 0.5 * vehicle.level * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min)
+    beyond = norm((moment[0], moment[1], 0.0)) / (_MUCH * whole) - 1.0
+    slower = max(LEAST_PACE, pace * (1.0 - period / _SLOWING_TIME * min(max(beyond, 0.0), 1.0)))
+    faster = min(1.0, pace + period / _HASTENING_TIME)
+    return if_above(beyond, 0.0, slower, faster)
 
 
 @kernel
@@ -299,6 +334,7 @@ def load_position(
     to the vehicle besides drag in still air; `period`, s, is that of the law.
     """
     jet = reference.jet
+    gains = paced(gains, memory.pace)
     air = add(air_force(state.v_quad, drag), push)
     motion = load_motion(state, thrust, memory.thrust_rate, air, vehicle)
     wanted = wanted_force(state, motion, air, jet, memory.integral, gains, vehicle)
@@ -365,4 +401,5 @@ def load_position(
         integral = scale(GREATEST_HELD * weight / held, integral)
     fastest = vehicle.lift * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
     thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
-    return PlumblineMemory(thrust_rate, integral), command
+    pace = next_pace(memory.pace, result.moment, period, vehicle)
+    return PlumblineMemory(thrust_rate, integral, pace), command

@@ -86,6 +86,7 @@ class Setup:
     control_every: int  # ticks
     layout: Layout = PLUS
     rotor_watch: float = 1.0  # as of `believed_rotor_watch`
+    factor_share: float = 0.0  # as of `believed_factor_share`
     own: OwnSetup | None = None  # the law that somebody has brought, if it is the one that flies
     estimator: OwnSetup | None = None  # the estimator that somebody has brought
     planner: OwnSetup | None = None  # the same of paths through waypoints
@@ -123,7 +124,7 @@ class FlightCore:
         self._fly: Callable[..., int] | None = None  # the tick's machine code, once it was run
         self._law: Any = None  # `law`, once it was asked for
         self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
-        pilot = Pilot(NO_COMMAND, STOPPED, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
+        pilot = Pilot(NO_COMMAND, STOPPED, 1.0, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
             estimator=packed(blank_state()),
             pilot=packed(pilot),
@@ -317,6 +318,7 @@ class FlightCore:
             setup.control_every,
             setup.settings.failsafe.sensor_age_limit_s,
             setup.rotor_watch,
+            setup.factor_share,
             rotors.can_fly_without(self._lost) and not rotors.can_hold_heading_without(self._lost),
             *(self._seat.link if self._seat is not None else (0, 0)),
         )

@@ -23,9 +23,10 @@ from autopilot.control.actuators.disturbance_observer import (
     observe,
     rested,
 )
-from autopilot.control.actuators.mixer import EXPECTED, FORCE, MISSED, TOLD, MixerResult, mix, spread
+from autopilot.control.actuators.mixer import EXPECTED, FORCE, MISSED, TOLD, MixerResult, spread
 from autopilot.control.actuators.rotor_model import Actuation, ActuationConstants
 from autopilot.control.actuators.rotor_model import advance as actuate
+from autopilot.control.actuators.thrust_factor import counted, learned_factor, mix_with
 from autopilot.control.actuators.unlike_rotors import make_alike
 from autopilot.control.drag import Drag, air_force
 from autopilot.control.height import cable_pull, tilted_thrust, vertical_force
@@ -86,6 +87,7 @@ class CoreConstants(NamedTuple):
     control_every: int  # ticks
     sensor_age_s: float  # greatest age of a reading to fly by
     rotor_watch: float  # share of a period in the time for which a rotor must have been asked to give a force
+    factor_share: float  # of a period in the time constant of the thrust factor
     nose_free: bool  # yaw is given up: the nose points where it points
     estimator: int  # address of what lets somebody's own estimate take the place of ours; 0: nothing does
     seat: int  # address that it is called with (`autopilot.core.estimator_seat`)
@@ -104,6 +106,7 @@ class Pilot(NamedTuple):
 
     command: Command
     mixed: MixerResult
+    factor: float  # what the rotors give, of what they are asked for
     thrust: float  # N, that the rotors are believed to give
     moment: Vec3  # N m
     observed: Observed
@@ -335,6 +338,9 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     slack_events = pilot.slack_events
     if pilot.was_taut and not seen.taut and not stretch.released:
         slack_events += 1
+    factor = learned_factor(
+        pilot.factor, pilot.thrust, vehicle, rows.table, rows.rotors, constants.factor_share
+    )
     estimator = unpack(EstimatorState, rows.estimator, 0)
     observed = observe(
         pilot.observed,
@@ -375,7 +381,9 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         if off_centre(vehicle) and seen.taut:
             turned = cable_moment(state, pilot.thrust, observed.load_mass, cable.length, vehicle)
             moment = sub(moment, turned)
-        mixed = mix(command.thrust, moment, vehicle, constants.limited, rows.table, rows.rotors)
+        mixed = mix_with(
+            counted(factor), command.thrust, moment, vehicle, constants.limited, rows.table, rows.rotors
+        )
     make_alike(rows.rotors, rows.table, vehicle, constants.limited)
     expect(rows, constants.rotor_watch)
     # rotors and cable together turn the vehicle
@@ -384,6 +392,7 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
     pilot = Pilot(
         command,
         mixed,
+        factor,
         actuation.thrust,
         actuation.moment,
         observed,

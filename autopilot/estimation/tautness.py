@@ -25,7 +25,7 @@ from autopilot.estimation.records import (
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, apply, axpy, cross, dot, norm, sub
+from autopilot.geometry.linear import Vec3, axpy, column, cross, dot, norm, sub
 from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
@@ -37,6 +37,7 @@ SPEED_KNOWN, KNOWN_S = 0.2, 1.0
 PULL_TAUT, PULL_SLACK = 0.8, 0.2  # share of the load's weight that must be felt, and that is too little
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 PULL_DISTANCE = 0.75  # share of the cable length below which no pull is believed
+LEAST_ALONG = 0.5  # of the pull, along the rotors' axis: a cable that slants more is taken for this slant
 PULL_TIME_S = 0.04  # in which the felt pull is smoothed
 # For so long after the cable came taut a load that pulls less than this share of a hanging one's is taken as
 # lying: pendulum and length then mean little.
@@ -69,10 +70,11 @@ def frame(q: Vec3, across: Vec3) -> Vec3:
 def felt_pull(
     load: LoadEstimate, vehicle: VehicleEstimate, imu: ImuReading, thrust: float, mass: float
 ) -> float:
-    """Force of the cable on the vehicle along q, N, from one sample."""
-    a = sub(imu.accel, vehicle.accel_bias)
-    left = (mass * a[0], mass * a[1], mass * a[2] - thrust)
-    return dot(load.q_cable, apply(rotation_from_quat(vehicle.quat_wxyz), left))
+    """Force of the cable on the vehicle along q, N, from one sample, as it is felt along the rotors' axis:
+    across that the air drags at rotors and frame, with as much as the load weighs."""
+    axis = column(rotation_from_quat(vehicle.quat_wxyz), 2)
+    left = mass * (imu.accel[2] - vehicle.accel_bias[2]) - thrust
+    return left / min(dot(load.q_cable, axis), -LEAST_ALONG)
 
 
 @kernel

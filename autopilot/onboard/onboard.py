@@ -15,6 +15,7 @@ import numpy as np
 from autopilot.control.believed import (
     believed_actuation,
     believed_drag,
+    believed_factor_share,
     believed_observer,
     believed_rotor_watch,
     believed_vehicle,
@@ -150,6 +151,7 @@ def build_setup(table: AutopilotParameters, control_every: int, own: Own = NOTHI
         planner=OwnSetup(own.planner, table.values()) if own.planner else None,
         layout=table.layout,
         rotor_watch=believed_rotor_watch(table),
+        factor_share=believed_factor_share(table),
     )
 
 

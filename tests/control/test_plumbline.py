@@ -24,6 +24,7 @@ from autopilot.control.actuators import rotor_model as actuation
 from autopilot.control.actuators import torque_observer
 from autopilot.control.actuators.rotor_model import actuation_constants
 from autopilot.control.believed import believed_design, believed_vehicle
+from autopilot.control.design import gains_of
 from autopilot.control.drag import Drag, air_force
 from autopilot.control.laws import build_law, chosen_law
 from autopilot.control.laws import plumbline as law_file
@@ -61,7 +62,8 @@ SECOND_DIFFERENCE = 5e-6
 # of differences over 2 ms along the motion: 4e-6/12 of fourth derivatives of up to 1e3
 ALONG = 1e-3
 ROUNDING = 1e-9  # sixth derivatives of 1e3, a hundred operations
-# m, largest load error on the true vehicle, the state known: measured FLOWN_B and FLOWN_C mm
+# m, largest load error on the true vehicle, the state known. Case C begins at once with all that the rotors
+# can give, at which the pace slows down: 23 mm.
 FLOWN = {("case-b", 0): 0.010, ("case-b", 18): 0.025, ("case-c", 0): 0.025}
 
 
@@ -79,6 +81,8 @@ def compiled() -> SimpleNamespace:
         gently=plumbline.gently,
         flat_across=plumbline.flat_across,
         no_longer=plumbline.no_longer,
+        paced=plumbline.paced,
+        next_pace=plumbline.next_pace,
         commanded_attitude=plumbline.commanded_attitude,
         wanted_force=plumbline.wanted_force,
         load_position=plumbline.load_position,
@@ -745,7 +749,42 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
     agree(storm.push, np.array([2.0, 0.0, 0.0]), ROUNDING)
 
 
+def where_much_is_asked_it_goes_at_a_slower_pace(
+    law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
+) -> None:
+    """A pace multiplies the bandwidths of load and cable. It falls while the moment is more than 0.55 of what
+    the rotors can turn with, the faster the more it is, and rises to the whole in 0.3 s."""
+    loops, pace = (0.6, 3.0, 5.0), 0.8
+    slow = gains_of(*(pace * omega for omega in loops), 20.0, 0.9, vehicle)
+    for found, wanted in zip(law.paced(gains_of(*loops, 20.0, 0.9, vehicle), pace), slow, strict=True):
+        assert found == pytest.approx(wanted, rel=1e-12)
+
+    vehicle = vehicle._replace(rotor_min=0.3)
+    # two rotors on an arm, each from the middle of its range to an end
+    much = 0.55 * 2.0 * vehicle.arm * 0.5 * (1.96 - 0.3)
+    for share, then in (
+        (0.0, 0.8 + TICK / 0.3),
+        (0.999, 0.8 + TICK / 0.3),
+        (1.1, 0.8 * (1.0 - 0.1 * TICK / 0.005)),
+        (9.0, 0.5),
+    ):
+        for moment in ((0.6 * share * much, -0.8 * share * much, 0.0), (0.0, share * much, 5.0)):
+            assert law.next_pace(0.8, moment, TICK, vehicle) == pytest.approx(then, rel=1e-12)
+    assert law.next_pace(0.99, ZERO, TICK, vehicle) == 1.0
+
+    at, f, _ = random_path(np.random.default_rng(31), model, vehicle)
+    reference = Reference(polynomial(np.random.default_rng(32).normal(size=(7, 3)), 0.0), EAST)
+    said = [
+        law.load_position(
+            law.start()._replace(pace=pace), at(0.0), reference, f, ZERO, gains, CALM_AIR, ZERO, TICK, vehicle
+        )[1]
+        for pace, gains in ((0.7, GAINS), (1.0, law.paced(GAINS, 0.7)))
+    ]
+    assert said[0].moment == said[1].moment and said[0].thrust == said[1].thrust
+
+
 PROOFS: tuple[Callable[..., None], ...] = (
+    where_much_is_asked_it_goes_at_a_slower_pace,
     drag_is_flown_against,
     motion_is_that_of_the_model,
     direction_is_differentiated,

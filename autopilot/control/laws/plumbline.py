@@ -189,10 +189,10 @@ def load_position(
     ahead = ahead_of(state, 1.0, actuation, observed, constants)
     then, thrust = ahead.state, ahead.thrust
     if lying(observed, state):
-        # the ground gives what the rotors do not yet
+        # the ground gives what the rotors do not yet; how the load hangs shows once it is lifted
         vehicle = constants.vehicle
         thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
-        position = cascade.PlumblineMemory(0.0, position.integral)
+        position = cascade.PlumblineMemory(0.0, position.integral, cascade.LEAST_PACE)
         then = with_field(with_field(then, "x_load", state.x_load), "v_load", state.v_load)
     drag, push = air_of(state, 1.0, observed, constants)
     position, wanted = cascade.load_position(

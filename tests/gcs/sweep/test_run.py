@@ -258,6 +258,6 @@ def test_flights_that_stand_out_are_the_same_when_they_are_flown_again(short: st
         record = json.loads((Path(one["report"]).parent / "summary.json").read_text())
         assert record["seed"] == one["seed"]
         # the sweep looks at every tick, the report at 125 samples a second
-        assert record["load_error_max_m"] == pytest.approx(rows[one["index"]]["load_error_max_m"], rel=2e-3)
+        assert record["load_error_max_m"] == pytest.approx(rows[one["index"]]["load_error_max_m"], rel=5e-3)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 'href="flights/plumbline-worst/report.html"' in page
