@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
@@ -15,6 +14,7 @@ import click
 
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE, GcsError, disk_trouble
 from gcs.shell.display import say
+from missions.nearest import nearest
 
 # name: (module in gcs.commands, summary)
 COMMANDS = {
@@ -69,9 +69,9 @@ class Gcs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         word = args[0]
-        near = [] if word in COMMANDS else get_close_matches(word, COMMANDS, n=1)
+        near = "" if word in COMMANDS else nearest(word, COMMANDS)
         if near:
-            ctx.fail(f"No such command {word!r}; did you mean {near[0]}?")
+            ctx.fail(f"No such command {word!r}; did you mean {near}?")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -85,9 +85,6 @@ class Gcs(click.Group):
         except GcsError as error:
             say(str(error))
             code = error.exit_code
-        except click.NoSuchOption as error:
-            say(_usage(error))
-            code = EXIT_USAGE
         except click.UsageError as error:
             if isinstance(error, click.exceptions.NoArgsIsHelpError):
                 click.echo(error.format_message(), err=True)
@@ -112,9 +109,9 @@ class Gcs(click.Group):
 
 
 def _usage(error: click.UsageError) -> str:
-    path = error.ctx.command_path if error.ctx else "gcs"
-    text = " ".join(error.format_message().split()).rstrip(".")
-    return f"{text}; see {path} --help"
+    from autopilot.shell.options import usage_text
+
+    return usage_text(error)
 
 
 def _signing_key(text: str) -> bytes:

@@ -3,9 +3,25 @@
 from __future__ import annotations
 
 import os
+from datetime import datetime
 from pathlib import Path
 
 from gcs.errors import GcsError
+
+
+def fresh_folder(name: str) -> Path:
+    """`flights/NAME-TIME`, made now and nobody else's: of two that begin in one second the later has `-2`."""
+    parent, stem = Path("flights"), f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
+    make_folder(parent, str(parent))
+    folder, ordinal = parent / stem, 1
+    while True:
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            ordinal += 1
+            folder = parent / f"{stem}-{ordinal}"
+        else:
+            return folder
 
 
 def make_folder(path: Path, told: str) -> None:

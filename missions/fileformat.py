@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from os import PathLike
 from typing import Any
 
 from pydantic import ValidationError
 
 from missions.model import Mission
+from missions.nearest import nearest
 from missions.schema import ITEMS, FileSpec, Item
 from missions.toml_files import FileError, TomlFiles, problems, shown
 
@@ -67,8 +67,8 @@ def _kind_problem(table: Mapping[str, Any]) -> str:
     if "type" not in table:
         return f"is missing; must be one of {allowed}"
     kind = table["type"]
-    near = get_close_matches(str(kind), ITEMS, n=1)
-    hint = f" (did you mean {near[0]}?)" if near else ""
+    near = nearest(str(kind), ITEMS)
+    hint = f" (did you mean {near}?)" if near else ""
     return f"= {shown(kind)}; must be one of {allowed}{hint}"
 
 

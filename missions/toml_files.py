@@ -10,7 +10,6 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from os import PathLike
@@ -20,6 +19,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from missions.nearest import did_you_mean, nearest
 from missions.text_files import TextFileError, text_of
 
 Spec = TypeVar("Spec", bound=BaseModel)
@@ -90,9 +90,7 @@ class TomlFiles:
             return TomlText(given, "/".join(filter(None, parts)), text)
         path = Path(given)
         if not given or not (path.is_file() or path.suffix == _SUFFIX or len(path.parts) > 1):
-            near = get_close_matches(given, self.names(), n=1)
-            hint = f"did you mean {near[0]}? " if near else ""
-            names = ", ".join(self.names())
+            hint, names = self._hint(given), ", ".join(self.names())
             text = f"unknown {self.kind} {given!r}; {hint}shipped: {names}; or the path of a file"
             error = self.error([text])
             error.unknown = True
@@ -117,6 +115,10 @@ class TomlFiles:
             return spec.model_validate(table)
         except ValidationError as error:
             raise self.error(problems(error, spec, where)) from None
+
+    def _hint(self, given: str) -> str:
+        beside = given + _SUFFIX
+        return f"did you mean {beside}? " if Path(beside).is_file() else did_you_mean(given, self.names())
 
     def _folder(self) -> Traversable:
         return files(self.package).joinpath(self.folder) if self.folder else files(self.package)
@@ -207,7 +209,7 @@ def _meant_key(key: str, owner: type[BaseModel]) -> str:
     # altitude_ft and altitude both mean altitude_m: compare what stands before the unit
     stem = key.rsplit("_", 1)[0]
     same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]
-    return (get_close_matches(key, same, n=1, cutoff=0.0) + get_close_matches(key, known, n=1) + [""])[0]
+    return nearest(key, same, likeness=0.0) or nearest(key, known)
 
 
 def _unknown_key(near: str, owner: type[BaseModel]) -> str:

@@ -12,8 +12,10 @@ import click
 from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
     Address,
+    ProgramCommand,
     Stop,
     StopRequest,
+    WholeNumber,
     address_option,
     be_punctual,
     home_option,
@@ -37,7 +39,7 @@ def _run_on(cpu: int) -> None:
         raise ValueError(f"cannot run on core {cpu}; leave --cpu out, or name another core") from None
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("sitl", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--for",
     "interface",
@@ -61,7 +63,7 @@ def _run_on(cpu: int) -> None:
     help=f"What really flies: {VEHICLES.choice()}.",
 )
 @click.option(
-    "--seed", default=1, show_default=True, type=click.IntRange(0, 2**63 - 1), help="Seed of all noise."
+    "--seed", default=1, show_default=True, type=WholeNumber(0, 2**63 - 1), help="Seed of all noise."
 )
 @click.option(
     "--speed",
@@ -90,7 +92,7 @@ def _run_on(cpu: int) -> None:
 )
 @click.option(
     "--truth-every",
-    type=click.IntRange(1, 1000),
+    type=WholeNumber(1, 1000),
     metavar="N",
     help="Truth on every Nth tick.  [default: 2; for ardupilot 8, px4 5, betaflight 10]",
 )
@@ -103,7 +105,7 @@ def _run_on(cpu: int) -> None:
     help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are passed over.",
 )
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
-@click.option("--cpu", type=click.IntRange(0), metavar="N", help="Run on this processor core only.")
+@click.option("--cpu", type=WholeNumber(0), metavar="N", help="Run on this processor core only.")
 @click.option(
     "--parameters",
     is_flag=True,

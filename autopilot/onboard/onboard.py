@@ -603,6 +603,10 @@ class Onboard:
         """What of the storage cannot be read: the vehicle is not armed until that is made good."""
         self._hinder("storage", lost)
 
+    def take_silence(self, silent: bool) -> None:
+        """Whether the simulator has fallen silent: the vehicle is not armed until it is back."""
+        self._hinder("simulator", ("the simulator is silent",) if silent else ())
+
     def _hinder(self, source: str, reasons: tuple[str, ...]) -> None:
         """What this source says keeps the vehicle from being armed."""
         hindrances = self.core.flight.hindrances

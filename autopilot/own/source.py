@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 
 from autopilot.own.interruption import is_interruption
+from missions.nearest import did_you_mean
 
 _OURS = Path(__file__).resolve().parents[1]
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
@@ -109,7 +110,10 @@ def _of_entry_point(name: str, group: str, what: str, shipped: Sequence[str]) ->
     there = {point.name: point for point in entry_points(group=group)}
     if name not in there:
         known = ", ".join((*shipped, *sorted(there)))
-        raise OwnError(f"{name!r}: no {what} of that name; must be {known}, or a file as my_law.py:MyLaw")
+        hint = did_you_mean(name, (*shipped, *there))
+        raise OwnError(
+            f"{name!r}: no {what} of that name; {hint}must be {known}, or a file as my_law.py:MyLaw"
+        )
     try:
         found = there[name].load()
     except BaseException as error:

@@ -8,8 +8,11 @@ import os
 import signal
 import socket
 import struct
+import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -20,6 +23,32 @@ Address = tuple[str, int]
 
 LARGEST_DATAGRAM = 65535
 _PR_SET_TIMERSLACK = 29
+
+
+class ProgramCommand(click.Command):
+    """A program that tells wrong usage in one line, and ends with 2."""
+
+    def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
+        extra["standalone_mode"] = False
+        try:
+            code = super().main(args, **extra)
+        except click.UsageError as error:
+            print(f"{self.name}: {usage_text(error)}", file=sys.stderr)
+            sys.exit(error.exit_code)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+def usage_text(error: click.UsageError) -> str:
+    """What is wrong with the words of a command, in one line, and who tells how they are meant."""
+    text = " ".join(error.format_message().split()).rstrip(".")
+    link = " " if text.endswith("?") else "; "
+    return f"{text}{link}see {error.ctx.command_path} --help" if error.ctx else text
+
+
+class WholeNumber(click.IntRange):
+    """A whole number within limits."""
+
+    name = "whole number"
 
 
 class Stop(BaseException):

@@ -37,6 +37,7 @@ from autopilot.shell.ground import AutopilotError, GroundInStep, GroundStations,
 from autopilot.shell.options import (
     LARGEST_DATAGRAM,
     Address,
+    ProgramCommand,
     Stop,
     StopRequest,
     address_option,
@@ -149,8 +150,9 @@ class Program:
                     silent = True
                     self._say(f"no word from the simulator for {_SILENCE_S:g} s; looking for it")
                     self.onboard.endpoint.say(
-                        mavlink.MAV_SEVERITY_CRITICAL, "Simulator silent: time stands still"
+                        mavlink.MAV_SEVERITY_ERROR, "Simulator silent: time stands still"
                     )
+                    self.onboard.take_silence(True)
                     lost = True
                 if silent or now - heard > 1.0:
                     self._greet()
@@ -173,6 +175,7 @@ class Program:
                     self._say(f"flying with the simulator at {shown(self._simulator)}")
                     if lost:
                         lost = False
+                        self.onboard.take_silence(False)
                         self.onboard.endpoint.say(mavlink.MAV_SEVERITY_NOTICE, "Simulator answers again")
                 heard = time.monotonic()
             elif onboard.restarted:
@@ -299,7 +302,7 @@ def _address_or_none(text: str) -> Address | None:
     return None if text == "none" else address_option(text)
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command("autopilot", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--sim",
     type=address_option,

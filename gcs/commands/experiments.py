@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from autopilot.shell.options import WholeNumber
 from gcs.commands.options import json_option, print_json
 from gcs.shell.display import say
 
@@ -26,7 +27,7 @@ def experiments_command() -> None:
 @click.option("--fresh", is_flag=True, help="Fly everything anew, also what has been flown already.")
 @click.option(
     "--jobs",
-    type=click.IntRange(min=1),
+    type=WholeNumber(min=1),
     help="Flights at a time, each on a core of its own.  [default: all cores]",
 )
 @click.option(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from autopilot.shell.options import WholeNumber
 from gcs.commands.options import (
     AddressType,
     PositiveType,
@@ -55,7 +56,7 @@ _OWN = (
     metavar="KIND=PROGRAM",
     help="Fly with an autopilot of others, ardupilot=PROGRAM or px4=PROGRAM; see docs/autopilots.md.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of all noise.")
+@click.option("--seed", type=WholeNumber(min=0), default=1, show_default=True, help="Seed of all noise.")
 @click.option("--lockstep", is_flag=True, help="As fast as it goes, the same bytes each time (default).")
 @click.option(
     "--speed",

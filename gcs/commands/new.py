@@ -8,13 +8,13 @@ from gcs.workflows.new_file import kinds, new_file
 
 
 @click.command("new")
-@click.argument("kind", type=click.Choice(kinds()))
+@click.argument("kind", type=click.Choice(kinds()), metavar="KIND")
 @click.argument("name")
 def new_command(kind: str, name: str) -> None:
     """Write a commented file of your own that flies as it is.
 
-    NAME is that of the file, without or with its ending; it may lead into another folder. A file that exists
-    is left as it is. Afterwards the command that flies it is printed.
+    KIND is one of those below, NAME is that of the file, without or with its ending; it may lead into another
+    folder. A file that exists is left as it is. Afterwards the command that flies it is printed.
 
     \b
     gcs new law steady

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 import click
 
+from autopilot.shell.options import WholeNumber
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -125,7 +126,7 @@ def page_options(function: F) -> F:
     """--port and --bind of every command that serves a page."""
     port = click.option(
         "--port",
-        type=click.IntRange(1, 65535),
+        type=WholeNumber(1, 65535),
         help=f"TCP port of the live page.  [default: {PAGE_PORT}, or one that is free]",
     )
     bind = click.option(

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from autopilot.own.chosen import Own
+from autopilot.shell.options import WholeNumber
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.commands.options import (
     LawType,
@@ -54,18 +55,18 @@ from gcs.shell.display import say
 )
 @click.option(
     "--seeds",
-    type=click.IntRange(min=1),
+    type=WholeNumber(min=1),
     default=1,
     show_default=True,
     help="Fly each setting with so many seeds: 1, 2, 3 ...",
 )
 @click.option(
     "--sample",
-    type=click.IntRange(min=1),
+    type=WholeNumber(min=1),
     help="Draw so many settings from what is varied (Latin hypercube) instead of flying its whole grid.",
 )
 @click.option(
-    "--jobs", type=click.IntRange(min=1), help="Flights at a time, each on a core.  [default: all cores]"
+    "--jobs", type=WholeNumber(min=1), help="Flights at a time, each on a core.  [default: all cores]"
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Fly on a running Dask cluster, e.g. tcp://host:8786.")
 @click.option(

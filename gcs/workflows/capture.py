@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from pathlib import Path
 
 from autopilot.wire.tlog import TlogWriter
@@ -11,6 +10,7 @@ from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.errors import GcsError, NoVehicleError, RefusedError
+from gcs.folders import fresh_folder
 from gcs.shell.display import say
 from gcs.shell.link import Address, monotonic_us, unix_us
 from gcs.shell.session import Session
@@ -27,7 +27,6 @@ def capture_to(
     Without `out` the log goes to flights/capture-TIME/flight.tlog. Parameters come first.
     `truth_at`: where the simulator tells what is true; None: where `sitl` does by default.
     """
-    path = out or Path("flights") / f"capture-{datetime.now():%Y%m%d-%H%M%S}" / TLOG_FILE
     with (
         TruthLink(truth_at) as world,
         Session(address) as session,
@@ -36,6 +35,7 @@ def capture_to(
         target = session.find_with_truth(world)
         if world.missing:
             say(f"the log will have no truth of the simulator: {world.missing}")
+        path = out or fresh_folder("capture") / TLOG_FILE
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             file = path.open("wb")

@@ -26,7 +26,7 @@ class CompareError(GcsError):
 def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]:
     """The flights that were named, and the page that was made of them."""
     if not 2 <= len(sources) <= MOST_RUNS:
-        raise CompareError(f"{len(sources)} flights; name 2 to {MOST_RUNS} to be compared")
+        raise CompareError(f"flights to be compared: {len(sources)}; name 2 to {MOST_RUNS}")
     logs = [find_log(source) for source in sources]
     for i, log in enumerate(logs):
         if log.resolve() in [other.resolve() for other in logs[:i]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,7 @@ from gcs.errors import (
     StoppedError,
     disk_trouble,
 )
-from gcs.folders import make_folder
+from gcs.folders import fresh_folder, make_folder
 from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
@@ -72,8 +71,8 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
     if options.connect is None and options.firmware is None:
         check_options(options)
     mission = load(options.mission)
-    out = options.out or Path("flights") / f"{mission.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    with _Folder(out, options.overwrite) as folder:
+    out = options.out or fresh_folder(mission.name)
+    with FlightFolder(out, options.overwrite) as folder:
         if options.connect is None:
             laws = (options.law,) if options.firmware is None else ()
             warm_up(flight_parts(laws), options.quiet)
@@ -179,7 +178,7 @@ def _end(
     truth_missing: str,
     wall_s: float,
     out: Path,
-    folder: _Folder,
+    folder: FlightFolder,
     stop: StopRequest,
     told: Told,
 ) -> Flight:
@@ -219,7 +218,7 @@ def _too_slow(tlog: Path) -> str:
     )
 
 
-class _Folder:
+class FlightFolder:
     """The output directory; if the flight came to nothing, what we put there is taken away again."""
 
     _OURS = (TLOG_FILE, ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG)
@@ -232,10 +231,13 @@ class _Folder:
     def keep(self) -> None:
         self._kept = True
 
-    def __enter__(self) -> _Folder:
-        if not self._overwrite and (self._path / self._OURS[0]).exists():
-            raise GcsError(f"--out {self._path}: holds a flight already; name another, or add --overwrite")
+    def __enter__(self) -> FlightFolder:
         make_folder(self._path, f"--out {self._path}")
+        try:
+            (self._path / TLOG_FILE).touch(exist_ok=self._overwrite)
+        except FileExistsError:
+            text = f"--out {self._path}: holds a flight already; name another, or add --overwrite"
+            raise GcsError(text) from None
         return self
 
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:

@@ -9,12 +9,12 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from gcs.errors import GcsError, InputError
 from gcs.shell.display import say
+from missions.nearest import did_you_mean
 
 COMPLETED = "completed"
 Value = float | str
@@ -65,8 +65,7 @@ def _read(text: str, keys: Sequence[str]) -> Requirement:
         raise InputError(f'--require {text!r}: must be KEY SIGN VALUE, e.g. "load_error_max_m < 0.01"')
     key, sign, word = form.groups()
     if key not in keys:
-        near = get_close_matches(key, keys, n=1)
-        hint = f"did you mean {near[0]}? " if near else ""
+        hint = did_you_mean(key, keys)
         raise InputError(f"--require {text!r}: no figure {key}; {hint}there are {', '.join(keys)}")
     value = _value(word)
     if isinstance(value, str) and sign not in ("==", "!="):

@@ -23,6 +23,7 @@ from gcs.sweep.plan import simulated
 from gcs.workflows.flight_inputs import check_flight_inputs
 from gcs.workflows.mission_file import load
 from missions.model import Mission
+from missions.nearest import did_you_mean
 from missions.toml_files import FileError
 from plumbline.arguments import told_in_python
 from plumbline.learning.actions import size_of_action
@@ -133,7 +134,8 @@ class Scenario:
     def setup_of(self, law: str) -> Setup:
         """What the autopilot is given to fly with a law. `Error` if there is none of that name."""
         if law not in LAWS:
-            raise GcsError(f"law {law!r}: there is none of that name; must be one of {', '.join(LAWS)}")
+            hint = did_you_mean(law, LAWS)
+            raise GcsError(f"law {law!r}: there is none of that name; {hint}must be one of {', '.join(LAWS)}")
         return self._cell(law).setup
 
     def _cell(self, law: str = _LAW) -> Cell:

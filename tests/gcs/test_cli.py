@@ -584,7 +584,7 @@ def test_a_place_that_is_none_is_wrong_usage():
 
 def test_the_nearest_command_is_named():
     line = one_line(run("fyl"), EXIT_USAGE)
-    assert line == "gcs: No such command 'fyl'; did you mean fly?; see gcs --help"
+    assert line == "gcs: No such command 'fyl'; did you mean fly? see gcs --help"
     assert "did you mean" not in one_line(run("zzzzzz"), EXIT_USAGE)
 
 

@@ -96,9 +96,10 @@ def test_unknown_vehicles_and_sensors_get_the_names_there_are():
 @pytest.mark.parametrize(
     ("setting", "part"),
     [
-        ("SIM_WINDE=3", "--set SIM_WINDE: no such parameter; did you mean SIM_WIND_E? there are SIM_"),
+        ("SIM_WINDE=3", "--set SIM_WINDE: no such parameter; did you mean SIM_WIND_E? docs/parameters.md "),
         ("SIM_BRIGHT=3", "--set SIM_BRIGHT: no such parameter; there are SIM_ACC_NOISE, SIM_ACT_DELAY_MS, "),
-        ("NGC_KXX=3", "--set NGC_KXX: no such parameter; did you mean NGC_KX? there are NGC_EPSILON, "),
+        ("NGC_KXX=3", "--set NGC_KXX: no such parameter; did you mean NGC_KX? docs/parameters.md lists all"),
+        ("WPNAV_SPEED=3", "--set WPNAV_SPEED: no such parameter; did you mean WNC_SPEED or MIS_SPEED? "),
         ("WIND=3", "--set WIND: no such parameter; names begin with one of BAT_, COM_, "),
         ("SIM_WIND_E=300", "--set SIM_WIND_E = 300.0 m/s; must be -50 ... 50"),
         ("SIM_LOSS_PCT=101", "--set SIM_LOSS_PCT = 101.0 %; must be 0 ... 100"),

@@ -137,6 +137,11 @@ def test_a_program_that_stood_still_goes_on_where_it_was(fly: Callable[..., Flig
     stopped.process.send_signal(signal.SIGCONT)
     status = flight.until(lambda status: status["phase"] != "mission")
     assert status["armed"], "it was flown to its landing"
+    if who == "sitl":
+        texts = json.loads(flight.do("texts", "--json"))
+        severity = {text["text"]: text["severity"] for text in texts}
+        # what is critical tells `gcs fly` that the flight has been given up
+        assert severity["Simulator silent: time stands still"] == "error"
     flight.until(lambda status: not status["armed"])
     assert b"has started again" not in flight.autopilot.log.read_bytes()
 
@@ -151,6 +156,18 @@ def test_an_autopilot_that_stood_still_in_real_time_gives_the_flight_up(fly: Cal
     status = flight.until(lambda status: status["phase"] == "disarmed")  # three seconds after it is given up
     assert not status["armed"]
     assert b"has started again" not in flight.autopilot.log.read_bytes()
+
+
+def test_a_vehicle_whose_simulator_is_silent_is_not_armed(fly: Callable[..., Flight], gcs: Gcs) -> None:
+    flight = fly(*QUICK)
+    flight.sitl.process.send_signal(signal.SIGSTOP)
+    flight.autopilot.says(b"no word from the simulator")
+    refused = gcs("arm", "--connect", flight.ground)
+    assert refused.returncode == 1
+    assert "simulator is silent" in refused.stderr
+    flight.sitl.process.send_signal(signal.SIGCONT)
+    flight.autopilot.says(b"flying with the simulator at .*\n(.*\n)*.*flying with the simulator at ")
+    flight.take_off()
 
 
 def test_an_autopilot_that_stands_still_is_named_where_the_flight_is_lost(

@@ -82,8 +82,10 @@ def continue_mission(flight: Flight, request: Any, view: View, settings: Setting
 def set_current(flight: Flight, request: SetCurrent, view: View, settings: Settings) -> Decision:
     """Make another item the present one; in flight, go there at once."""
     plan = flight.mission.plan
+    if not plan.items:
+        return flight, denied(f"Mission item {request.seq} denied: no mission is stored")
     if not 0 <= request.seq < plan.items:
-        return flight, denied(f"Mission item {request.seq} denied: the mission has {plan.items}")
+        return flight, denied(f"Mission item {request.seq} denied: the last is {plan.items - 1}")
     step = next((i for i, seq in enumerate(plan.sequence) if seq >= request.seq), None)
     if step is None:
         return flight, denied(f"Mission item {request.seq} denied: nothing is flown from there")

@@ -203,7 +203,7 @@ def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
             ["--vary", "SIM_WIND=1,2"],
             "--vary SIM_WIND: no such parameter; did you mean SIM_WIND_",
         ),
-        (["--set", "MIS_SPED=1"], "--set MIS_SPED: no such parameter; did you mean MIS_SPEED? there are "),
+        (["--set", "MIS_SPED=1"], "--set MIS_SPED: no such parameter; did you mean MIS_SPEED? docs/"),
         (["--vary", "FOO=1,2"], "--vary FOO: no such parameter; names begin with one of BAT_, COM_, "),
         (["--vary", "SIM_WIND_E=0:999:3"], "SIM_WIND_E"),
         (["--jobs", "2", "--scheduler", "tcp://nowhere:1"], "--jobs"),

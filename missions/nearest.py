@@ -1,0 +1,24 @@
+"""Which of the known names somebody may have meant who wrote another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+LIKENESS = 0.6  # 0: nothing in common, 1: the same letters
+
+
+def nearest(word: str, known: Iterable[str], likeness: float = LIKENESS) -> str:
+    """The known name that is most like `word`, whatever is upper and lower case; empty if none is.
+
+    `likeness` is the least that counts, as `difflib.SequenceMatcher.ratio` has it.
+    """
+    names = {name.lower(): name for name in known}
+    found = get_close_matches(word.lower(), names, n=1, cutoff=likeness)
+    return names[found[0]] if found else ""
+
+
+def did_you_mean(word: str, known: Iterable[str], likeness: float = LIKENESS) -> str:
+    """`did you mean NAME? `, to be put before what is told next; empty if no name is near."""
+    name = nearest(word, known, likeness)
+    return f"did you mean {name}? " if name else ""

@@ -1,0 +1,37 @@
+"""Folders of flights: each flight has its own, whoever begins at the same time."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from gcs.errors import GcsError
+from gcs.folders import fresh_folder
+from gcs.workflows.fly import FlightFolder
+
+
+def test_flights_that_begin_in_one_second_have_folders_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with ThreadPoolExecutor(8) as pool:
+        folders = list(pool.map(fresh_folder, ["hover"] * 40))
+    assert len(set(folders)) == 40
+    assert all(folder.is_dir() and folder.name.startswith("hover-") for folder in folders)
+
+
+def test_where_no_folder_can_be_made_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "flights").write_text("", encoding="utf-8")
+    with pytest.raises(GcsError, match="flights: File exists"):
+        fresh_folder("hover")
+
+
+def test_of_two_flights_into_one_folder_the_first_has_it(tmp_path: Path) -> None:
+    with FlightFolder(tmp_path, overwrite=False):
+        with pytest.raises(GcsError, match="holds a flight already"):
+            FlightFolder(tmp_path, overwrite=False).__enter__()
+        with FlightFolder(tmp_path, overwrite=True) as folder:
+            folder.keep()
