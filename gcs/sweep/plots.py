@@ -82,6 +82,8 @@ def _draw_cells(ax: Any, found: Cells, values: Floats, norm: Any, colours: Any) 
 
 def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, units: dict[str, str]) -> None:
     """Share of success and error over one parameter, all laws."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     with style():
         figure = new_figure(11.0, 3.7)
         left, right = figure.subplots(1, 2)
@@ -98,6 +100,9 @@ def draw_curve(path: Path, laws: list[Flights], plan: SweepPlan, name: str, unit
         left.set_title("flights completed (%)")
         right.set_title("greatest load error (mm)")
         right.set_yscale("log")
+        right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        right.yaxis.set_major_formatter("{x:g}")
+        right.yaxis.set_minor_formatter(NullFormatter())
         for ax in (left, right):
             ax.set_xlabel(_label(name, units))
             key(ax)
