@@ -25,6 +25,7 @@ from autopilot.control.laws.interface import Kernels, Law
 from autopilot.control.records import Cable, Command, Jet, Reference, State, Vehicle, with_length
 from autopilot.control.thesis_cascade import ThesisMemory
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, scale, sub
 from autopilot.geometry.packed import Row, with_field
 from autopilot.wire.parameter_table import ParameterTable
@@ -189,10 +190,11 @@ def load_position(
     ahead = ahead_of(state, 1.0, actuation, observed, constants)
     then, thrust = ahead.state, ahead.thrust
     if lying(observed, state):
-        # the ground gives what the rotors do not yet; how the load hangs shows once it is lifted
+        # the ground gives what the rotors do not yet; where it is lifted, how it hangs shows only afterwards
         vehicle = constants.vehicle
         thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
-        position = cascade.PlumblineMemory(0.0, position.integral, cascade.LEAST_PACE)
+        pace = if_above(reference.jet[1][2], 0.0, cascade.LEAST_PACE, position.pace)
+        position = cascade.PlumblineMemory(0.0, position.integral, pace)
         then = with_field(with_field(then, "x_load", state.x_load), "v_load", state.v_load)
     drag, push = air_of(state, 1.0, observed, constants)
     position, wanted = cascade.load_position(
