@@ -12,6 +12,7 @@ from autopilot.supervisor.machine import begin_legs, happen, must_happen
 from autopilot.supervisor.motion import AT_REST, as_flown, calm, length_at, stop, swings
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import (
+    CRITICAL,
     INFO,
     Event,
     Flight,
@@ -21,6 +22,7 @@ from autopilot.supervisor.state import (
     Report,
     Selected,
     View,
+    off_mission,
 )
 from autopilot.supervisor.step_legs import borrowed, destination, following_legs, made, step_legs
 from autopilot.trajectory.timeline import MissionState, state_after
@@ -28,6 +30,7 @@ from autopilot.trajectory.waypoint_path import Passage
 from missions.model import AttitudeRun, Land, Release, ReturnHome, Speed, Step, Takeoff, Waypoint, Winch
 
 SETTLE_S = 3.0  # hold after an attitude run
+LIFTED = 0.5
 RELEASED_TEXT = "Load released"
 
 
@@ -77,6 +80,9 @@ def legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, R
     leg = flight.legs[0] if flight.legs else None
     if isinstance(leg, Calm) and not leg.ends_step:  # now the phase can begin
         return begin_legs(flight, view, settings), Report()
+    if flight.phase == Phase.LIFT and leg is not None and _stays_below(flight, leg, view):
+        text = "The load was not lifted: landing"
+        return must_happen(off_mission(flight), Event.LAND, view, settings), Report(((CRITICAL, text),))
     if flight.mission.active and flight.phase in (Phase.LIFT, Phase.MISSION):
         return _step_done(flight, view, settings)
     if flight.phase == Phase.LIFT and flight.selected == Selected.OFFBOARD:
@@ -88,6 +94,12 @@ def legs_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, R
         legs, here = stop(flight, view, settings)
         return _flying(flight, as_flown(flight, (*legs, Hold(here))), view), Report()
     return after, Report()
+
+
+def _stays_below(flight: Flight, leg: Leg, view: View) -> bool:
+    """Whether a lift that is over has brought the load less than `LIFTED` of its way up."""
+    begun, asked = leg.jet(0.0)[0][2], leg.jet(leg.duration_s)[0][2]
+    return not flight.cable.released and view.x_load[2] - begun < LIFTED * (asked - begun)
 
 
 def _step_done(flight: Flight, view: View, settings: Settings) -> tuple[Flight, Report]:

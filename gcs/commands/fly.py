@@ -56,7 +56,9 @@ _OWN = (
     metavar="KIND=PROGRAM",
     help="Fly with an autopilot of others, ardupilot=PROGRAM or px4=PROGRAM; see docs/autopilots.md.",
 )
-@click.option("--seed", type=WholeNumber(min=0), default=1, show_default=True, help="Seed of all noise.")
+@click.option(
+    "--seed", type=WholeNumber(0, 2**63 - 1), default=1, show_default=True, help="Seed of all noise."
+)
 @click.option("--lockstep", is_flag=True, help="As fast as it goes, the same bytes each time (default).")
 @click.option(
     "--speed",

@@ -249,6 +249,9 @@ class FlightFolder:
             ) from None
         if self._kept:
             return
+        if isinstance(error, KeyboardInterrupt) and tlog.exists() and tlog.stat().st_size > 0:
+            say(f"report abandoned; the telemetry is in {tlog}")
+            return
         for name in self._OURS:
             (self._path / name).unlink(missing_ok=True)
         if not any(self._path.iterdir()):

@@ -12,6 +12,7 @@ from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import unix_us
+from gcs.shell.processes import STOPPED_LIMIT_S
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.flight_loops import run_lockstep, run_wall_clock
 from gcs.workflows.flight_options import FlightOptions
@@ -23,14 +24,16 @@ if TYPE_CHECKING:
     from gcs.workflows.flight_page import FlightPage
 
 
-def flight_client(mission: Mission, options: FlightOptions, home: Home) -> FlightClient:
-    """The ground station's side of the flight; `home` is the vehicle's."""
+def flight_client(
+    mission: Mission, options: FlightOptions, home: Home, silence_us: int = LINK_TIMEOUT_US
+) -> FlightClient:
+    """The ground station's side of the flight of a vehicle with this home, which may be silent so long."""
     slow = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
     return FlightClient(
         encode_mission(mission, home),
         expected_duration_s(mission),
         options.limit_s,
-        round(LINK_TIMEOUT_US * slow),
+        round(silence_us * slow),
     )
 
 
@@ -44,7 +47,9 @@ def fly_own(
     page: FlightPage | None = None,
 ) -> FlightClient:
     """Fly with the simulator and the autopilot that were started for it."""
-    client = flight_client(mission, options, Home())
+    # one of our programs that is stopped for long is named before the vehicle is taken for lost
+    silence_us = round(1e6 * STOPPED_LIMIT_S) + LINK_TIMEOUT_US
+    client = flight_client(mission, options, Home(), silence_us)
 
     def begun() -> None:
         watch.start()

@@ -50,6 +50,14 @@ def test_quiet_trackers_lift_and_set_down(scale: float, seed: int) -> None:
     assert craft.texts[-1] == "Landed, disarmed"
 
 
+def test_a_load_too_heavy_to_be_lifted_is_told_and_set_down() -> None:
+    craft = Craft(Takeoff(2.0), Delay(1.0), Land(), SIM_LOAD_MASS=1.0)
+    craft.begin()
+    craft.run(at_phase(Phase.DISARMED), 120.0)
+    assert craft.texts[:2] == ["Cable taut, lifting the load", "The load was not lifted: landing"]
+    assert craft.texts[-1] == "Landed, disarmed"
+
+
 @pytest.mark.parametrize("law", range(len(LAWS)), ids=LAWS)
 def test_every_law_lifts_with_noisy_readings(law: int) -> None:
     """A law that takes derivatives of the load's velocity is the first to mind how noisy that is."""

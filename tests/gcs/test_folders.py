@@ -35,3 +35,17 @@ def test_of_two_flights_into_one_folder_the_first_has_it(tmp_path: Path) -> None
             FlightFolder(tmp_path, overwrite=False).__enter__()
         with FlightFolder(tmp_path, overwrite=True) as folder:
             folder.keep()
+
+
+def test_what_was_recorded_outlives_two_interrupts(tmp_path: Path) -> None:
+    def interrupted(telemetry: bytes) -> None:
+        with FlightFolder(tmp_path / "out", overwrite=False):
+            (tmp_path / "out" / "flight.tlog").write_bytes(telemetry)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted(b"")
+    assert not (tmp_path / "out").exists(), "nothing was"
+    with pytest.raises(KeyboardInterrupt):
+        interrupted(b"telemetry")
+    assert (tmp_path / "out" / "flight.tlog").read_bytes() == b"telemetry"

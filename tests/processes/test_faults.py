@@ -184,6 +184,12 @@ def test_an_autopilot_that_stands_still_is_named_where_the_flight_is_lost(
         if b"autopilot" in Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
     )
     os.kill(autopilot, signal.SIGSTOP)
+    with pytest.raises(subprocess.TimeoutExpired):  # for seconds nothing is lost
+        flight.process.wait(7.0)
+    os.kill(autopilot, signal.SIGCONT)
+    flight.says(b"  (lower|set down)  ")
+    os.kill(autopilot, signal.SIGSTOP)
     flight.process.wait(LONG_S)
-    assert f"lost: autopilot (process {autopilot}) stopped by a signal; ".encode() in flight.log.read_bytes()
+    told = f"lost: autopilot (process {autopilot}) has been stopped by a signal for "
+    assert told.encode() in flight.log.read_bytes()
     assert not Path(f"/proc/{autopilot}").exists()
