@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.control.actuators.disturbance_observer import ObserverConstants, observer_constants
+from autopilot.control.actuators.disturbance_observer import ObserverConstants, observer_constants, share_of
 from autopilot.control.actuators.rotor_model import ActuationConstants, actuation_constants
 from autopilot.control.design import Design, Timing, Wanted, design
 from autopilot.control.drag import Drag
@@ -62,8 +62,7 @@ def believed_rotor_watch(table: ParameterTable) -> float:
 
 def believed_factor_share(table: ParameterTable) -> float:
     """Share of a period in the time constant with which the speeds of the rotors tell their thrust factor."""
-    period, time = 1.0 / table["CTL_RATE_HZ"], table["CTL_T_THRUST"]
-    return min(1.0, period / time) if time > 0.0 else 0.0
+    return share_of(1.0 / table["CTL_RATE_HZ"], table["CTL_T_THRUST"])
 
 
 def believed_design(table: ParameterTable, vehicle: Vehicle) -> Design:

@@ -197,9 +197,13 @@ def _end(
         meta = meta_of(mission, options, outcome, wall_s, truth_missing)
         record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
     except KeyboardInterrupt:
-        say(f"report abandoned; the telemetry is in {tlog}")
+        _tell_abandoned(tlog)
         raise
     return Flight(outcome, record, out, bool(stop))
+
+
+def _tell_abandoned(tlog: Path) -> None:
+    say(f"report abandoned; the telemetry is in {tlog}")
 
 
 def _too_slow(tlog: Path) -> str:
@@ -250,7 +254,7 @@ class FlightFolder:
         if self._kept:
             return
         if isinstance(error, KeyboardInterrupt) and tlog.exists() and tlog.stat().st_size > 0:
-            say(f"report abandoned; the telemetry is in {tlog}")
+            _tell_abandoned(tlog)
             return
         for name in self._OURS:
             (self._path / name).unlink(missing_ok=True)

@@ -95,6 +95,11 @@ class Observed(NamedTuple):
     torque: Torque  # on the vehicle besides that of rotors and cable
 
 
+def share_of(period: float, time: float) -> float:
+    """Share of what is new in a memory that fades with this time constant (s); 0 learns nothing."""
+    return min(1.0, period / time) if time > 0.0 else 0.0
+
+
 def observer_constants(
     mass_time: float,
     push_time: float,
@@ -108,7 +113,7 @@ def observer_constants(
     """For memories that fade with these time constants (s); 0 learns nothing. Drag is the believed one."""
 
     def share(time: float) -> float:
-        return min(1.0, period / time) if time > 0.0 else 0.0
+        return share_of(period, time)
 
     believed = max(drag.linear, drag.quadratic) > 0.0
     return ObserverConstants(
