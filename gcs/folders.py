@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
 from gcs.errors import GcsError
+
+SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
+TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
+# of these three one lies in every folder that holds the results of one thing
+_HOLDS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis's experiments"}
 
 
 def fresh_folder(name: str) -> Path:
@@ -35,3 +41,16 @@ def make_folder(path: Path, told: str) -> None:
             raise PermissionError(13, "Permission denied")
     except OSError as error:
         raise GcsError(f"{told}: {error.strerror}") from None
+
+
+def keep_others(path: Path, kind: str, written: Iterable[str] = ()) -> None:
+    """A folder holds the results of one thing: GcsError if this one holds those of another `kind`, by name of
+    the file that tells, or before it holds ours a file under a name that is `written`."""
+    for mark, what in _HOLDS.items():
+        if mark != kind and (path / mark).exists():
+            raise GcsError(f"--out {path}: holds {what}; name another")
+    if (path / kind).exists():
+        return
+    for name in written:
+        if (path / name).exists():
+            raise GcsError(f"--out {path}: holds a {name} that is not of {_HOLDS[kind]}; name another")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
 from gcs.errors import GcsError
-from gcs.folders import make_folder
+from gcs.folders import PAGE_FILE, TLOG_FILE, keep_others, make_folder
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
 from missions import model
@@ -139,11 +139,11 @@ class Flight:
     def report(self, out: str | Path, quiet: bool = True) -> Path:
         """Write what `gcs fly` leaves into the directory `out`, but for the autopilot's own log; the path of
         the page."""
-        from gcs.report.build import PAGE_FILE
-        from gcs.workflows.report import TLOG_FILE, make_report
+        from gcs.workflows.report import make_report
 
         folder = Path(out)
         make_folder(folder, str(folder))
+        keep_others(folder, TLOG_FILE)
         (folder / TLOG_FILE).write_bytes(self.tlog)
         make_report(folder / TLOG_FILE, folder, self._meta, quiet)
         return folder / PAGE_FILE

@@ -53,7 +53,14 @@ from autopilot.services.records import (
     ParameterChanged,
     Verdict,
 )
-from autopilot.services.requests import ChangeSigningKey, Reboot, ResetParameters, SetHome, StartMission
+from autopilot.services.requests import (
+    FLOWN,
+    ChangeSigningKey,
+    Reboot,
+    ResetParameters,
+    SetHome,
+    StartMission,
+)
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.recovery import Found
 from autopilot.supervisor.settings import settings_from
@@ -83,6 +90,7 @@ LEAP_US = 5_000_000  # a single tick that lies farther ahead is not believed
 GAP_US = 500_000  # without a tick, in which a vehicle in the air has long been out of control
 FIRST_TICKS = 1  # in which the rate of the ticks is found
 BELIEVED = 3  # ticks in a row that say the same of the clock are
+_SIMULATOR = "simulator"  # as what keeps the vehicle from being armed
 LEAST_THRUST = 0.3  # of the vehicle's weight: rotors that were asked for less did not carry it
 
 
@@ -567,6 +575,9 @@ class Onboard:
             return Verdict(mavlink.MAV_RESULT_ACCEPTED)
         if self.fault:
             return Verdict(mavlink.MAV_RESULT_DENIED, self.fault)
+        silence = self.core.flight.hindrances.get(_SIMULATOR)
+        if silence and isinstance(request, FLOWN):
+            return Verdict(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, f"Not flown: {silence[0]}")
         home = self.core.flight.area.home
         verdict = self.core.ask(request, self.now_us)
         if isinstance(request, SetHome) and self.core.flight.area.home != home:
@@ -604,8 +615,9 @@ class Onboard:
         self._hinder("storage", lost)
 
     def take_silence(self, silent: bool) -> None:
-        """Whether the simulator has fallen silent: the vehicle is not armed until it is back."""
-        self._hinder("simulator", ("the simulator is silent",) if silent else ())
+        """Whether the simulator has fallen silent: until it is back the vehicle is not armed, and takes no
+        command that is to be flown."""
+        self._hinder(_SIMULATOR, ("the simulator is silent",) if silent else ())
 
     def _hinder(self, source: str, reasons: tuple[str, ...]) -> None:
         """What this source says keeps the vehicle from being armed."""

@@ -148,6 +148,7 @@ class VehicleEndpoint:
         self._texts = TextWriter()
         self.kept_texts = KeptTexts(self._texts)
         self._now_us = 0  # of what was called last, by which texts are dated
+        self._stood_us = 0  # for which the vehicle's clock stood, by that of the services
         self._timed = (
             self._signing,
             self._missions,
@@ -251,10 +252,11 @@ class VehicleEndpoint:
                 if addressed[1] == WINCH_COMPONENT and state.streams.interval(WINCH_HEARTBEAT) == OFF:
                     state.streams.set_interval(WINCH_HEARTBEAT, DEFAULT, now_us)
                 wrapped = self._decider(state, peer, now_us, decide)
+                service_us = now_us + self._stood_us
                 try:
-                    outputs = handler(received.message, peer, now_us, wrapped)
+                    outputs = handler(received.message, peer, service_us, wrapped)
                 except Exception:  # a fault of ours must not bring the vehicle down
-                    outputs = self._faults.answered(received.message, peer, now_us)
+                    outputs = self._faults.answered(received.message, peer, service_us)
                 self._do(outputs, events)
                 self._follow_up(events)
         return events
@@ -273,9 +275,21 @@ class VehicleEndpoint:
         events, self._events = self._events, []
         return events
 
+    def stand(self, passed_us: int) -> None:
+        """So much time has passed by which the vehicle's clock did not go on.
+
+        Answers that go out at a pace of their own do so all the same; streams wait for the vehicle.
+        """
+        self._stood_us += passed_us
+        self._stirred = True
+
     def say(self, severity: int, text: str) -> None:
         """A text for the operators of all links."""
         self._do([Say(severity, text)], [])
+
+    def inherit_texts(self, before: VehicleEndpoint) -> None:
+        """What the vehicle said in the run that ended as this one begins."""
+        self.kept_texts.inherit(before.kept_texts.texts, before._now_us + before._stood_us)
 
     def item_reached(self, seq: int, last: bool = False) -> None:
         """The mission came to the end of an item.
@@ -312,8 +326,8 @@ class VehicleEndpoint:
         return self._work or now_us >= min(self._next_timer(), self._next_stream())
 
     def _next_timer(self) -> int:
-        """When a service, or the end of a mission, has something to do."""
-        timers = [service.next_timer() for service in self._timed]
+        """When a service, or the end of a mission, has something to do, by the vehicle's clock."""
+        timers = [service.next_timer() - self._stood_us for service in self._timed]
         if self._reached_left:
             timers.append(self._reached_us or 0)
         return min(timers)
@@ -331,11 +345,12 @@ class VehicleEndpoint:
         if self._learned:
             self._forget_silent(now_us)
         if self._work or now_us >= self._timer_us or self._signing.signing is not None:
+            service_us = now_us + self._stood_us
             for service in self._timed:
                 try:
-                    outputs = service.poll(now_us)
+                    outputs = service.poll(service_us)
                 except Exception:  # as in `receive`
-                    outputs = self._faults.told(type(service).__name__, now_us)
+                    outputs = self._faults.told(type(service).__name__, service_us)
                 self._do(outputs, self._events)
             self._follow_up(self._events)
             self._say_reached_again(now_us)
@@ -445,7 +460,7 @@ class VehicleEndpoint:
                     for state in self._states(link):
                         state.queue.append((source or self._own, message))
                 case Say(severity, text):
-                    self.kept_texts.keep(severity, text, self._now_us)
+                    self.kept_texts.keep(severity, text, self._now_us + self._stood_us)
                     if self.on_text is not None:
                         self.on_text(severity, text)
                     for message in self._texts.messages(severity, text):
@@ -562,7 +577,7 @@ class VehicleEndpoint:
             return self._request_interval(state, peer, number)
         source = peer.addressed or self._own
         if message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT and source == self._own:
-            self.kept_texts.ask(peer.link, now_us)
+            self.kept_texts.ask(peer.link, now_us + self._stood_us)
             return _ACCEPTED
         where = _METADATA.get(message_id)
         if where is not None and source == self._own:
@@ -622,7 +637,7 @@ class VehicleEndpoint:
         rate_hz = message.req_message_rate if message.start_stop else 0
         interval_us = _SECOND_US // rate_hz if rate_hz else DEFAULT
         for message_id in GROUPS.get(message.req_stream_id, ()):
-            state.streams.set_interval(message_id, interval_us, now_us)
+            state.streams.set_interval(message_id, interval_us, self._now_us)
         return []
 
     def _handler_table(self) -> dict[int, Handler]:

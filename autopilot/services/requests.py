@@ -203,6 +203,26 @@ class Grab:
     """Take hold of the cable of a load that lies within reach; nothing where it was never let go."""
 
 
+# what moves the vehicle or its load, as soon as time goes on
+FLOWN = (
+    Takeoff
+    | Land
+    | ReturnHome
+    | SetMode
+    | StartMission
+    | Pause
+    | Continue
+    | SetCurrent
+    | Reposition
+    | Orbit
+    | ChangeAltitude
+    | ChangeSpeed
+    | Release
+    | Winch
+    | Grab
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Terminate:
     """Stop the rotors at once, wherever the vehicle is."""

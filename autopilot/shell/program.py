@@ -68,6 +68,8 @@ LOCKSTEP_BOOT_UNIX_US = 1_767_225_600_000_000  # 2026-01-01: logs of equal fligh
 _GREETING_S = 0.2  # between heartbeats to a simulator that is not there yet
 _BEAT_S = 1.0  # between two heartbeats while the clock stands
 _SLOW_SHARE = 0.8  # of the wall clock, below which the vehicle's is slow
+_STANDING_STEP_US = 4000  # by which answers go on meanwhile, so often between two greetings:
+_STANDING_STEPS = round(1e6 * _GREETING_S / _STANDING_STEP_US)
 _SILENCE_S = 3.0  # of the simulator, until it is said
 _LOG_BYTES = 32_768  # of the flight log that are stored at once
 
@@ -160,6 +162,9 @@ class Program:
                 self.cost.pause()
                 if isinstance(self._ground, GroundStations):
                     self._ground.exchange(self.onboard, self._keep, stop)
+                    for _ in range(_STANDING_STEPS):
+                        self.onboard.endpoint.stand(_STANDING_STEP_US)
+                        self._ground.send(self.onboard)
                     if lost and now - beaten >= _BEAT_S:
                         beaten = now
                         self._ground.beat(self.onboard)
@@ -184,7 +189,7 @@ class Program:
                 areas = before.endpoint.areas
                 self._end_log()
                 self.onboard = self._build(before.endpoint.mission)
-                self.onboard.endpoint.kept_texts.inherit(before.endpoint.kept_texts.texts, before.now_us)
+                self.onboard.endpoint.inherit_texts(before.endpoint)
                 self.take_areas(areas)
                 self._ground.join(self.onboard)
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)

@@ -43,7 +43,7 @@ class Connection:
                 one.frame, one.id, one.system, one.component
             ):
                 continue
-            if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and _is_vehicle(one.message):
+            if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and is_vehicle(one.message):
                 if self.target is None:
                     self.target = Target(one.system, one.component)
                 if self.target == (one.system, one.component):
@@ -81,5 +81,6 @@ class Connection:
         return self._heard_us is not None and now_us - self._heard_us > self._link_timeout_us
 
 
-def _is_vehicle(heartbeat: Any) -> bool:
+def is_vehicle(heartbeat: Any) -> bool:
+    """Whether it is of a vehicle, not of a ground station or a companion computer."""
     return heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID and heartbeat.type not in _NOT_A_VEHICLE

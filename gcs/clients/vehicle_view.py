@@ -62,6 +62,11 @@ _PHASES = {
     for value, entry in mavlink.enums["PLUMBLINE_PHASE"].items()
     if "ENUM_END" not in entry.name
 }
+_STATES = {
+    value: str(entry.name).removeprefix("MAV_STATE_").lower()
+    for value, entry in mavlink.enums["MAV_STATE"].items()
+    if "ENUM_END" not in entry.name
+}
 _LANDED = {
     mavlink.MAV_LANDED_STATE_ON_GROUND: "on the ground",
     mavlink.MAV_LANDED_STATE_IN_AIR: "in the air",
@@ -173,6 +178,12 @@ class VehicleView:
     def mode(self) -> str | None:
         heartbeat = self.latest.get("HEARTBEAT")
         return None if heartbeat is None else mode_name(heartbeat.custom_mode)
+
+    @property
+    def state(self) -> str | None:
+        """MAV_STATE: standby, active, critical (a failsafe, or the simulator is silent), ..."""
+        heartbeat = self.latest.get("HEARTBEAT")
+        return None if heartbeat is None else _STATES.get(heartbeat.system_status, "not known")
 
     @property
     def ready_to_arm(self) -> bool | None:

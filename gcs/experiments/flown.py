@@ -15,7 +15,7 @@ from gcs.analysis.samples import CARRIED, MISSION, Samples, samples_of
 from gcs.analysis.telemetry import load_telemetry
 from gcs.analysis.tracks import Telemetry
 from gcs.experiments.plan import Experiment
-from gcs.experiments.store import TLOG_FILE
+from gcs.folders import TLOG_FILE
 from gcs.report.build import META_FILE, load_meta
 
 _AT_REST_M_S = 1e-6  # desired speeds are single precision

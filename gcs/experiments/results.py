@@ -14,8 +14,6 @@ from gcs.experiments.decay import DEPTH, Decay, decay_of
 from gcs.experiments.flown import Flown
 from gcs.experiments.plan import printed
 
-RESULTS_FILE = "results.json"
-
 # error function: unit; what cannot be told from zero (single precision on the wire, 20 m from home); how deep
 # below its peak the fit goes: the configuration errors are squares of the others
 ERROR_FUNCTIONS: dict[str, tuple[str, float, float]] = {

@@ -8,10 +8,10 @@ from typing import Any
 
 from gcs.batch.reuse import Origin, origin_of
 from gcs.experiments.plan import SEED, SENSORS, Experiment
+from gcs.folders import TLOG_FILE
 from gcs.report.build import META_FILE, ReportError, load_meta
 
 MARK_FILE = "flown.json"  # written when a flight is whole; says which code flew it
-TLOG_FILE = "flight.tlog"
 _WHOLE = ("completed", "diverged", "timeout")  # outcomes that say something about the experiment
 # of the code that flies an experiment: `gcs fly` once it has read a mission file, and what it starts
 ENTRIES = ("gcs.workflows.own_flight", "missions.fileformat", "sitl.__main__", "autopilot.__main__")

@@ -14,9 +14,9 @@ from gcs.experiments.figures.catalogue import Drawn, draw_figures, wanted
 from gcs.experiments.flown import read_flown
 from gcs.experiments.page import PAGE_FILE, render_page
 from gcs.experiments.plan import CASES, LAWS, VEHICLES, Experiment, in_reading_order
-from gcs.experiments.results import RESULTS_FILE, result, write_results
+from gcs.experiments.results import result, write_results
 from gcs.experiments.table import markdown
-from gcs.folders import make_folder
+from gcs.folders import RESULTS_FILE, keep_others, make_folder
 
 FLIGHTS = "flights"
 FIGURES = "figures"
@@ -66,6 +66,7 @@ def _order(record: Record) -> tuple[int, int, int]:
 
 def make_directory(out: Path) -> None:
     """`out`, or one line on why not."""
+    keep_others(out, RESULTS_FILE, (PAGE_FILE, TABLE_FILE))
     make_folder(out / FLIGHTS, f"--out {out}")
 
 

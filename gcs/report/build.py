@@ -9,11 +9,10 @@ from pathlib import Path
 from gcs.analysis.record import FlightMeta, Record, flight_record
 from gcs.analysis.samples import samples_of
 from gcs.analysis.telemetry import load_telemetry
+from gcs.folders import PAGE_FILE, SUMMARY_FILE
 
 META_FILE = "meta.json"
-SUMMARY_FILE = "summary.json"
 PARQUET_FILE = "flight.parquet"
-PAGE_FILE = "report.html"
 MCAP_FILE = "flight.mcap"
 
 # steps done, steps in all, what is done next

@@ -7,7 +7,9 @@ import select
 import socket
 import struct
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from gcs.errors import GcsError
 
@@ -115,6 +117,10 @@ class UdpSocket:
             return []
         return [datagram]
 
+    def answer_to(self, peer: tuple[str, int]) -> None:
+        """Send there from now on."""
+        self._peer = peer
+
     def send(self, datagram: bytes) -> None:
         """Send to the peer; nothing if there is none yet or it does not listen."""
         if self._peer is not None:
@@ -144,7 +150,14 @@ def open_address(address: Address) -> UdpSocket:
     return UdpSocket("0.0.0.0" if not host.startswith("127.") else LOOPBACK, 0, peer=(host, address.port))
 
 
-def wait(sockets: list[UdpSocket], timeout_s: float) -> None:
+class Readable(Protocol):
+    """A socket, or what holds one."""
+
+    def fileno(self) -> int:
+        """Its file descriptor."""
+
+
+def wait(sockets: Sequence[Readable], timeout_s: float) -> None:
     """Until one of them has a datagram, or the time is over."""
     select.select(sockets, [], [], max(timeout_s, 0.0))
 

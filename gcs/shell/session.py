@@ -15,8 +15,9 @@ from gcs.clients.operation import Operation, Result, Status, Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.display import StepDisplay
-from gcs.shell.link import Address, monotonic_us, open_address, unix_us, wait
+from gcs.shell.link import Address, monotonic_us, unix_us, wait
 from gcs.shell.truth import TruthLink
+from gcs.shell.vehicle_socket import VehicleSocket
 
 FIND_S = 5.0
 TRUTH_S = 2.0  # it says five times a second of its clock whose it is
@@ -42,7 +43,7 @@ class Session:
         self._connection = Connection(link_timeout_us)
         if address.signing_key is not None:
             self._connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
-        self._socket = open_address(address)
+        self._socket = VehicleSocket(address)
 
     @property
     def target(self) -> Target:

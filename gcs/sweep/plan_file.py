@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from gcs.batch.reuse import Origin, file_digests, origin_of
-from gcs.folders import make_folder
+from gcs.folders import PLAN_FILE, make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
 
-PLAN_FILE = "plan.json"
 ENTRIES = ("gcs.sweep.work",)  # of the code that flies a sweep
 
 

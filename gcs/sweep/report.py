@@ -13,6 +13,7 @@ from autopilot.own.chosen import parameters_for
 from autopilot.vehicle.file import load_belief
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 from gcs.analysis.axes import Floats
+from gcs.folders import PAGE_FILE
 from gcs.sweep.margin import linear_range
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import load_command
@@ -24,7 +25,6 @@ from gcs.web.page import render
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import load_truth
 
-PAGE_FILE = "report.html"
 _TEMPLATE = "sweep.html"
 _MOST_PAIRS = 10
 _SCRIPTS = ("sweep.js",)

@@ -13,8 +13,9 @@ from autopilot.shell.compiling import Part
 from gcs.batch.pool import PoolCrew
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running, fly_all
+from gcs.folders import PAGE_FILE, PLAN_FILE, keep_others
 from gcs.sweep.plan import SweepPlan
-from gcs.sweep.plan_file import PLAN_FILE, store_plan, sweep_origin
+from gcs.sweep.plan_file import store_plan, sweep_origin
 from gcs.sweep.results import COMPLETED
 from gcs.sweep.store import Row, Store
 from gcs.sweep.work import batches, fly_cases, prepare
@@ -56,6 +57,7 @@ def sweep(
     which are otherwise compiled where they are first needed.
     """
     store = Store(directory, plan)
+    keep_others(directory, PLAN_FILE, (PAGE_FILE,))
     if fresh:
         store.clear()
         (directory / PLAN_FILE).unlink(missing_ok=True)

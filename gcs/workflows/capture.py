@@ -10,13 +10,12 @@ from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.errors import GcsError, NoVehicleError, RefusedError
-from gcs.folders import fresh_folder
+from gcs.folders import TLOG_FILE, fresh_folder
 from gcs.shell.display import say
 from gcs.shell.link import Address, monotonic_us, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
 from gcs.shell.truth import TruthLink
-from gcs.workflows.report import TLOG_FILE
 
 
 def capture_to(

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gcs.errors import EXIT_USAGE, GcsError
-from gcs.workflows.report import TLOG_FILE, find_log
+from gcs.folders import TLOG_FILE
+from gcs.workflows.report import find_log
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta

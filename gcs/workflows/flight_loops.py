@@ -13,6 +13,7 @@ from gcs.errors import NoVehicleError
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import UdpSocket, monotonic_us
 from gcs.shell.stopping import StopRequest
+from gcs.shell.vehicle_socket import VehicleSocket
 
 if TYPE_CHECKING:
     from gcs.workflows.flight_page import FlightPage
@@ -144,7 +145,7 @@ def _show(display: FlightDisplay, client: FlightClient) -> None:
 def run_wall_clock(
     client: FlightClient,
     capture: Capture,
-    vehicle: UdpSocket,
+    vehicle: UdpSocket | VehicleSocket,
     truth: Drained,
     ended: Ended,
     display: FlightDisplay,

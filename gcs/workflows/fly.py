@@ -18,7 +18,7 @@ from gcs.errors import (
     StoppedError,
     disk_trouble,
 )
-from gcs.folders import fresh_folder, make_folder
+from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, fresh_folder, keep_others, make_folder
 from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
@@ -27,7 +27,7 @@ from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FirmwareProgram, FlightOptions
 from gcs.workflows.mission_file import load
 from gcs.workflows.own_vehicle import AUTOPILOT_LOG, FIRMWARE_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
-from gcs.workflows.report import TLOG_FILE, make_report
+from gcs.workflows.report import make_report
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.warmup import flight_parts, warm_up
 from missions.model import Mission
@@ -237,6 +237,7 @@ class FlightFolder:
 
     def __enter__(self) -> FlightFolder:
         make_folder(self._path, f"--out {self._path}")
+        keep_others(self._path, TLOG_FILE, () if self._overwrite else (SUMMARY_FILE, PAGE_FILE))
         try:
             (self._path / TLOG_FILE).touch(exist_ok=self._overwrite)
         except FileExistsError:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from autopilot.wire.tlog import read_tlog, write_common
 from gcs.errors import GcsError
+from gcs.folders import TLOG_FILE, keep_others
 from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
 
 COMMON_FILE = "flight.common.tlog"
-TLOG_FILE = "flight.tlog"  # in a directory of gcs fly or gcs capture
 
 
 def make_report(
@@ -51,6 +51,7 @@ def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, P
     """The report of a log, or of the directory that holds it, made again; the record and its directory."""
     tlog = find_log(source)
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else tlog.with_suffix(""))
+    keep_others(folder, TLOG_FILE)
     return make_report(tlog, folder, None, quiet), folder
 
 

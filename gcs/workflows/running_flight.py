@@ -11,10 +11,11 @@ from gcs.clients import command
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
 from gcs.shell.display import FlightDisplay, say
-from gcs.shell.link import Address, open_address, unix_us
+from gcs.shell.link import Address, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
 from gcs.shell.truth import TruthLink
+from gcs.shell.vehicle_socket import VehicleSocket
 from gcs.workflows.flight_loops import run_wall_clock
 from gcs.workflows.flight_options import FlightOptions
 from gcs.workflows.own_flight import flight_client
@@ -61,7 +62,7 @@ def _fly(
 ) -> None:
     if address.signing_key is not None:
         client.connection.sign_with(Signing(address.signing_key, timestamp_of(unix_us())))
-    vehicle = open_address(address)
+    vehicle = VehicleSocket(address)
     try:
         with FlightDisplay(mission.name, options.quiet) as display:
             capture = Capture(log, unix_us())

@@ -81,6 +81,7 @@ def status_record(view: VehicleView) -> dict[str, Any]:
     world = view.truth.get("SIM_STATUS")
     return {
         "mode": view.mode,
+        "state": view.state,
         "armed": view.armed,
         "ready_to_arm": view.ready_to_arm,
         "landed": view.landed,

@@ -11,10 +11,11 @@ from autopilot.own.chosen import NOTHING_OWN, Own
 from gcs.batch.pool import dask_cluster, own_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
+from gcs.folders import PAGE_FILE
 from gcs.shell.display import say
 from gcs.shell.stopping import StopRequest
 from gcs.sweep.plan import SweepPlan, make_plan, read_varied
-from gcs.sweep.report import PAGE_FILE, write_report
+from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
 from gcs.workflows.flight_options import FlightOptions, setting_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gcs.errors import GcsError
-from gcs.folders import fresh_folder
+from gcs.folders import PAGE_FILE, PLAN_FILE, RESULTS_FILE, SUMMARY_FILE, TLOG_FILE, fresh_folder, keep_others
 from gcs.workflows.fly import FlightFolder
 
 
@@ -49,3 +49,29 @@ def test_what_was_recorded_outlives_two_interrupts(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         interrupted(b"telemetry")
     assert (tmp_path / "out" / "flight.tlog").read_bytes() == b"telemetry"
+
+
+@pytest.mark.parametrize(
+    ("there", "kind", "told"),
+    [
+        (PLAN_FILE, TLOG_FILE, "holds a sweep; name another"),
+        (TLOG_FILE, PLAN_FILE, "holds a flight; name another"),
+        (RESULTS_FILE, PLAN_FILE, "holds the thesis's experiments; name another"),
+        (PAGE_FILE, PLAN_FILE, "holds a report.html that is not of a sweep; name another"),
+    ],
+)
+def test_results_of_one_kind_do_not_take_the_place_of_others(
+    tmp_path: Path, there: str, kind: str, told: str
+) -> None:
+    (tmp_path / there).write_text("theirs", encoding="utf-8")
+    with pytest.raises(GcsError, match=told):
+        keep_others(tmp_path, kind, (PAGE_FILE,))
+
+
+def test_a_flight_leaves_a_sweep_and_files_of_others_as_they_are(tmp_path: Path) -> None:
+    for name in (SUMMARY_FILE, PLAN_FILE):
+        (tmp_path / name).write_text("theirs", encoding="utf-8")
+        with pytest.raises(GcsError, match="holds a "):
+            FlightFolder(tmp_path, overwrite=name == PLAN_FILE).__enter__()
+        assert [file.name for file in tmp_path.iterdir()] == [name]
+        (tmp_path / name).unlink()

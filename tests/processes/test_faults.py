@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 from collections.abc import Callable
@@ -158,13 +159,20 @@ def test_an_autopilot_that_stood_still_in_real_time_gives_the_flight_up(fly: Cal
     assert b"has started again" not in flight.autopilot.log.read_bytes()
 
 
-def test_a_vehicle_whose_simulator_is_silent_is_not_armed(fly: Callable[..., Flight], gcs: Gcs) -> None:
+def test_a_vehicle_whose_simulator_is_silent_refuses_what_is_to_be_flown(
+    fly: Callable[..., Flight], gcs: Gcs
+) -> None:
     flight = fly(*QUICK)
     flight.sitl.process.send_signal(signal.SIGSTOP)
     flight.autopilot.says(b"no word from the simulator")
-    refused = gcs("arm", "--connect", flight.ground)
-    assert refused.returncode == 1
-    assert "simulator is silent" in refused.stderr
+    for command in ("arm", "land", "start"):
+        refused = gcs(command, "--connect", flight.ground)
+        assert refused.returncode == 1, command
+        assert "simulator is silent" in refused.stderr
+    told = gcs("status", "--connect", flight.ground).stdout
+    assert re.search(r"state +critical", told)
+    assert "Simulator silent: time stands still" in told
+    assert "Simulator silent: time stands still" in gcs("texts", "--connect", flight.ground).stdout
     flight.sitl.process.send_signal(signal.SIGCONT)
     flight.autopilot.says(b"flying with the simulator at .*\n(.*\n)*.*flying with the simulator at ")
     flight.take_off()

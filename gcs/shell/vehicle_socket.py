@@ -1,0 +1,82 @@
+"""The socket at which one vehicle is met: others that speak there are not taken for it."""
+
+from __future__ import annotations
+
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.connection import is_vehicle
+from gcs.clients.datagrams import messages
+from gcs.shell.display import say
+from gcs.shell.link import Address, UdpSocket, monotonic_us, open_address
+
+GONE_US = 2_000_000  # after such a silence who else speaks is the vehicle, started again
+
+Sender = tuple[str, int]
+
+
+class VehicleSocket:
+    """Hears the vehicle whose heartbeat comes first, and whoever is no vehicle; answers go to the vehicle."""
+
+    def __init__(self, address: Address) -> None:
+        self._address = address
+        self._socket: UdpSocket = open_address(address)
+        self._vehicle: Sender | None = None
+        self._heard_us = 0
+        self._others: dict[Sender, int] = {}  # vehicles that are not heard, and their systems
+        self._told: set[Sender] = set()
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a datagram is there."""
+        return self._socket.waiting
+
+    def send(self, datagram: bytes) -> None:
+        """Send to the vehicle, or to whoever spoke last before there was one."""
+        self._socket.send(datagram)
+
+    def drain(self) -> list[bytes]:
+        """All datagrams that are there, without waiting."""
+        now_us = monotonic_us()
+        heard = self._socket.drain_with_senders()
+        return [datagram for datagram, sender in heard if self._takes(datagram, sender, now_us)]
+
+    def _takes(self, datagram: bytes, sender: Sender, now_us: int) -> bool:
+        if sender == self._vehicle:
+            self._heard_us = now_us
+            self._tell_of_others()
+            return True
+        system = _vehicle_in(datagram)
+        if self._vehicle is not None and now_us - self._heard_us < GONE_US:
+            if system is not None:
+                self._others[sender] = system
+            return sender not in self._others
+        if system is not None:
+            self._vehicle, self._heard_us = sender, now_us
+            self._others.pop(sender, None)
+        if system is not None or self._vehicle is None:
+            self._socket.answer_to(sender)
+        return True
+
+    def _tell_of_others(self) -> None:
+        """The vehicle speaks on, so that these are not it: said once of each."""
+        for sender, system in self._others.items():
+            if sender not in self._told:
+                self._told.add(sender)
+                host, port = sender
+                say(
+                    f"another vehicle (system {system}) speaks on UDP {self._address} from {host}:{port} and"
+                    " is not heard; give each a port of its own: autopilot --gcs"
+                )
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _vehicle_in(datagram: bytes) -> int | None:
+    """The system of the vehicle whose heartbeat it holds."""
+    for one in messages(datagram)[0]:
+        if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and is_vehicle(one.message):
+            return one.system
+    return None

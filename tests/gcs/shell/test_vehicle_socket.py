@@ -1,0 +1,108 @@
+"""Two vehicles at one port: one of them is heard and answered, the other is named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+from gcs.shell import vehicle_socket
+from gcs.shell.link import Address, UdpSocket, free_port, parse_address, wait
+from gcs.shell.vehicle_socket import GONE_US, VehicleSocket
+
+WAIT_S = 5.0
+
+
+def heartbeat(kind: int = mavlink.MAV_AUTOPILOT_PX4, of: int = mavlink.MAV_TYPE_QUADROTOR) -> bytes:
+    return FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(of, kind, 0, 0, 0, 3))
+
+
+class Clock:
+    """Ours, in us."""
+
+    def __init__(self) -> None:
+        self.now_us = 0
+
+    def __call__(self) -> int:
+        return self.now_us
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    ours = Clock()
+    monkeypatch.setattr(vehicle_socket, "monotonic_us", ours)
+    return ours
+
+
+@pytest.fixture
+def address() -> Address:
+    return parse_address(str(free_port()))
+
+
+@pytest.fixture
+def ground(address: Address) -> Iterator[VehicleSocket]:
+    ours = VehicleSocket(address)
+    yield ours
+    ours.close()
+
+
+@pytest.fixture
+def two(address: Address) -> Iterator[tuple[UdpSocket, UdpSocket]]:
+    both = UdpSocket(peer=(address.host, address.port)), UdpSocket(peer=(address.host, address.port))
+    yield both
+    for one in both:
+        one.close()
+
+
+def heard(ground: VehicleSocket, sender: UdpSocket, *datagrams: bytes) -> list[bytes]:
+    found: list[bytes] = []
+    for datagram in datagrams:
+        sender.send(datagram)
+        wait([ground], WAIT_S)
+        assert ground.waiting
+        found += ground.drain()
+    return found
+
+
+def test_of_two_vehicles_the_first_is_heard_and_answered(
+    ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = two
+    assert heard(ground, first, heartbeat(), b"first") == [heartbeat(), b"first"]
+    assert heard(ground, second, heartbeat(), b"second") == []
+    assert not capsys.readouterr().err, "it may be the first one, started again"
+    assert heard(ground, first, b"goes on", b"and on") == [b"goes on", b"and on"]
+    assert capsys.readouterr().err.count(f"from {second.address} and is not heard") == 1
+    ground.send(b"answer")
+    wait([first], WAIT_S)
+    assert first.drain() == [b"answer"]
+    assert not second.waiting
+
+
+def test_a_vehicle_that_starts_again_is_heard_at_its_new_port(
+    ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before, after = two
+    heard(ground, before, heartbeat())
+    clock.now_us = GONE_US - 1
+    assert heard(ground, after, heartbeat()) == []
+    clock.now_us = GONE_US
+    assert heard(ground, after, heartbeat(), b"here") == [heartbeat(), b"here"]
+    ground.send(b"answer")
+    wait([after], WAIT_S)
+    assert after.drain() == [b"answer"]
+    assert not capsys.readouterr().err
+
+
+def test_who_is_no_vehicle_is_heard_beside_it(
+    ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock
+) -> None:
+    vehicle, companion = two
+    word = heartbeat(mavlink.MAV_AUTOPILOT_INVALID, mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
+    heard(ground, vehicle, heartbeat())
+    assert heard(ground, companion, word) == [word]
+    ground.send(b"answer")
+    wait([vehicle], WAIT_S)
+    assert vehicle.drain() == [b"answer"]
