@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 import threading
 from collections.abc import Callable
@@ -442,7 +443,9 @@ def main(address: str, steps: list[str]) -> None:
             except Exception as error:
                 sys.exit(f"{step}: {type(error).__name__} {error}\n{pilot.texts}")
         told = {**pilot.told, "texts": pilot.texts, "modes": pilot.modes}
-    print(json.dumps(told))
+        print(json.dumps(told), flush=True)
+        # 4.1.0 at times dies of a segmentation fault while it is taken apart, whatever vehicle there was
+        os._exit(0)
 
 
 if __name__ == "__main__":
