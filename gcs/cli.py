@@ -80,6 +80,10 @@ class Gcs(click.Group):
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
         extra.pop("standalone_mode", None)
+        if sys.stdout.isatty() or sys.stderr.isatty():
+            from autopilot.shell.options import outlive_terminal
+
+            outlive_terminal()
         try:
             code = super().main(args, standalone_mode=False, **extra)
         except GcsError as error:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import tempfile
 from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
-from gcs.errors import GcsError
+from gcs.errors import GcsError, InputError
 
 SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
 TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
@@ -18,7 +20,10 @@ _HOLDS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis
 def fresh_folder(name: str) -> Path:
     """`flights/NAME-TIME`, made now and nobody else's: of two that begin in one second the later has `-2`."""
     parent, stem = Path("flights"), f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
-    make_folder(parent, str(parent))
+    try:
+        make_folder(parent, str(parent))
+    except GcsError as error:
+        raise GcsError(f"{error}; name another folder by --out DIR") from None
     folder, ordinal = parent / stem, 1
     while True:
         try:
@@ -41,6 +46,39 @@ def make_folder(path: Path, told: str) -> None:
             raise PermissionError(13, "Permission denied")
     except OSError as error:
         raise GcsError(f"{told}: {error.strerror}") from None
+
+
+def check_writable(path: Path, is_folder: bool, told: str) -> None:
+    """InputError, which calls it `told`, unless a file can be written there, or files into a folder there.
+
+    It is tried, as permissions do not tell all (/proc), and what was made for it is taken away again.
+    """
+    try:
+        if is_folder or not path.parent.is_dir():
+            _try_folder(path if is_folder else path.parent)
+        else:
+            _try_file(path)
+    except OSError as error:
+        kind = "folder" if is_folder else "file in a folder"
+        raise InputError(f"{told}: {error.strerror}; name a {kind} that can be written") from None
+
+
+def _try_folder(path: Path) -> None:
+    """Make something in the nearest folder that is there."""
+    there = next(one for one in (path, *path.absolute().parents) if one.exists())
+    if not there.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+    Path(tempfile.mkdtemp(dir=there)).rmdir()
+
+
+def _try_file(path: Path) -> None:
+    """Open it without a change to what is in it; a pipe is left alone, which may wait for its reader."""
+    is_new = not path.exists()
+    if not (is_new or path.is_file()):
+        return
+    path.open("ab").close()
+    if is_new:
+        path.unlink()
 
 
 def keep_others(path: Path, kind: str, written: Iterable[str] = ()) -> None:

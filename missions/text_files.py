@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 
 MOST_BYTES = 16 * 2**20  # ten times the largest plan that a vehicle takes
@@ -12,7 +13,8 @@ class TextFileError(ValueError):
 
 
 def text_of(path: Path) -> str:
-    """The text of a file in UTF-8; TextFileError for what is none, is too long, or would never end."""
+    """The text of a file in UTF-8, without the mark at its beginning that some editors set (BOM);
+    TextFileError for what is none, is too long, or would never end."""
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
             raise TextFileError("cannot be read: a device or a pipe, which may have no end")
@@ -20,8 +22,14 @@ def text_of(path: Path) -> str:
             data = file.read(MOST_BYTES + 1)
         if len(data) > MOST_BYTES:
             raise TextFileError(f"cannot be read: more than {MOST_BYTES // 2**20} MiB")
-        return data.decode("utf-8")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise TextFileError(f"not a text file in UTF-8 (byte {error.start})") from None
+        utf_16 = error.object.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
+        found = (
+            "not a text file in UTF-8 but in UTF-16; save it as UTF-8"
+            if utf_16
+            else f"not a text file in UTF-8 (byte {error.start})"
+        )
+        raise TextFileError(found) from None
     except OSError as error:
         raise TextFileError(f"cannot be read: {error.strerror}") from None

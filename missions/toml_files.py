@@ -98,7 +98,9 @@ class TomlFiles:
         try:
             return TomlText(path.stem, given, text_of(path))
         except TextFileError as error:
-            raise self.error([f"{given}: {error}"]) from None
+            near = "" if path.exists() else nearest(path.stem, self.names())
+            hint = f"; did you mean the shipped {near}?" if near else ""
+            raise self.error([f"{given}: {error}{hint}"]) from None
 
     def table(self, text: str, where: str) -> dict[str, Any]:
         """The keys and values of a TOML text. `where` begins each line of an error."""

@@ -73,14 +73,22 @@ def _keys(record: Any) -> dict[str, Any]:
     for field in fields(record) if known else ():
         value = getattr(record, field.name)
         if field.name.endswith("_rad") and isinstance(value, Real):
-            table[field.name.removesuffix("_rad") + "_deg"] = _degrees(float(value))
+            table[field.name.removesuffix("_rad") + "_deg"] = _degrees(_number(value))
         elif isinstance(value, Sequence) and not isinstance(value, str):
             table |= {field.name: [_keys(part) for part in value]} if value else {}
         elif value is not None:
-            table[field.name] = float(value) if isinstance(value, Real) else value
+            table[field.name] = _number(value) if isinstance(value, Real) else value
     if isinstance(record, Term) and record.hold_s is None:
-        del table["fall_s"]  # the term stays at its top
+        table.pop("fall_s", None)  # the term stays at its top
     return table
+
+
+def _number(value: Real) -> float:
+    """As a file has it; an integer that no float holds is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return inf
 
 
 def _degrees(angle_rad: float) -> float:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from operator import index
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any
 
 from gcs.errors import GcsError
 
+_LONGEST_SHOWN = 80  # characters of a value
 _PHRASES = (  # of the command line, and what they are in Python
     (r"; choose another --out, or add --fresh to .*", "; choose another out"),
     (r"; --sample takes a few", "; vary less"),
@@ -44,10 +47,10 @@ def number(name: str, value: Any) -> float:
     """A finite number, or `Error`."""
     try:
         found = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = math.nan
     if not math.isfinite(found):
-        raise GcsError(f"{name} = {value!r}; must be a finite number")
+        raise GcsError(f"{name} = {shown(value)}; must be a finite number")
     return found
 
 
@@ -55,18 +58,19 @@ def positive(name: str, value: Any) -> float:
     """A finite number above 0, or `Error`."""
     found = number(name, value)
     if found <= 0.0:
-        raise GcsError(f"{name} = {value!r}; must be greater than 0")
+        raise GcsError(f"{name} = {shown(value)}; must be greater than 0")
     return found
 
 
-def whole(name: str, value: Any, least: int) -> int:
-    """A whole number of `least` or more, or `Error`."""
+def whole(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """A whole number from `least` to `most`, or `Error`."""
     try:
         found = index(value)
     except TypeError:
         found = least - 1
-    if found < least:
-        raise GcsError(f"{name} = {value!r}; must be a whole number, {least} or more")
+    if found < least or (most is not None and found > most):
+        limits = f", {least} or more" if most is None else f" from {least} to {most}"
+        raise GcsError(f"{name} = {shown(value)}; must be a whole number{limits}")
     return found
 
 
@@ -76,6 +80,70 @@ def numbers(name: str, values: Any) -> tuple[float, ...]:
         found = tuple(number(f"{name}[{i}]", value) for i, value in enumerate(values))
     except TypeError:
         found = ()
-    if not found or isinstance(values, str):
-        raise GcsError(f"{name} = {values!r}; must be a list of numbers")
+    if not found or isinstance(values, str | Mapping):
+        raise GcsError(f"{name} = {shown(values)}; must be a list of numbers")
     return found
+
+
+def text(name: str, value: Any, example: str) -> str:
+    """A text, or `Error`, which shows one that could be."""
+    if not isinstance(value, str):
+        raise GcsError(f"{name} = {shown(value)}; must be a text, as {example!r}")
+    return value
+
+
+def file_path(name: str, value: Any) -> Path:
+    """The path of a file or a directory, or `Error`."""
+    path = name_or_file(name, value)
+    if not path:
+        raise GcsError(f"{name} = ''; must be the path of a file or a directory")
+    return Path(path)
+
+
+def name_or_file(name: str, value: Any) -> str:
+    """The name of a shipped thing, or the path of a file, whether or not there is one; `Error` if it can be
+    neither."""
+    path = fspath(value) if isinstance(value, str | PathLike) else None
+    if not isinstance(path, str):
+        raise GcsError(f"{name} = {shown(value)}; must be a text or a Path")
+    return path
+
+
+def items(name: str, values: Any, what: str) -> tuple[Any, ...]:
+    """The members of a list or of another iterable, or `Error`, which says `what` it must be."""
+    if isinstance(values, Iterable) and not isinstance(values, str | bytes | Mapping):
+        return tuple(values)
+    raise GcsError(f"{name} = {shown(values)}; must be {what}")
+
+
+def by_parameter(name: str, values: Any, example: str) -> Mapping[str, Any]:
+    """What a mapping has by names of parameters, nothing for None; `Error` shows one that could be."""
+    if values is None:
+        return {}
+    if not isinstance(values, Mapping):
+        raise GcsError(f"{name} = {shown(values)}; must be a dict, as {example}")
+    for key in values:
+        parameter_name(name, key)
+    return values
+
+
+def parameter_name(where: str, name: Any) -> str:
+    """The name of a parameter, in capitals, whether or not there is one; `Error` if it can be none."""
+    if not isinstance(name, str) or not name.isidentifier():
+        raise GcsError(f"{where}: {shown(name)} is no name of a parameter; must be one as 'SIM_WIND_E'")
+    return name.upper()
+
+
+def setting_words(settings: Any) -> tuple[str, ...]:
+    """Parameters with their values, as the command line writes them; or `Error`."""
+    found = by_parameter("settings", settings, "{'SIM_WIND_E': 3}")
+    return tuple(f"{name}={number(f'settings[{name!r}]', value)!r}" for name, value in found.items())
+
+
+def shown(value: Any) -> str:
+    """The value as Python writes it, in one line that is not long."""
+    try:
+        written = " ".join(repr(value).split())
+    except ValueError:  # an integer of thousands of digits
+        written = f"a number of {value.bit_length()} bits" if isinstance(value, int) else type(value).__name__
+    return written if len(written) <= _LONGEST_SHOWN else written[: _LONGEST_SHOWN - 3] + "..."

@@ -16,7 +16,8 @@ from gcs.folders import PAGE_FILE, TLOG_FILE, keep_others, make_folder
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
 from missions import model
-from plumbline.arguments import number, positive, told_in_python, whole
+from missions.nearest import did_you_mean
+from plumbline.arguments import file_path, positive, setting_words, text, told_in_python, whole
 from plumbline.frames import as_frame
 from plumbline.made_files import name_or_path
 from plumbline.missions import Mission
@@ -62,6 +63,7 @@ def fly(
     profile, law, estimator, planner or parameter, if a value is no number or out of its range, if what you
     have brought fails before it flies, or if the vehicle cannot fly the mission.
     """
+    from autopilot.shell.options import MOST_SEED
     from gcs.workflows.flight_here import fly_here
 
     known = isinstance(mission, model.Mission)
@@ -69,15 +71,13 @@ def fly(
     options = FlightOptions(
         mission=flown.name if known else str(mission),
         law=law_reference(law),
-        sensors=name_or_path(sensors, "sensors"),
-        vehicle=name_or_path(vehicle, getattr(vehicle, "name", "") or "vehicle"),
-        seed=whole("seed", seed, 0),
+        sensors=name_or_path("sensors", sensors),
+        vehicle=name_or_path("vehicle", vehicle),
+        seed=whole("seed", seed, 0, MOST_SEED),
         speed=None,
         real_time=False,
         out=None,
-        settings=tuple(
-            f"{name}={number(f'settings[{name!r}]', value)!r}" for name, value in (settings or {}).items()
-        ),
+        settings=setting_words(settings),
         connect=None,
         quiet=quiet,
         force=force,
@@ -128,8 +128,9 @@ class Flight:
         from gcs.report.style import style
 
         pictures = {picture.name: picture for picture in PICTURES}
-        if name not in pictures:
-            raise GcsError(f"plot {name!r}: there is none; must be one of {', '.join(pictures)}")
+        if text("plot", name, "error") not in pictures:
+            hint = did_you_mean(name, pictures)
+            raise GcsError(f"plot {name!r}: there is none; {hint}must be one of {', '.join(pictures)}")
         view = View(self._received, self._samples, self.summary, self._meta)
         png = io.BytesIO()
         with style():
@@ -141,7 +142,7 @@ class Flight:
         the page."""
         from gcs.workflows.report import make_report
 
-        folder = Path(out)
+        folder = file_path("out", out)
         make_folder(folder, str(folder))
         keep_others(folder, TLOG_FILE)
         (folder / TLOG_FILE).write_bytes(self.tlog)
@@ -176,8 +177,15 @@ class Picture:
         self.png = png
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file."""
-        Path(path).write_bytes(self.png)
+        """Write it to a file, x.png; one that is there is replaced."""
+        file = file_path("path", path)
+        if file.suffix.lower() not in ("", ".png"):
+            raise GcsError(f"{file}: a picture is written as PNG alone; name it {file.stem}.png")
+        try:
+            file.write_bytes(self.png)
+        except OSError as error:
+            told = f"{file}: cannot be written: {error.strerror}; name a file in a folder that can be written"
+            raise GcsError(told) from None
 
     def _repr_png_(self) -> bytes:
         return self.png

@@ -17,6 +17,7 @@ from typing import Protocol
 from platformdirs import user_cache_path
 
 from gcs.errors import GcsError
+from plumbline.arguments import shown
 
 
 class Savable(Protocol):
@@ -26,13 +27,17 @@ class Savable(Protocol):
         """Write its file."""
 
 
-def name_or_path(given: str | PathLike[str] | Savable, name: str) -> str:
-    """A name or a path as it was given; of a thing made in Python the path of its file, which is called
-    `name`."""
+def name_or_path(argument: str, given: str | PathLike[str] | Savable) -> str:
+    """A name or a path as the argument gives it; of a thing made in Python the path of its file, which has
+    its name, or that of the argument."""
     if isinstance(given, str | PathLike):
         return str(given)
-    if not hasattr(given, "save"):
-        raise GcsError(f"{given!r}: must be a name, the path of a file, or one made by plumbline")
+    kind = argument.capitalize()
+    if not hasattr(given, "save") or kind not in (one.__name__ for one in type(given).__mro__):
+        raise GcsError(
+            f"{argument} = {shown(given)}; must be a name, the path of a file, or a plumbline.{kind}"
+        )
+    name = getattr(given, "name", "") or argument
     folder = user_cache_path("plumbline") / "inputs"
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as beside:

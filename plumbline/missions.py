@@ -11,6 +11,7 @@ from missions.fileformat import MissionFileError, load_mission, mission_of
 from missions.model import Step
 from missions.toml_files import FileError
 from missions.writing import mission_table, write_toml
+from plumbline.arguments import file_path, items, name_or_file, text
 
 
 class Mission(model.Mission):
@@ -36,7 +37,13 @@ class Mission(model.Mission):
         description: str = "",
         assumptions: Iterable[str] = (),
     ) -> None:
-        table = mission_table(title or name, description, tuple(assumptions), tuple(steps))
+        text("name", name, "there")
+        table = mission_table(
+            title or name,
+            description,
+            items("assumptions", assumptions, "a list of texts"),
+            items("steps", steps, "a list of steps, as [Takeoff(1.0), Land()]"),
+        )
         try:
             made = mission_of(table, name, name)
         except MissionFileError as error:
@@ -47,7 +54,7 @@ class Mission(model.Mission):
     def load(cls, name_or_path: str | PathLike[str]) -> Mission:
         """A shipped mission by its name, or that of a file, which goes by the name of the file."""
         try:
-            found = load_mission(name_or_path)
+            found = load_mission(name_or_file("mission", name_or_path))
         except MissionFileError as error:
             raise input_error(error) from None
         return cls(found.name, found.steps, found.title, found.description, found.assumptions)
@@ -56,6 +63,6 @@ class Mission(model.Mission):
         """Write the mission file, which `load` and every command read; one that is there is replaced."""
         table = mission_table(self.title, self.description, self.assumptions, self.steps)
         try:
-            write_toml(path, table)
+            write_toml(file_path("path", path), table)
         except FileError as error:
             raise input_error(error) from None

@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import TypeVar
 
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import KEY_BYTES
 from gcs.clients import command
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterGet, ParameterSet
@@ -30,10 +31,12 @@ from gcs.workflows.reposition import reposition
 from gcs.workflows.running_flight import vehicle_home
 from gcs.workflows.transfer import checked_upload
 from missions import model
-from plumbline.arguments import positive, told_in_python
+from missions.nearest import did_you_mean
+from plumbline.arguments import number, parameter_name, positive, shown, text, told_in_python
 from plumbline.made_files import name_or_path
 from plumbline.missions import Mission
 from plumbline.state import State, state_of
+from plumbline.vehicles import Vehicle
 
 Value = TypeVar("Value")
 Condition = Callable[[State], bool]
@@ -61,8 +64,11 @@ def connect(
     32 bytes with which messages are signed (docs/mavlink.md). `Error` if no vehicle is heard.
     """
     limit_s = positive("timeout_s", timeout_s)
+    if signing_key is not None and not (isinstance(signing_key, bytes) and len(signing_key) == KEY_BYTES):
+        raise GcsError(f"signing_key: must be {KEY_BYTES} bytes, as secrets.token_bytes({KEY_BYTES})")
     with told_in_python():
-        where = replace(parse_address(address), signing_key=signing_key)
+        found = parse_address(text("address", address, "udpin:127.0.0.1:14550"))
+        where = replace(found, signing_key=signing_key)
         return RunningVehicle(Session(where, limit_s, round(limit_s * 1e6)), limit_s)
 
 
@@ -109,11 +115,12 @@ class RunningVehicle:
 
     def arm(self, *, force: bool = False, timeout_s: float = 30.0) -> None:
         """Start the rotors. A vehicle that is not ready yet is waited for; then it refuses, and says why."""
+        limit_s = positive("timeout_s", timeout_s)
         if not force and self.state.ready_to_arm is not True:
             with suppress(NoVehicleError):  # the refusal says why it is not
-                self.wait("ready", timeout_s)
+                self.wait("ready", limit_s)
         self._command(lambda session: command.arm(session.target, force))
-        self.wait(lambda state: state.armed is True, timeout_s)
+        self.wait(lambda state: state.armed is True, limit_s)
 
     def disarm(self, *, force: bool = False) -> None:
         """Stop the rotors; in the air only by force: it falls."""
@@ -124,16 +131,18 @@ class RunningVehicle:
 
         The vehicle must be armed.
         """
+        height_m = None if up_m is None else number("up_m", up_m)
+        limit_s = positive("timeout_s", timeout_s)
         self._must_be_armed("takeoff")
 
         def make(session: Session) -> Operation:
-            if up_m is None:
+            if height_m is None:
                 return command.takeoff(session.target)
-            return command.takeoff(session.target, vehicle_home(session).altitude_m + up_m)
+            return command.takeoff(session.target, vehicle_home(session).altitude_m + height_m)
 
         self._command(make)
         if wait:
-            self.wait("holding", timeout_s)
+            self.wait("holding", limit_s)
 
     def goto(
         self,
@@ -149,23 +158,27 @@ class RunningVehicle:
 
         It has arrived when it is within 0.1 m and slower than 0.1 m/s. A mission that is being flown ends.
         """
+        height_m = None if up_m is None else number("up_m", up_m)
+        place = (number("east_m", east_m), number("north_m", north_m), height_m)
+        pace_m_s = None if speed_m_s is None else positive("speed_m_s", speed_m_s)
+        limit_s = positive("timeout_s", timeout_s)
         self._must_be_armed("goto")
-        self._command(lambda session: reposition(session, (east_m, north_m, up_m), False, speed_m_s))
-        place = (east_m, north_m, up_m)
+        self._command(lambda session: reposition(session, place, False, pace_m_s))
         if wait:
-            self.wait(lambda state: _is_there(state, place), timeout_s)
+            self.wait(lambda state: _is_there(state, place), limit_s)
 
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
         """Set the load down, and the vehicle beside it."""
+        limit_s = positive("timeout_s", timeout_s)
         self._command(lambda session: command.land(session.target))
         if wait:
-            self.wait("landed", timeout_s)
+            self.wait("landed", limit_s)
 
     def upload(
         self,
         mission: str | PathLike[str] | model.Mission,
         *,
-        vehicle: str | PathLike[str] = "bebop",
+        vehicle: str | PathLike[str] | Vehicle = "bebop",
         force: bool = False,
     ) -> None:
         """Put a mission on the vehicle: a shipped name, a file (also .plan and .waypoints), or a `Mission`.
@@ -174,9 +187,9 @@ class RunningVehicle:
         """
         if isinstance(mission, model.Mission) and not isinstance(mission, Mission):
             mission = Mission(mission.name, mission.steps, mission.title)
-        path = name_or_path(mission, getattr(mission, "name", ""))
+        path, checked = name_or_path("mission", mission), name_or_path("vehicle", vehicle)
         with told_in_python():
-            send = checked_upload(path, str(vehicle), force, False, lambda _: None)
+            send = checked_upload(path, checked, force, False, lambda _: None)
         self._patiently(lambda: send(self._session))
 
     def start(self) -> None:
@@ -193,17 +206,20 @@ class RunningVehicle:
 
     def mode(self, name: str) -> None:
         """Change the flight mode, in plain words: hold, mission, return, land ..."""
-        if name not in FLOWN_MODES:
-            raise GcsError(f"mode {name!r}: there is none; must be one of {', '.join(sorted(FLOWN_MODES))}")
+        if text("mode", name, "hold") not in FLOWN_MODES:
+            hint = did_you_mean(name, FLOWN_MODES)
+            known = ", ".join(sorted(FLOWN_MODES))
+            raise GcsError(f"mode {name!r}: there is none; {hint}must be one of {known}")
         main, sub = FLOWN_MODES[name]
         armed = bool(self.state.armed)
         self._command(lambda session: command.set_mode(session.target, name, main, sub, armed))
 
     def parameter(self, name: str) -> float:
         """The value of a parameter."""
+        asked = parameter_name("parameter", name)
 
         def read() -> float:
-            operation = ParameterGet(self._session.target, name.upper())
+            operation = ParameterGet(self._session.target, asked)
             exchange(self._session, operation)
             assert operation.value is not None
             return operation.value
@@ -212,9 +228,8 @@ class RunningVehicle:
 
     def set_parameter(self, name: str, value: float) -> None:
         """Set a parameter, and see that it was stored."""
-        self._patiently(
-            lambda: exchange(self._session, ParameterSet(self._session.target, name.upper(), value))
-        )
+        asked, wanted = parameter_name("parameter", name), number(name, value)
+        self._patiently(lambda: exchange(self._session, ParameterSet(self._session.target, asked, wanted)))
 
     # ---- waiting
 
@@ -226,9 +241,8 @@ class RunningVehicle:
         vehicle's clock, if the vehicle is disarmed before, or falls silent.
         """
         condition, what = self._condition(until)
-        if isinstance(until, int | float):
-            timeout_s = math.inf
-        return self._in_thread(lambda: self._watch(condition, what, timeout_s))
+        limit_s = math.inf if isinstance(until, int | float) else positive("timeout_s", timeout_s)
+        return self._in_thread(lambda: self._watch(condition, what, limit_s))
 
     def _condition(self, until: str | float | Condition) -> tuple[Condition, str]:
         if isinstance(until, str):
@@ -236,8 +250,11 @@ class RunningVehicle:
                 raise GcsError(f"wait {until!r}: must be one of {', '.join(_WORDS)}, a number or a function")
             return _WORDS[until], f"{until!r}"
         if isinstance(until, int | float):
-            clock = _Clock()
-            return lambda state: clock.passed_s(state) >= until, f"{until:g} s"
+            clock, awaited_s = _Clock(), number("wait", until)
+            return lambda state: clock.passed_s(state) >= awaited_s, f"{awaited_s:g} s"
+        if not callable(until):
+            known = ", ".join(_WORDS)
+            raise GcsError(f"wait {shown(until)}: must be one of {known}, a number or a function")
         return until, "what was asked for"
 
     def _watch(self, condition: Condition, what: str, timeout_s: float) -> State:

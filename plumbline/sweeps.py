@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Any
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.errors import EXIT_INTERRUPTED, GcsError, InputError
 from gcs.workflows.flight_options import own_words
-from plumbline.arguments import number, numbers, told_in_python, whole
+from plumbline.arguments import (
+    by_parameter,
+    file_path,
+    items,
+    numbers,
+    setting_words,
+    shown,
+    told_in_python,
+    whole,
+)
 from plumbline.frames import as_frame, check_kind
 from plumbline.made_files import name_or_path
 from plumbline.references import estimator_reference, law_reference, planner_reference
@@ -59,21 +68,23 @@ def sweep(
     """
     check_kind(kind)
     with ExitStack() as stack:
-        folder = Path(out or stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-")))
+        if out is None:
+            out = stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-"))
+        folder = file_path("out", out)
         words = [
-            name_or_path(mission, getattr(mission, "name", "") or "mission"),
+            name_or_path("mission", mission),
             "--seeds",
             str(whole("seeds", seeds, 1)),
         ]
-        words += ["--sensors", name_or_path(sensors, "sensors")]
-        words += ["--vehicle", name_or_path(vehicle, getattr(vehicle, "name", "") or "vehicle")]
+        words += ["--sensors", name_or_path("sensors", sensors)]
+        words += ["--vehicle", name_or_path("vehicle", vehicle)]
         for law in _laws(laws):
             words += ["--law", law_reference(law)]
         words += own_words(estimator_reference(estimator), planner_reference(planner))
-        for name, values in (vary or {}).items():
+        for name, values in by_parameter("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
             words += ["--vary", f"{name}={','.join(map(repr, numbers(f'vary[{name!r}]', values)))}"]
-        for name, value in (settings or {}).items():
-            words += ["--set", f"{name}={number(f'settings[{name!r}]', value)!r}"]
+        for setting in setting_words(settings):
+            words += ["--set", setting]
         if jobs is not None:
             words += ["--jobs", str(whole("jobs", jobs, 1))]
         if scheduler is not None:
@@ -87,15 +98,20 @@ def sweep(
 
 
 def _laws(laws: Sequence[str]) -> Sequence[str]:
-    if isinstance(laws, str) or not laws:
-        raise GcsError(f"laws = {laws!r}; must be a list of laws, as [{DEFAULT_LAW!r}]")
-    return laws
+    wanted = f"a list of laws, as [{DEFAULT_LAW!r}]"
+    if not (found := items("laws", laws, wanted)):
+        raise GcsError(f"laws = {laws!r}; must be {wanted}")
+    return found
 
 
 def _address(scheduler: Any) -> str:
     """Of a Dask client, or as it was given."""
-    found = getattr(scheduler, "scheduler", None)
-    return str(scheduler if found is None else found.address)
+    found = getattr(getattr(scheduler, "scheduler", None), "address", scheduler)
+    if not isinstance(found, str) or not found:
+        raise GcsError(
+            f"scheduler = {shown(scheduler)}; must be a Dask client or an address, as tcp://HOST:8786"
+        )
+    return found
 
 
 def _run(words: list[str], quiet: bool) -> None:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from gcs.errors import GcsError, input_error
 from missions.toml_files import FileError, TomlFiles, problems
 from missions.writing import write_toml
+from plumbline.arguments import file_path, name_or_file
 
 _EVERY_TICK = "tick"  # in a file; a record holds a rate of 0
 
@@ -31,7 +32,7 @@ class Table(BaseModel):
     def load(cls, name_or_path: str | PathLike[str]) -> Self:
         """A shipped one by its name, or that of a file."""
         try:
-            found = cls.files.read(name_or_path)
+            found = cls.files.read(name_or_file(cls.files.kind, name_or_path))
             return cls(**cls.files.table(found.text, found.where))
         except FileError as error:
             raise input_error(error) from None
@@ -50,7 +51,7 @@ class Table(BaseModel):
     def save(self, path: str | PathLike[str]) -> None:
         """Write the file, which `load` and every command read; one that is there is replaced."""
         try:
-            write_toml(path, self.keys())
+            write_toml(file_path("path", path), self.keys())
         except FileError as error:
             raise input_error(error) from None
 

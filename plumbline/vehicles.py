@@ -9,6 +9,7 @@ from autopilot.vehicle import model
 from autopilot.vehicle.file import VEHICLES, vehicle_keys
 from gcs.errors import input_error
 from missions.toml_files import FileError, TomlFiles
+from plumbline.arguments import name_or_file
 from plumbline.tables import Table
 
 
@@ -26,7 +27,7 @@ class Vehicle(Table, model.Vehicle):
     def load(cls, name_or_path: str | PathLike[str]) -> Self:
         """A shipped one by its name, or that of a file; with a `believed`, what it leaves out is as there."""
         try:
-            keys, _ = vehicle_keys(name_or_path)
+            keys, _ = vehicle_keys(name_or_file("vehicle", name_or_path))
         except FileError as error:
             raise input_error(error) from None
         return cls(**keys)

@@ -11,6 +11,7 @@ import click
 
 from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
+    MOST_SEED,
     Address,
     ProgramCommand,
     Stop,
@@ -63,7 +64,7 @@ def _run_on(cpu: int) -> None:
     help=f"What really flies: {VEHICLES.choice()}.",
 )
 @click.option(
-    "--seed", default=1, show_default=True, type=WholeNumber(0, 2**63 - 1), help="Seed of all noise."
+    "--seed", default=1, show_default=True, type=WholeNumber(0, MOST_SEED), help="Seed of all noise."
 )
 @click.option(
     "--speed",
@@ -155,6 +156,11 @@ def main(
     real_time = real_time or kind.real_time
     listen = listen or kind.listen
     truth_every = truth_every or kind.truth_every
+
+    if settings:
+        from autopilot.shell.setting_names import check_names
+
+        check_names(settings)
 
     def say(text: str) -> None:
         if not quiet:

@@ -109,11 +109,10 @@ def _of_name(place: str) -> ModuleType:
 def _of_entry_point(name: str, group: str, what: str, shipped: Sequence[str]) -> type:
     there = {point.name: point for point in entry_points(group=group)}
     if name not in there:
-        known = ", ".join((*shipped, *sorted(there)))
+        known = "".join(f"{one}, " for one in (*shipped, *sorted(there)))
+        known += "or " if known else ""
         hint = did_you_mean(name, (*shipped, *there))
-        raise OwnError(
-            f"{name!r}: no {what} of that name; {hint}must be {known}, or a file as my_law.py:MyLaw"
-        )
+        raise OwnError(f"{name!r}: no {what} of that name; {hint}must be {known}a file as my_law.py:MyLaw")
     try:
         found = there[name].load()
     except BaseException as error:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
-from autopilot.services.identity import Flavour, Identity
+from autopilot.services.identity import FLOWN, Flavour, Identity, Mode
 from autopilot.services.records import Announce, Decide, Output, Peer, Say, Send, Verdict
 from autopilot.services.requests import (
     Answered,
@@ -147,15 +147,21 @@ def _takeoff(call: Call, context: Context) -> Request | Verdict:
 def _mode_of_pair(main: int, sub: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode(main, sub)
     if mode is None:
-        return _refused(f"Mode {main}/{sub} is unknown to the {context.flavour.name} flavour")
-    return SetMode(mode.main, mode.sub)
+        return _refused(context.flavour.not_flown(f"Mode {main}/{sub} unknown"))
+    return _flown_mode(mode, SetMode(mode.main, mode.sub), context)
 
 
 def _mode_of_number(number: int, context: Context) -> Request | Verdict:
     mode = context.flavour.mode_of_number(number)
     if mode is None:
-        return _refused(f"Custom mode {number} is unknown to the {context.flavour.name} flavour")
-    return SetMode(mode.main, mode.sub, number)
+        return _refused(context.flavour.not_flown(f"Mode {number} unknown"))
+    return _flown_mode(mode, SetMode(mode.main, mode.sub, number), context)
+
+
+def _flown_mode(mode: Mode, request: SetMode, context: Context) -> Request | Verdict:
+    if mode.pair not in FLOWN:
+        return _refused(context.flavour.not_flown(f"{mode.name} not flown"))
+    return request
 
 
 def _set_mode(call: Call, context: Context) -> Request | Verdict:

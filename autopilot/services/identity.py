@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from autopilot.services.statustext import CHUNK
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.dialect import plumbline as mavlink
 
@@ -44,6 +45,15 @@ FLOWN = (
     (AUTO, AUTO_LAND),
     (OFFBOARD, 0),
     (POSCTL, 0),
+)
+# the modes that are named to whoever asks for another, the most useful first
+_NAMED = (
+    (AUTO, AUTO_LOITER),
+    (AUTO, AUTO_MISSION),
+    (AUTO, AUTO_RTL),
+    (AUTO, AUTO_LAND),
+    (POSCTL, 0),
+    (OFFBOARD, 0),
 )
 # MAV_STANDARD_MODE of a pair, and its name for people
 _STANDARD = {
@@ -126,6 +136,15 @@ class Flavour:
         return tuple(
             mode for mode in self.modes if mode.pair in FLOWN and self._by_number[mode.custom_mode] is mode
         )
+
+    def not_flown(self, what: str) -> str:
+        """What is wrong with a mode that was asked for, and names of others, as many as one STATUSTEXT has
+        room for."""
+        text = f"{what}; use"
+        for pair in _NAMED:
+            longer = f"{text} {self._by_pair[pair].name}" if pair in self._by_pair else text
+            text = longer if len(longer) <= CHUNK else text
+        return text
 
     def mode(self, main: int, sub: int, asked: int | None = None) -> Mode | None:
         """The mode of PX4's pair, under the number `asked` where that means the pair.

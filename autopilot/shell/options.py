@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import gc
 import os
 import signal
 import socket
 import struct
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO, cast
 
 import click
 
@@ -22,6 +23,7 @@ from autopilot.wire.signing import NoKeyError, key_of_text
 Address = tuple[str, int]
 
 LARGEST_DATAGRAM = 65535
+MOST_SEED = 2**63 - 1
 _PR_SET_TIMERSLACK = 29
 
 
@@ -30,6 +32,7 @@ class ProgramCommand(click.Command):
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
         extra["standalone_mode"] = False
+        outlive_terminal()
         try:
             code = super().main(args, **extra)
         except click.UsageError as error:
@@ -51,8 +54,63 @@ class WholeNumber(click.IntRange):
     name = "whole number"
 
 
+class NamedPath(click.Path):
+    """A path that says where: not an empty one, which would be the folder that somebody happens to be in."""
+
+    def convert(
+        self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | bytes | os.PathLike[str]:
+        if not os.fspath(value):
+            self.fail("'' is no path; . is the folder in which you are", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+def stop_signals() -> tuple[signal.Signals, ...]:
+    """What asks a program to end: also that its terminal is closed, unless it is to outlive that (nohup)."""
+    outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    return (signal.SIGINT, signal.SIGTERM) if outlives else (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class LastingStream:
+    """A terminal to which may be written even when it is closed: from then on nobody reads it."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        with self._whether_or_not_it_is_there():
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with self._whether_or_not_it_is_there():
+            self._stream.flush()
+
+    @contextmanager
+    def _whether_or_not_it_is_there(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            if error.errno != errno.EIO:
+                raise
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())  # what is left in its buffer goes there, too
+            os.close(nowhere)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def outlive_terminal() -> None:
+    """What is said to a terminal that was closed is lost, and no error."""
+    if sys.stdout.isatty():
+        sys.stdout = cast(TextIO, LastingStream(sys.stdout))
+    if sys.stderr.isatty():
+        sys.stderr = cast(TextIO, LastingStream(sys.stderr))
+
+
 class Stop(BaseException):
-    """SIGTERM or SIGINT."""
+    """SIGTERM, SIGINT or SIGHUP."""
 
 
 class StopRequest:
@@ -63,15 +121,17 @@ class StopRequest:
     """
 
     asked = False
+    _signals: tuple[signal.Signals, ...] = ()
 
     def __enter__(self) -> StopRequest:
-        signal.signal(signal.SIGTERM, self._note)
-        signal.signal(signal.SIGINT, self._note)
+        self._signals = stop_signals()
+        for number in self._signals:
+            signal.signal(number, self._note)
         return self
 
     def __exit__(self, *_: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once is enough
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        for number in self._signals:
+            signal.signal(number, signal.SIG_IGN)  # once is enough
 
     def _note(self, _signal: int, _frame: object) -> None:
         self.asked = True
@@ -168,7 +228,7 @@ def signing_key_option(text: str) -> bytes:
     try:
         if path.stat().st_mode & 0o077:
             raise click.BadParameter(f"{text!r} can be read by others; chmod 600 {text}")
-        return key_of_text(path.read_text(encoding="utf-8"))
+        return key_of_text(path.read_text(encoding="utf-8-sig"))
     except NoKeyError as error:
         raise click.BadParameter(f"{text!r} {error}") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -180,6 +240,6 @@ def setting_option(text: str) -> tuple[str, float]:
     """NAME=VALUE."""
     name, _, value = text.partition("=")
     try:
-        return name.strip(), float(value)
+        return name.strip().upper(), float(value)
     except ValueError:
         raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None

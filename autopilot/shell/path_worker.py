@@ -84,7 +84,8 @@ class Aside:
 
 
 def _serve(rehearsal: Rehearsal, pipe: Connection) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever began it ends it
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # whoever began it ends it
     rehearsal.done()
     with suppress(EOFError, OSError), watched_calls():  # our parent is gone
         pipe.send(None)  # ready

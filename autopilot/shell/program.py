@@ -37,6 +37,7 @@ from autopilot.shell.ground import AutopilotError, GroundInStep, GroundStations,
 from autopilot.shell.options import (
     LARGEST_DATAGRAM,
     Address,
+    NamedPath,
     ProgramCommand,
     Stop,
     StopRequest,
@@ -51,6 +52,7 @@ from autopilot.shell.options import (
     signing_key_option,
 )
 from autopilot.shell.path_worker import Aside
+from autopilot.shell.setting_names import check_names
 from autopilot.shell.steady_clock import SteadyClock
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.storing import Storing
@@ -381,7 +383,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(
     "--storage",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=NamedPath(file_okay=False, path_type=Path),
     metavar="DIR",
     help="Where mission and parameters outlive the program.  [default: the user's state directory]",
 )
@@ -428,6 +430,7 @@ def main(
     try:
         own = Own(own_law(law or DEFAULT_LAW), estimator, planner)
         table = parameters_for(load_belief(vehicle), own)
+        check_names(settings, table.names)
         kept = Storage(storage or user_state_path("plumbline"))
         kept.lock()
         troubles = kept.load_parameters(table)

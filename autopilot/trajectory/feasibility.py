@@ -85,6 +85,20 @@ class VehicleLimits:
         )
 
     @property
+    def usable_n(self) -> float:
+        """The thrust (N) of which the reserve is left."""
+        return self.vehicle.greatest_thrust_n * (1.0 - self.thrust_reserve)
+
+    @property
+    def says_thrust(self) -> str:
+        """What the rotors give, in words."""
+        rotors, full, usable = len(self.vehicle.layout), self.vehicle.greatest_thrust_n, self.usable_n
+        reserve = f", {usable:.2f} N with the reserve of {100.0 * self.thrust_reserve:.0f} %"
+        return (
+            f"{_NUMBERS.get(rotors, str(rotors))} rotors give {full:.2f} N{reserve if usable < full else ''}"
+        )
+
+    @property
     def shaping(self) -> Limits:
         """What the autopilot shapes paths to, as delivered: its MIS_ parameters."""
         vehicle = self.vehicle
@@ -146,7 +160,9 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
 
     `shaped`: signals are flown by an autopilot that shapes them; what it can fly near the asked path passes.
     """
-    found: list[Violation] = []
+    found: list[Violation] = _too_heavy(limits)
+    if found:
+        return found
     for entry in _timeline(mission, limits):
         if isinstance(entry.step, Takeoff | Waypoint) and entry.end[2] < LEAST_HEIGHT_M:
             text = (
@@ -176,6 +192,20 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
         if along is not None:
             found += _judge(entry, along, limits)
     return found
+
+
+def _too_heavy(limits: VehicleLimits) -> list[Violation]:
+    """What there is to say of a vehicle that cannot even hover with its load, however slowly it flies."""
+    vehicle = limits.vehicle
+    weight = (vehicle.quad_mass_kg + vehicle.load_mass_kg) * vehicle.gravity_m_s2
+    if weight <= limits.usable_n:
+        return []
+    text = (
+        f"vehicle ({vehicle.quad_mass_kg:g} kg) and load ({vehicle.load_mass_kg:g} kg) weigh {weight:.2f} N; "
+        f"{limits.says_thrust} ({_excess(weight, limits.usable_n)}): it cannot hover; lower load_mass_kg, or "
+        "raise rotor_max_n"
+    )
+    return [Violation(0, "thrust", weight, limits.usable_n, 0.0, text)]
 
 
 def paths(mission: Mission, limits: VehicleLimits, planner: Planner | None = None) -> list[PathReport]:
@@ -244,10 +274,7 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
 
     fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
     vehicle = limits.vehicle
-    gravity, full = vehicle.gravity_m_s2, vehicle.greatest_thrust_n
-    rotors = len(vehicle.layout)
-    count = _NUMBERS.get(rotors, str(rotors))
-    usable = full * (1.0 - limits.thrust_reserve)
+    gravity, usable = vehicle.gravity_m_s2, limits.usable_n
     # a step that begins under the ground has been told of at the one that led there
     if along.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
         says = f"the load would be {-along.height_low.value:.2f} m under the ground"
@@ -262,10 +289,9 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
         yield violation("tension", fall, gravity, says)
         return
     if thrust.value > usable:
-        reserve = f", {usable:.2f} N with the reserve of {100.0 * limits.thrust_reserve:.0f} %"
         says = (
-            f"the flight needs {thrust.value:.2f} N of thrust; {count} rotors give {full:.2f} N"
-            f"{reserve if usable < full else ''} ({_excess(thrust.value, usable)})"
+            f"the flight needs {thrust.value:.2f} N of thrust; {limits.says_thrust} "
+            f"({_excess(thrust.value, usable)})"
         )
         yield violation("thrust", thrust, usable, says)
     if high.value > vehicle.rotor_max_n:

@@ -6,12 +6,14 @@ the simulator flies it, and the autopilot, and whoever checks missions, goes by 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from autopilot.vehicle.model import Vehicle
-from missions.toml_files import FileError, TomlFiles
+from missions.toml_files import FileError, TomlFiles, shown
 
 
 class VehicleFileError(FileError):
@@ -30,7 +32,12 @@ def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
 
 def load_belief(name_or_path: str | PathLike[str]) -> Vehicle:
     """What the autopilot takes it for; a VehicleFileError says what is wrong with either."""
-    return load_vehicle(belief_of(name_or_path))
+    table, where = _table(name_or_path)
+    believed = _believed(table, name_or_path)
+    if not believed:
+        return load_vehicle(name_or_path)
+    with _told_of(where, table):
+        return load_vehicle(believed)
 
 
 def belief_of(name_or_path: str | PathLike[str]) -> str | PathLike[str]:
@@ -46,7 +53,8 @@ def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str
     believed = _believed(table, name_or_path)
     if not believed:
         return table, where
-    keys, other = _table(believed)
+    with _told_of(where, table):
+        keys, other = _table(believed)
     if keys.get("believed"):
         raise VehicleFileError([f"{where}: believed: {other} has a `believed` of its own; name that one"])
     return {**keys, **table}, where
@@ -55,6 +63,16 @@ def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str
 def _table(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:
     found = VEHICLES.read(name_or_path)
     return {"name": found.name, **VEHICLES.table(found.text, found.where)}, found.where
+
+
+@contextmanager
+def _told_of(where: str, table: dict[str, Any]) -> Iterator[None]:
+    """A VehicleFileError of the vehicle that is believed names the file and the key that name it."""
+    try:
+        yield
+    except VehicleFileError as error:
+        lines = [f"{where}: believed = {shown(table['believed'])}; {line}" for line in error.problems]
+        raise VehicleFileError(lines) from None
 
 
 def _believed(table: dict[str, Any], name_or_path: str | PathLike[str]) -> str:

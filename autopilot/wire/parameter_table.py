@@ -11,7 +11,8 @@ import re
 import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
+
+from autopilot.wire.parameter_names import unknown_parameter
 
 NAME_LENGTH = 16  # PARAM_VALUE.param_id
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*")
@@ -179,9 +180,7 @@ class ParameterTable:
         }
 
     def _unknown(self, name: str) -> ParameterError:
-        close = get_close_matches(name, self.names, n=3, cutoff=0.6)
-        hint = f"; did you mean {' or '.join(close)}?" if close else ""
-        return ParameterError(f"{name}: no such parameter{hint}")
+        return ParameterError(unknown_parameter(name, self.names))
 
 
 def parse_text(text: str) -> dict[str, float]:

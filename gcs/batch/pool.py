@@ -111,8 +111,9 @@ def _killed_is_an_error() -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """Ctrl-C is handled by the parent; a worker whose parent has gone ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Ctrl-C and a closed terminal are handled by the parent; a worker whose parent has gone ends."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     parent = parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

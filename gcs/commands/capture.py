@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from gcs.commands.options import PositiveType, connect_option, truth_option
+from gcs.commands.options import OUTPUT_FILE, PositiveType, connect_option, truth_option
 from gcs.shell.link import Address
 
 
 @click.command("capture")
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=OUTPUT_FILE,
     help="The log to write.  [default: flights/capture-TIME/flight.tlog]",
 )
 @click.option(

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from gcs.commands.options import json_option, print_json
+from gcs.commands.options import OUTPUT_FILE, json_option, print_json
 
 
 @click.command("compare")
 @click.argument("runs", metavar="RUN RUN ...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=OUTPUT_FILE,
     help="The page.  [default: comparisons/RUN-RUN.html]",
 )
 @json_option

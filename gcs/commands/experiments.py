@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from autopilot.shell.options import WholeNumber
-from gcs.commands.options import json_option, print_json
+from gcs.commands.options import OUTPUT_FILE, OUTPUT_FOLDER, json_option, print_json
 from gcs.shell.display import say
 
 
@@ -19,7 +19,7 @@ def experiments_command() -> None:
 @experiments_command.command("thesis")
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=OUTPUT_FOLDER,
     default=Path("experiments/thesis"),
     show_default=True,
     help="Where flights, tables and figures go.",
@@ -32,7 +32,7 @@ def experiments_command() -> None:
 )
 @click.option(
     "--docs",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=OUTPUT_FILE,
     help="Also put tables and key figures into this page, docs/thesis.md of the source tree.",
 )
 @json_option

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from autopilot.shell.options import WholeNumber
+from autopilot.shell.options import MOST_SEED, WholeNumber
 from gcs.commands.options import (
+    OUTPUT_FOLDER,
     AddressType,
     PositiveType,
     SettingType,
@@ -57,7 +58,7 @@ _OWN = (
     help="Fly with an autopilot of others, ardupilot=PROGRAM or px4=PROGRAM; see docs/autopilots.md.",
 )
 @click.option(
-    "--seed", type=WholeNumber(0, 2**63 - 1), default=1, show_default=True, help="Seed of all noise."
+    "--seed", type=WholeNumber(0, MOST_SEED), default=1, show_default=True, help="Seed of all noise."
 )
 @click.option("--lockstep", is_flag=True, help="As fast as it goes, the same bytes each time (default).")
 @click.option(
@@ -79,7 +80,7 @@ _OWN = (
 )
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=OUTPUT_FOLDER,
     help="Where telemetry and report go.  [default: flights/MISSION-TIME]",
 )
 @click.option(

@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 
 import click
 
-from autopilot.shell.options import WholeNumber
+from autopilot.shell.options import NamedPath, WholeNumber
+from gcs.folders import check_writable
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -45,6 +46,23 @@ class TruthType(click.ParamType):  # type: ignore[type-arg]
         if not address.listen:
             self.fail(f"{value!r}; a simulator is only listened to: PORT or HOST:PORT", param, ctx)
         return address
+
+
+class OutputPath(NamedPath):
+    """Where a command writes: refused before anything is done where nothing can be written."""
+
+    def __init__(self, is_folder: bool) -> None:
+        super().__init__(file_okay=not is_folder, dir_okay=is_folder, path_type=Path)
+        self._is_folder = is_folder
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        path = Path(str(super().convert(value, param, ctx)))
+        named = param.opts[0] if isinstance(param, click.Option) else ""
+        check_writable(path, self._is_folder, f"{named} {path}".lstrip())
+        return path
+
+
+OUTPUT_FOLDER, OUTPUT_FILE = OutputPath(is_folder=True), OutputPath(is_folder=False)
 
 
 class FiniteType(click.ParamType):  # type: ignore[type-arg]
@@ -249,7 +267,7 @@ def require_options(function: F) -> F:
     )
     junit = click.option(
         "--junit",
-        type=click.Path(dir_okay=False, path_type=Path),
+        type=OUTPUT_FILE,
         help="Write the outcome, and what was required, as a JUnit test report.",
     )
     return require(junit(function))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from gcs.commands.options import connect_option, json_option, print_json, print_table
+from gcs.commands.options import OUTPUT_FILE, connect_option, json_option, print_json, print_table
 from gcs.errors import GcsError
 from gcs.shell.link import Address
 from gcs.workflows.parameters import (
@@ -68,7 +68,7 @@ def set_command(name: str, value: float, address: Address) -> None:
 
 
 @param_command.command("save")
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("file", type=OUTPUT_FILE)
 @connect_option
 def save_command(file: Path, address: Address) -> None:
     """Save all parameters to FILE.

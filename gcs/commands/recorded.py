@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from gcs.commands.options import json_option, print_json, print_table
+from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json, print_table
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -62,7 +62,7 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 @columns_option
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=OUTPUT_FOLDER,
     help="Where table and picture go.  [default: replays/NAME]",
 )
 @json_option

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gcs.commands.options import json_option, print_json
+from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json
 from gcs.errors import GcsError
 
 
@@ -14,7 +14,7 @@ from gcs.errors import GcsError
 @click.argument("source", metavar="DIR|TLOG", type=click.Path(path_type=Path))
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=OUTPUT_FOLDER,
     help="Where the report goes.  [default: beside the log]",
 )
 @click.option("--mcap", is_flag=True, help="Also flight.mcap, for Foxglove, PlotJuggler and Rerun.")

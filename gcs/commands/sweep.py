@@ -12,6 +12,7 @@ from autopilot.own.chosen import Own
 from autopilot.shell.options import WholeNumber
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from gcs.commands.options import (
+    OUTPUT_FOLDER,
     LawType,
     SettingType,
     json_option,
@@ -71,7 +72,7 @@ from gcs.shell.display import say
 @click.option("--scheduler", metavar="ADDRESS", help="Fly on a running Dask cluster, e.g. tcp://host:8786.")
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=OUTPUT_FOLDER,
     help="Where table and report go.  [default: sweeps/MISSION]",
 )
 @click.option(

@@ -11,7 +11,14 @@ import click
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.clients.missions import MissionClear
-from gcs.commands.options import connect_option, json_option, print_json, print_table, vehicle_option
+from gcs.commands.options import (
+    OUTPUT_FILE,
+    connect_option,
+    json_option,
+    print_json,
+    print_table,
+    vehicle_option,
+)
 from gcs.formats.items import command_name
 from gcs.formats.missions import is_foreign
 from gcs.shell.link import Address
@@ -42,7 +49,7 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
 
 
 @click.command("download")
-@click.argument("file", required=False, type=click.Path(dir_okay=False, path_type=Path))
+@click.argument("file", required=False, type=OUTPUT_FILE)
 @json_option
 @connect_option
 def download_command(file: Path | None, as_json: bool, address: Address) -> None:

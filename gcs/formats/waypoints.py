@@ -13,7 +13,7 @@ _COLUMNS = 12
 
 def read_waypoints(text: str) -> list[FileItem]:
     """The items of a file; columns may be parted by tabs or spaces, `#` begins a comment."""
-    lines = text.lstrip("\ufeff").splitlines()
+    lines = text.splitlines()
     if not lines or lines[0].split() != HEAD.split():
         first = lines[0].strip()[:40] if lines else ""
         raise FormatError(f"line 1: {first!r}; must be {HEAD!r}")

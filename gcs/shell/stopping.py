@@ -1,13 +1,15 @@
-"""Ctrl-C: the first asks to stop in order, the second abandons what is still being done."""
+"""Ctrl-C: the first asks to stop in order, the second abandons what is still being done.
+
+A terminal that is closed asks to stop, too, however often that is said: shell and system both say it.
+"""
 
 from __future__ import annotations
 
 import signal
 from types import FrameType, TracebackType
 
+from autopilot.shell.options import stop_signals
 from gcs.shell.display import say
-
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopRequest:
@@ -23,12 +25,14 @@ class StopRequest:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if self._asked:
-            raise KeyboardInterrupt
+            if number != signal.SIGHUP:
+                raise KeyboardInterrupt
+            return
         self._asked = True
         say(self._hint)
 
     def __enter__(self) -> StopRequest:
-        for number in _SIGNALS:
+        for number in stop_signals():
             self._before[number] = signal.signal(number, self._handle)
         return self
 

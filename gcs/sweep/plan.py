@@ -21,10 +21,10 @@ from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import RateError, control_divider
+from autopilot.wire.parameter_names import unknown_parameter
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
-from gcs.parameter_names import unknown_parameter
 from missions.fileformat import load_mission
 from sitl.sensors.files import load_profile
 from sitl.settings import settings_of

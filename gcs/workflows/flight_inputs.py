@@ -14,16 +14,15 @@ from autopilot.vehicle.file import load_belief, load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import RateError, control_divider
+from autopilot.wire.parameter_names import unknown_parameter
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
-from gcs.parameter_names import unknown_parameter
+from gcs.workflows.flight_options import WORLD
 from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
-
-_WORLD = "SIM_"
 
 
 def check_flight_inputs(
@@ -39,7 +38,7 @@ def check_flight_inputs(
     given = list(settings)
     own, world = _table(believed, given_own), sim_parameters(truth_of(found))
     for name, value in given:
-        table = world if name.startswith(_WORLD) and name not in own else own
+        table = world if name.startswith(WORLD) and name not in own else own
         if name not in table:
             raise InputError(f"--set {unknown_parameter(name, [*own.names, *world.names])}")
         _check(table, name, value)

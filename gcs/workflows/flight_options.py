@@ -10,6 +10,7 @@ from autopilot.own.chosen import Own
 from autopilot.own.law import own_law
 from gcs.shell.link import Address
 
+WORLD = "SIM_"  # begins the names of the simulator's parameters
 _REFUSED = 2.0  # MIS_INFEASIBLE
 
 

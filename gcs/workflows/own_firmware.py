@@ -17,7 +17,7 @@ from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.firmware_flight import FIRMWARES, Firmware, FirmwareFlight
 from gcs.clients.firmware_mission import FirmwareMissionError, firmware_items
-from gcs.errors import GcsError
+from gcs.errors import GcsError, InputError
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, UdpSocket, free_port, unix_us
 from gcs.shell.processes import Processes
@@ -28,6 +28,7 @@ from gcs.workflows.flight_options import FirmwareProgram, FlightOptions, setting
 from gcs.workflows.own_vehicle import FIRMWARE_LOG, SIMULATOR_LOG, OwnVehicle
 from gcs.workflows.stopwatch import Stopwatch
 from missions.model import Mission
+from missions.nearest import nearest
 
 if TYPE_CHECKING:
     from gcs.workflows.flight_page import FlightPage
@@ -37,14 +38,16 @@ _PX4_PHYSICS = 4560  # TCP; its startup script knows no other
 
 
 def firmware_program(text: str) -> FirmwareProgram:
-    """KIND=PATH; GcsError says what is wrong with it."""
+    """KIND=PATH; InputError says what is wrong with it."""
     kind, _, path = text.partition("=")
     program = Path(path).expanduser()
     if kind not in FIRMWARES or not path:
         known = " or ".join(f"{name}=PATH" for name in FIRMWARES)
-        raise GcsError(f"--autopilot {text}: must be {known}")
+        near = nearest(kind, FIRMWARES)
+        hint = f"; did you mean {near}?" if near != kind and near else ""
+        raise InputError(f"--autopilot {text}: must be {known}{hint}")
     if not (program.is_file() and os.access(program, os.X_OK)):
-        raise GcsError(f"--autopilot {text}: no program there; see docs/autopilots.md on where to get one")
+        raise InputError(f"--autopilot {text}: no program there; see docs/autopilots.md on where to get one")
     return FirmwareProgram(kind, program.resolve())
 
 
@@ -115,7 +118,7 @@ def _px4(
     """The same of PX4, whose startup looks for px4-rc.params in PATH; `etc` is where its build has it."""
     etc = program.parent.parent / "etc"
     if not etc.is_dir():
-        raise GcsError(f"--autopilot px4={program}: no folder {etc}; name bin/px4 of a build of px4_sitl")
+        raise InputError(f"--autopilot px4={program}: no folder {etc}; name bin/px4 of a build of px4_sitl")
     lines = [line.split() for line in parameters.splitlines() if line and not line.startswith("#")]
     text = "".join(f"param set-default {name} {value}\n" for name, value in lines)
     (folder / "px4-rc.params").write_text(text, encoding="ascii")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from gcs.shell.link import LOOPBACK, UdpSocket, free_port
 from gcs.shell.processes import Processes
-from gcs.workflows.flight_options import FlightOptions, own_words
+from gcs.workflows.flight_options import WORLD, FlightOptions, own_words
 
 ONBOARD_LOG = "flight.ulg"
 SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG = "sitl.log", "autopilot.log", "firmware.log"
@@ -65,10 +65,12 @@ def _start(
     pace = ["--lockstep"] if options.speed is None else ["--speed", f"{options.speed:g}"]
     pace += ["--real-time"] if options.real_time else []
     both = ["--vehicle", options.vehicle]
-    if options.force:
-        both += ["--set", "MIS_INFEASIBLE=0"]
-    for setting in options.settings:
-        both += ["--set", setting]
+    given = [("--set", setting) for setting in options.settings]
+    theirs = [word for words in given if words[1].startswith(WORLD) for word in words]
+    told = ["--set", "MIS_INFEASIBLE=0"] if options.force else []
+    told += [
+        word for words in given for word in words
+    ]  # those of the world, too: what is measured is believed
     world = [
         "--sensors",
         options.sensors,
@@ -79,8 +81,8 @@ def _start(
         "--truth",
         truth,
     ]
-    processes.start("sitl", [*world, *pace, *both, "--quiet"], out / SIMULATOR_LOG)
+    processes.start("sitl", [*world, *pace, *both, *theirs, "--quiet"], out / SIMULATOR_LOG)
     link = ["--ground-lockstep", ground] if options.speed is None else ["--gcs", ground, *_WATCHERS]
     home = ["--sim", simulator, "--storage", str(storage), "--law", options.law]
     own = own_words(options.estimator, options.planner)
-    processes.start("autopilot", [*home, *own, *link, *both, "--quiet"], out / AUTOPILOT_LOG)
+    processes.start("autopilot", [*home, *own, *link, *both, *told, "--quiet"], out / AUTOPILOT_LOG)

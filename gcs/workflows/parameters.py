@@ -6,12 +6,12 @@ import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 
+from autopilot.wire.parameter_names import unknown_parameter
 from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
 from gcs.errors import GcsError, RefusedError
 from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
-from gcs.parameter_names import unknown_parameter
 from gcs.shell.display import StepDisplay, say
 from gcs.shell.link import Address
 from gcs.shell.session import Session

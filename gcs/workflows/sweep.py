@@ -10,11 +10,11 @@ from pathlib import Path
 from autopilot.own.chosen import NOTHING_OWN, Own
 from gcs.batch.pool import dask_cluster, own_processes
 from gcs.batch.programs import cores
-from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED
+from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
 from gcs.folders import PAGE_FILE
 from gcs.shell.display import say
 from gcs.shell.stopping import StopRequest
-from gcs.sweep.plan import SweepPlan, make_plan, read_varied
+from gcs.sweep.plan import MOST_FLIGHTS, SweepPlan, make_plan, read_varied
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
@@ -92,6 +92,8 @@ class Sweep:
 
 def run_sweep(options: SweepOptions) -> Sweep:
     """Plan the sweep, fly what is missing of it, and write its report; PlanError if it cannot be flown."""
+    if options.seeds > MOST_FLIGHTS:
+        raise InputError(f"--seeds {options.seeds}: too many, {MOST_FLIGHTS} flights at most")
     plan = make_plan(
         options.mission,
         options.vehicle,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import signal
 import sys
 import webbrowser
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from autopilot.shell.options import stop_signals
 from autopilot.vehicle.file import load_vehicle
 from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients.connection import Connection
@@ -197,7 +197,7 @@ async def _serve(
 ) -> None:
     stopped = asyncio.Event()
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in stop_signals():
         loop.add_signal_handler(number, stopped.set)
 
     def opened() -> list[dict[str, Any]]:

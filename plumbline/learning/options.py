@@ -11,6 +11,16 @@ from typing import Any
 
 from gcs.errors import GcsError
 from missions.model import Mission
+from missions.nearest import did_you_mean
+from plumbline.arguments import (
+    by_parameter,
+    number,
+    numbers,
+    positive,
+    setting_words,
+    shown,
+    whole,
+)
 from plumbline.learning.records import ACTIONS, Reward
 from plumbline.made_files import name_or_path
 from plumbline.sensors import Sensors
@@ -45,34 +55,37 @@ class EnvOptions:
     @cached_property
     def vehicle_file(self) -> str:
         """Name or path of the vehicle."""
-        return name_or_path(self.vehicle, getattr(self.vehicle, "name", "") or "vehicle")
+        return name_or_path("vehicle", self.vehicle)
 
     @cached_property
     def sensors_file(self) -> str:
         """Name or path of the sensor profile."""
-        return name_or_path(self.sensors, "sensors")
+        return name_or_path("sensors", self.sensors)
 
     def __post_init__(self) -> None:
+        for name in ("settings", "randomise", "reward"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, {})
         _one_of("action", self.action, tuple(ACTIONS))
         _one_of("observation", self.observation, OBSERVATIONS)
         _one_of("start", self.start, STARTS)
-        for name, least in (("history", 0), ("preview", 0)):
-            value = getattr(self, name)
-            if not isinstance(value, int) or not least <= value <= 1000:
-                raise GcsError(f"{name} = {value!r}; must be a whole number from {least} to 1000")
+        for name in ("history", "preview"):
+            whole(name, getattr(self, name), 0, 1000)
         for name in ("rate_hz", "preview_s", "reach_m"):
-            _positive(name, getattr(self, name))
-        if not 0.0 <= self.start_m < self.reach_m:
+            positive(name, getattr(self, name))
+        if not 0.0 <= number("start_m", self.start_m) < self.reach_m:
             raise GcsError(f"start_m = {self.start_m!r}; must be at least 0 and below reach_m")
         for name in ("max_rate_rad_s", "max_accel_m_s2"):
-            for value in getattr(self, name):
-                _positive(name, value)
-        unknown = sorted(set(self.reward) - set(Reward._fields))
-        if unknown:
-            raise GcsError(f"reward: there is no {unknown[0]!r}; there are {', '.join(Reward._fields)}")
-        for name, limits in self.randomise.items():
+            _three_positive(name, getattr(self, name))
+        setting_words(self.settings)
+        for name, weight in by_parameter("reward", self.reward, "{'crash': -10}").items():
+            if name not in Reward._fields:
+                hint = did_you_mean(name, Reward._fields)
+                raise GcsError(f"reward: there is no {name!r}; {hint}there are {', '.join(Reward._fields)}")
+            number(f"reward[{name!r}]", weight)
+        for name, limits in by_parameter("randomise", self.randomise, "{'SIM_WIND_E': (0, 3)}").items():
             if not _is_range(limits):
-                raise GcsError(f"randomise {name}: {limits!r}; must be (least, greatest)")
+                raise GcsError(f"randomise {name}: {shown(limits)}; must be (least, greatest)")
 
 
 def options_of(given: Mapping[str, Any]) -> EnvOptions:
@@ -80,18 +93,20 @@ def options_of(given: Mapping[str, Any]) -> EnvOptions:
     known = [each.name for each in fields(EnvOptions)]
     unknown = sorted(set(given) - set(known))
     if unknown:
-        raise GcsError(f"{unknown[0]}: there is no such option; there are {', '.join(known)}")
+        hint = did_you_mean(unknown[0], known)
+        raise GcsError(f"{unknown[0]}: there is no such option; {hint}there are {', '.join(known)}")
     return EnvOptions(**given)
 
 
 def _one_of(name: str, value: object, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise GcsError(f"{name} = {value!r}; must be one of {', '.join(known)}")
+    if not isinstance(value, str) or value not in known:
+        raise GcsError(f"{name} = {shown(value)}; must be one of {', '.join(known)}")
 
 
-def _positive(name: str, value: float) -> None:
-    if not (isfinite(value) and value > 0.0):
-        raise GcsError(f"{name} = {value!r}; must be a number above 0")
+def _three_positive(name: str, values: Any) -> None:
+    found = numbers(name, values)
+    if len(found) != 3 or min(found) <= 0.0:
+        raise GcsError(f"{name} = {shown(values)}; must be three numbers above 0")
 
 
 def _is_range(limits: Any) -> bool:

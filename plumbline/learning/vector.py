@@ -12,6 +12,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from gcs.errors import GcsError
+from plumbline.arguments import whole
 from plumbline.learning.batch import Episodes
 from plumbline.learning.options import options_of
 from plumbline.learning.ready import make_ready
@@ -41,11 +42,13 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        if num_envs < 1:
-            raise GcsError(f"num_envs = {num_envs}; must be at least 1")
-        self.num_envs = num_envs
+        self.num_envs = num_envs = whole("num_envs", num_envs, 1)
+        if max_episode_steps is not None:
+            max_episode_steps = whole("max_episode_steps", max_episode_steps, 1)
+        if threads is not None:
+            threads = whole("threads", threads, 1)
         self.render_mode = render_mode
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self.scenario = Scenario(options_of(options))
         make_ready(self.scenario)
@@ -125,6 +128,14 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         if len(seed) != self.num_envs:
             raise GcsError(f"seed: {len(seed)} seeds; must be {self.num_envs}")
         return seed
+
+
+def _autoreset_mode(given: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(given)
+    except ValueError:
+        known = ", ".join(repr(mode.value) for mode in AutoresetMode)
+        raise GcsError(f"autoreset_mode = {given!r}; must be one of {known}") from None
 
 
 def _checked(mask: Any, count: int) -> Flags:

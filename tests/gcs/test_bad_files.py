@@ -235,7 +235,49 @@ def test_a_file_with_a_mistake_is_told_with_its_place(
 @pytest.mark.parametrize("command", ["fly hover", "sweep hover", "experiments thesis"])
 def test_a_folder_that_cannot_be_made_is_told(command: str) -> None:
     Path("file").touch()
-    assert told_of(*command.split(), "--out", "file/x") == (1, "gcs: --out file/x: Not a directory")
+    told = "gcs: --out file/x: Not a directory; name a folder that can be written"
+    assert told_of(*command.split(), "--out", "file/x") == (EXIT_USAGE, told)
+
+
+WRITERS = [
+    ("fly hover --junit", "x.xml"),
+    ("sweep hover --junit", "x.xml"),
+    ("fly hover --out", ""),
+    ("sweep hover --out", ""),
+    ("report flight --out", ""),
+    ("replay flight.csv --out", ""),
+    ("experiments thesis --out", ""),
+    ("experiments thesis --docs", "x.md"),
+    ("compare one other --out", "x.html"),
+    ("capture --out", "x.tlog"),
+    ("download", "x.plan"),
+    ("param save", "x.params"),
+]
+
+
+@pytest.mark.parametrize(("command", "name"), WRITERS)
+@pytest.mark.parametrize("folder", ["/proc", "file", "/proc/deep/er"])
+def test_where_nothing_can_be_written_it_is_told_at_once(command: str, name: str, folder: str) -> None:
+    Path("file").touch()
+    path = f"{folder}/{name}" if name else f"{folder}/out"
+    code, line = told_of(*command.split(), path)
+    kind = "file in a folder" if name else "folder"
+    assert code == EXIT_USAGE
+    assert f"{path}: " in line and line.endswith(f"; name a {kind} that can be written")
+    assert [entry.name for entry in Path().iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("command", [command for command, _ in WRITERS])
+def test_no_path_is_not_the_folder_in_which_one_is(command: str) -> None:
+    code, line = told_of(*command.split(), "")
+    assert code == EXIT_USAGE
+    assert "'' is no path; . is the folder in which you are" in line
+
+
+def test_what_is_in_a_file_stays_until_another_is_written() -> None:
+    Path("report.xml").write_text("earlier", encoding="utf-8")
+    told_of("fly", "nowhere", "--junit", "report.xml", "--out", "")
+    assert Path("report.xml").read_text(encoding="utf-8") == "earlier"
 
 
 REQUIREMENTS = [
@@ -250,3 +292,19 @@ def test_a_requirement_that_cannot_be_judged_is_told(text: str, told: str) -> No
     code, line = told_of("fly", "hover", "--require", text)
     assert told in line and text in line
     assert code == EXIT_USAGE
+
+
+FIRMWARES = [
+    ("ardupilot", "must be ardupilot=PATH or px4=PATH"),
+    ("ardupilt=/bin/true", "did you mean ardupilot?"),
+    ("ardupilot=", "must be ardupilot=PATH or px4=PATH"),
+    ("ardupilot=nowhere", "no program there; see docs/autopilots.md"),
+    ("px4=.", "no program there; see docs/autopilots.md"),
+]
+
+
+@pytest.mark.parametrize(("text", "told"), FIRMWARES)
+def test_an_autopilot_that_there_is_not_is_wrong_usage(text: str, told: str) -> None:
+    code, line = told_of("fly", "hover", "--autopilot", text)
+    assert code == EXIT_USAGE
+    assert line.startswith(f"gcs: --autopilot {text}: ") and told in line

@@ -250,7 +250,7 @@ def test_a_report_of_nothing_is_one_line(tmp_path):
 
 def test_an_output_that_cannot_be_is_one_line(tmp_path):
     (tmp_path / "file").write_text("")
-    line = one_line(run("fly", "hover", "--out", str(tmp_path / "file" / "x")), EXIT_ERROR)
+    line = one_line(run("fly", "hover", "--out", str(tmp_path / "file" / "x")), EXIT_USAGE)
     assert "--out" in line
 
 

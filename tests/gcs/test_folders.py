@@ -25,7 +25,7 @@ def test_flights_that_begin_in_one_second_have_folders_of_their_own(
 def test_where_no_folder_can_be_made_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "flights").write_text("", encoding="utf-8")
-    with pytest.raises(GcsError, match="flights: File exists"):
+    with pytest.raises(GcsError, match="flights: File exists; name another folder by --out DIR"):
         fresh_folder("hover")
 
 

@@ -203,9 +203,17 @@ def test_an_unknown_name_gets_the_names_there_are() -> None:
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     binary = tmp_path / "binary.toml"
-    binary.write_bytes(b"\xff\xfe\x00")
+    binary.write_bytes(b"\xff\x00\xfe")
     for path, expected in [
         (tmp_path / "absent.toml", "cannot be read: No such file or directory"),
+        (
+            tmp_path / "case-b.toml",
+            "cannot be read: No such file or directory; did you mean the shipped case-b?",
+        ),
+        (
+            tmp_path / "Hovr.toml",
+            "cannot be read: No such file or directory; did you mean the shipped hover?",
+        ),
         (tmp_path, "cannot be read: Is a directory"),
         (binary, "not a text file in UTF-8 (byte 0)"),
     ]:

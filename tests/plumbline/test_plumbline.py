@@ -100,7 +100,7 @@ WRONG: dict[str, tuple[Any, str]] = {
     ),
     "value": (lambda: plumbline.fly("hover", settings={"SIM_ACT_DELAY_MS": -1}), "SIM_ACT_DELAY_MS"),
     "sweep": (lambda: plumbline.sweep("hover", vary={"SIM_WIND": [1]}), "did you mean SIM_WIND_"),
-    "seed": (lambda: plumbline.fly("hover", seed=-1), "seed = -1; must be a whole number, 0 or more"),
+    "seed": (lambda: plumbline.fly("hover", seed=-1), "seed = -1; must be a whole number from 0 to"),
     "half a seed": (lambda: plumbline.fly("hover", seed=1.5), "seed = 1.5; must be a whole number"),  # type: ignore[arg-type]
     "word": (
         lambda: plumbline.fly("hover", settings={"SIM_WIND_E": "fast"}),  # type: ignore[dict-item]
@@ -112,7 +112,10 @@ WRONG: dict[str, tuple[Any, str]] = {
     ),
     "timeout": (lambda: plumbline.fly("hover", timeout_s=0), "timeout_s = 0; must be greater than 0"),
     "no law": (lambda: plumbline.fly("hover", law=3), "law = 3; must be a name"),  # type: ignore[arg-type]
-    "no vehicle": (lambda: plumbline.fly("hover", vehicle=3), "3: must be a name, the path of a file"),  # type: ignore[arg-type]
+    "no vehicle": (
+        lambda: plumbline.fly("hover", vehicle=3),
+        "vehicle = 3; must be a name, the path of a file",
+    ),  # type: ignore[arg-type]
     "infeasible": (
         lambda: plumbline.fly(WILD),
         "; force=True tries",

@@ -8,6 +8,7 @@ import pytest
 
 import plumbline
 from gcs.shell.link import UdpSocket, free_port
+from plumbline import RunningVehicle
 
 WRONG: dict[str, tuple[Any, str]] = {
     "address": (lambda: plumbline.connect("14550x"), "address '14550x'; must be PORT, HOST:PORT, udpin:"),
@@ -20,6 +21,36 @@ WRONG: dict[str, tuple[Any, str]] = {
         "no vehicle heard on UDP udpout:127.0.0.1:",
     ),
 }
+
+
+UNMET = RunningVehicle.__new__(
+    RunningVehicle
+)  # never met a vehicle: what is wrong is told before one is asked
+ARGUMENTS: dict[str, tuple[Any, str]] = {
+    "goto": (lambda: UNMET.goto("a", 0, 1), "east_m = 'a'; must be a finite number"),  # type: ignore[arg-type]
+    "goto nowhere": (lambda: UNMET.goto(float("nan"), 0, 1), "east_m = nan; must be a finite number"),
+    "goto height": (lambda: UNMET.goto(0, 0, [1]), "up_m = [1]; must be a finite number"),  # type: ignore[arg-type]
+    "goto speed": (lambda: UNMET.goto(0, 0, speed_m_s=0), "speed_m_s = 0; must be greater than 0"),
+    "takeoff": (lambda: UNMET.takeoff("high"), "up_m = 'high'; must be a finite number"),  # type: ignore[arg-type]
+    "arm": (lambda: UNMET.arm(timeout_s=None), "timeout_s = None; must be a finite number"),  # type: ignore[arg-type]
+    "land": (lambda: UNMET.land(timeout_s=-1), "timeout_s = -1; must be greater than 0"),
+    "mode": (lambda: UNMET.mode("holt"), "mode 'holt': there is none; did you mean hold? must be one of"),
+    "mode number": (lambda: UNMET.mode(3), "mode = 3; must be a text, as 'hold'"),  # type: ignore[arg-type]
+    "parameter": (lambda: UNMET.parameter(3), "parameter: 3 is no name of a parameter"),  # type: ignore[arg-type]
+    "value": (lambda: UNMET.set_parameter("MIS_SPEED", "x"), "MIS_SPEED = 'x'; must be a finite number"),  # type: ignore[arg-type]
+    "upload": (lambda: UNMET.upload(3), "mission = 3; must be a name, the path of a file, or a"),  # type: ignore[arg-type]
+    "upload vehicle": (lambda: UNMET.upload("hover", vehicle=3), "vehicle = 3; must be a name"),  # type: ignore[arg-type]
+    "wait": (lambda: UNMET.wait(None), "wait None: must be one of ready, holding,"),  # type: ignore[arg-type]
+    "wait for ever": (lambda: UNMET.wait(float("inf")), "wait = inf; must be a finite number"),
+    "wait limit": (lambda: UNMET.wait("ready", "long"), "timeout_s = 'long'; must be a finite number"),  # type: ignore[arg-type]
+}
+
+
+@pytest.mark.parametrize(("call", "says"), ARGUMENTS.values(), ids=ARGUMENTS)
+def test_an_argument_is_looked_at_before_the_vehicle_is_asked(call: Any, says: str) -> None:
+    with pytest.raises(plumbline.Error) as told:
+        call()
+    assert says in str(told.value) and "\n" not in str(told.value)
 
 
 @pytest.mark.parametrize(("call", "says"), WRONG.values(), ids=WRONG)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
+import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -67,6 +71,29 @@ def test_ctrl_c_stops_everything_and_still_writes_what_was_captured(start: Start
     assert json.loads((out / "summary.json").read_text())["outcome"] == "interrupted"
     assert (out / "report.html").stat().st_size > 0
     assert not [pid for pid in children if Path(f"/proc/{pid}").exists()]
+
+
+def test_a_closed_terminal_ends_a_flight_as_ctrl_c_does(tmp_path: Path) -> None:
+    """The terminal is gone first, so that nothing more can be said; then shell and system tell of it."""
+    ours, theirs = pty.openpty()
+    words = ["gcs", "fly", "hover", "--sensors", "ideal", "--speed", "2", "--out", str(tmp_path / "out")]
+    flight = subprocess.Popen(
+        [sys.executable, "-m", *words], stdin=theirs, stdout=theirs, stderr=theirs, cwd=tmp_path
+    )
+    os.close(theirs)
+    try:
+        said = b""
+        while b"tauten" not in said:
+            said += os.read(ours, 4096)
+        os.close(ours)
+        flight.send_signal(signal.SIGHUP)
+        flight.send_signal(signal.SIGHUP)
+        assert flight.wait(60.0) == 130
+    finally:
+        flight.kill()
+        flight.wait()
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["outcome"] == "interrupted"
+    assert (tmp_path / "out" / "report.html").stat().st_size > 0
 
 
 def _children(pid: int) -> list[int]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from autopilot.services.commands import FORCE_ARM, PARSERS, REPEAT_US
-from autopilot.services.identity import ARDUPILOT, AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, Identity
+from autopilot.services.identity import ARDUPILOT, AUTO, AUTO_LAND, AUTO_MISSION, OFFBOARD, PX4, Identity
 from autopilot.services.records import ParameterChanged, ParametersSaved, Verdict, WorldSaved
 from autopilot.services.requests import (
     Arm,
@@ -328,6 +328,24 @@ def test_set_mode_message_is_acknowledged_as_the_command(rig):
 def test_set_mode_message_refused(rig, base_mode, custom, result):
     assert acks(rig.replies(mavlink.MAVLink_set_mode_message(1, base_mode, custom))) == [(176, result)]
     assert rig.asked == []
+
+
+@pytest.mark.parametrize(
+    ("flavour", "custom", "text"),
+    [
+        (PX4, 7 << 16, "STABILIZED not flown; use LOITER MISSION RTL LAND"),
+        (PX4, 99 << 16, "Mode 6488064 unknown; use LOITER MISSION RTL LAND"),
+        (ARDUPILOT, 0, "STABILIZE not flown; use GUIDED AUTO RTL LAND"),
+        (ARDUPILOT, 77, "Mode 77 unknown; use GUIDED AUTO RTL LAND POSHOLD"),
+        (ARDUPILOT, 2**32 - 1, "Mode 4294967295 unknown; use GUIDED AUTO RTL LAND"),
+    ],
+)
+def test_a_mode_that_is_not_flown_is_refused_by_its_name_with_those_that_are(rig_with, flavour, custom, text):
+    rig = rig_with(identity=Identity(flavour=flavour))
+    replies = rig.replies(mavlink.MAVLink_set_mode_message(1, 1, custom))
+    assert acks(replies) == [(176, DENIED)]
+    assert [m.text for m in replies if m.get_type() == "STATUSTEXT"] == [text]
+    assert len(text) <= 50 and rig.asked == []
 
 
 def test_set_current_message_is_answered_by_mission_current(rig):

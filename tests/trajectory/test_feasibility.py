@@ -173,3 +173,11 @@ def test_expected_duration_adds_take_off_and_landing() -> None:
     assert expected_duration_s(load_mission("hover"), 2.0, 2.0) == pytest.approx(
         TAUTEN_S + lift + 10.0 + lift + SET_DOWN_S
     )
+
+
+def test_a_vehicle_that_cannot_hover_is_not_advised_to_fly_slower() -> None:
+    heavy = replace(LIMITS, vehicle=LIMITS.vehicle.model_copy(update={"load_mass_kg": 50.0}))
+    (found,) = check(mission(), heavy)
+    assert found.value > found.limit == pytest.approx(heavy.usable_n)
+    assert "it cannot hover; lower load_mass_kg, or raise rotor_max_n" in found.text
+    assert "speed_m_s" not in found.text

@@ -61,8 +61,12 @@ def test_setting_counts_and_changes() -> None:
         ("SIM_WIND_E", float("inf"), "SIM_WIND_E = inf m/s; must be -50 ... 50"),
         ("SIM_RATE_HZ", 250.5, "SIM_RATE_HZ = 250.5 Hz; must be a whole number"),
         ("LAW_GAIN", 0.0, "LAW_GAIN = 0.0; must be 0.1 ... 0.7"),
-        ("SIM_WND_E", 1.0, "SIM_WND_E: no such parameter; did you mean SIM_WIND_E?"),
-        ("X", 1.0, "X: no such parameter"),
+        (
+            "SIM_WND_E",
+            1.0,
+            "SIM_WND_E: no such parameter; did you mean SIM_WIND_E? docs/parameters.md lists all",
+        ),
+        ("X", 1.0, "X: no such parameter; names begin with one of LAW_, SIM_"),
     ],
 )
 def test_a_wrong_value_is_refused_in_words(name: str, value: float, message: str) -> None:

@@ -1,0 +1,29 @@
+"""Names of parameters that `--set` of `sitl` and of `autopilot` take: those of either program, as one list of
+settings may be given to both."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from importlib.resources import files
+
+import click
+
+from autopilot.vehicle.parameters import definitions
+from autopilot.wire.parameter_names import unknown_parameter
+
+
+def check_names(settings: Iterable[tuple[str, float]], brought: Iterable[str] = ()) -> None:
+    """click.UsageError with the nearest name where neither program has such a parameter, nor is it one of
+    those that somebody has `brought`."""
+    known = {*brought, *definitions().parameters, *_world()}
+    for name, _ in settings:
+        if name not in known:
+            raise click.UsageError(f"--set {unknown_parameter(name, known)}")
+
+
+def _world() -> set[str]:
+    """The simulator's names, from its file: the autopilot is installed with it and imports nothing of it."""
+    return set(tomllib.loads((files("sitl") / "sim_parameters.toml").read_text(encoding="utf-8"))) - {
+        "groups"
+    }

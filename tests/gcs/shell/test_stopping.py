@@ -1,0 +1,64 @@
+"""What asks `gcs` to stop, and what it says to a terminal that is closed."""
+
+from __future__ import annotations
+
+import os
+import pty
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from autopilot.shell.options import LastingStream, stop_signals
+from gcs.shell.stopping import StopRequest
+
+
+@pytest.fixture(autouse=True)
+def _handlers() -> Iterator[None]:
+    """As they were."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before, strict=True):
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_first_asks_and_ctrl_c_after_it_abandons(number: signal.Signals) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    with StopRequest("stopping") as stop:
+        os.kill(os.getpid(), number)
+        assert stop
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_closed_terminal_may_be_told_twice(capsys: pytest.CaptureFixture[str]) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    with StopRequest("stopping") as stop:
+        for _ in range(3):
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert stop
+    assert capsys.readouterr().err == "gcs: stopping\n"
+
+
+def test_what_was_begun_to_outlive_its_terminal_does() -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    assert signal.SIGHUP not in stop_signals()
+    with StopRequest("stopping") as stop:
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert not stop
+
+
+def test_what_is_said_to_a_closed_terminal_is_lost() -> None:
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "w") as terminal:
+        stream = LastingStream(terminal)
+        stream.write("heard\n")
+        stream.flush()
+        assert os.read(ours, 100) == b"heard\r\n"
+        assert stream.isatty()
+        os.close(ours)
+        for _ in range(2):
+            assert stream.write("lost\n") == 5
+            stream.flush()
