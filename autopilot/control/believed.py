@@ -15,7 +15,7 @@ from autopilot.wire.parameter_table import ParameterTable
 # three speeds, 60 ms. In this time what is expected of it may rise by less than the tenth of the full force
 # from which on it is judged (`autopilot.core.tick.rotors_lost`): 1 - exp(-t / T) < 0.1 for T = 10 t.
 SPEEDS_S, ROTOR_PATIENCE = 0.06, 10.0
-GREATEST_PUSH = 0.3  # of the weight: more wind than that is not believed
+GREATEST_PUSH = 0.7  # of the weight: more wind than that is not believed
 
 
 def believed_vehicle(table: AutopilotParameters) -> Vehicle:

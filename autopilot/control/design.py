@@ -92,19 +92,28 @@ class Design(NamedTuple):
     rotor_deviation: float  # N, standard deviation of a rotor's command
 
 
+def yaw_share(vehicle: Vehicle) -> float:
+    """Bandwidth of yaw over that of roll and pitch, with which an error of either asks for the same share of
+    what the rotors can give about its axis. About the thrust axis they turn the vehicle by their drag alone.
+    """
+    level = vehicle.level * vehicle.arm / max(vehicle.inertia[0], vehicle.inertia[1])
+    return min(1.0, math.sqrt(vehicle.lift * vehicle.torque_ratio / vehicle.inertia[2] / level))
+
+
 def gains_of(
     omega_i: float, omega_x: float, omega_q: float, omega_R: float, zeta: float, vehicle: Vehicle
 ) -> PlumblineGains:
     """Gains that give the three loops these bandwidths (rad/s) and damping."""
     mass, reach = vehicle.quad_mass + vehicle.load_mass, vehicle.quad_mass * vehicle.cable_length
     J_x, J_y, J_z = vehicle.inertia
+    slower = yaw_share(vehicle)
     stiff, damped = omega_R * omega_R, 2.0 * zeta * omega_R
     k_x = mass * omega_x * (omega_x + 2.0 * zeta * omega_i)
     k_v = mass * (2.0 * zeta * omega_x + omega_i)
     k_i = mass * omega_x * omega_x * omega_i
     return PlumblineGains(
-        k_R=(J_x * stiff, J_y * stiff, J_z * stiff),
-        k_Omega=(J_x * damped, J_y * damped, J_z * damped),
+        k_R=(J_x * stiff, J_y * stiff, slower * slower * J_z * stiff),
+        k_Omega=(J_x * damped, J_y * damped, slower * J_z * damped),
         k_q=reach * omega_q * omega_q,
         k_omega=2.0 * zeta * omega_q * reach,
         k_x=(k_x, k_x, k_x),

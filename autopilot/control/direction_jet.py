@@ -1,4 +1,4 @@
-"""The commanded cable direction with its exact derivatives: (3-42), (3-43) differentiated along the model.
+"""The commanded cable direction with its derivatives: (3-42), (3-43) differentiated along the motion.
 
 | symbol       | code name          | frame | unit          | equation |
 |--------------|--------------------|-------|---------------|----------|
@@ -9,7 +9,8 @@
 | k_x, k_v     | k_x, k_v           | I     | N/m, N s/m    | (3-43)   |
 | e_i, k_i     | e_i, k_i           | I     | m s, N/m/s    | e_i' = e_x |
 | s            | s                  |       | 1/s^2         | q' . q'  |
-| q_c          | q_c                | I     |               | (3-42)   |
+| T            | T                  |       | N             | q . A - m_Q L s |
+| q_d          |                    | I     |               | -(x_d'' + g e_3) / its length |
 
     A   = -k_i e_i - k_x e_x - k_v e_v + m (x_d'' + g e_3) + m_Q L s q
     A'  = -k_i e_x - k_x e_v - k_v e_a + m x_d'''          + m_Q L (s' q + s q')
@@ -17,10 +18,24 @@
 
 What the errors ask for, k_i e_i + k_x e_x + k_v e_v, is bounded smoothly by half the weight (`saturated`).
 
-e_a = x_L'' - x_d'' and e_j = x_L''' - x_d''' are what the model says of the load (`load_motion`), not
-differences of what was measured; s' = 2 q'.q'', s'' = 2 (q''.q'' + q'.q'''). The derivatives of q_c = -A/|A|
-follow exactly. The thesis passes q_c through a filter for them; and to take the derivatives of the reference
-alone, leaving out those of the errors, makes the cascade unstable with its gains.
+The load moves as (2-31) has it under the pull T that is asked for, not the one that the rotors happen to
+give:
+
+    m (e_a + x_d'' + g e_3) = T q    m (e_j + x_d''') = T' q + T q'
+
+and the cable swings as the reference has it: s' = 2 q_d' . q_d'', s'' = 2 q_d'' . q_d'' (the part with
+q_d''' is left out), and of q'' in A'' the part across the cable. On the reference, and across the cable
+wherever the load is, this is exact.
+
+Pull and swing as they are would be exact everywhere, and are no good. Where the vehicle leans against the
+cable, in wind or far from its path, T' is f times lean times body rate, and with an error of the direction
+the commanded attitude becomes a function of the body rate: at 17 deg of lean and 0.1 rad of error it takes
+away all of the inertia that the attitude's loop reckons with, and the vehicle chases an attitude that runs
+from it.
+
+The derivatives of q_c = -A/|A| follow exactly. The thesis passes q_c through a filter for them; and to take
+the derivatives of the reference alone, leaving out those of the errors, makes the cascade unstable with its
+gains.
 """
 
 from __future__ import annotations
@@ -33,8 +48,8 @@ from autopilot.control.load_motion import LoadMotion
 from autopilot.control.load_position import load_position_force
 from autopilot.control.records import Jet, State, Vehicle
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, add, add3, axpy, dot, norm, scale, sub, times
-from autopilot.geometry.s2 import unit_derivatives
+from autopilot.geometry.linear import ZERO, Vec3, add, add3, axpy, dot, norm, scale, sub, times
+from autopilot.geometry.s2 import tangent, unit_derivatives
 
 # of the weight: what the errors may ask for, however great they are
 GREATEST_FEEDBACK = 0.5
@@ -90,6 +105,15 @@ def held_up(A: Vec3, A_dot: Vec3, A_ddot: Vec3, weight: float) -> tuple[Vec3, Ve
 
 
 @kernel
+def swing_of(jet: Jet, vehicle: Vehicle) -> tuple[float, float]:
+    """s' (1/s^3) and s'' (1/s^4, without the part of the third derivative of q_d) on the reference."""
+    upward = (jet[2][0], jet[2][1], jet[2][2] + vehicle.gravity)
+    lift, lift_dot, lift_ddot = held_up(upward, jet[3], jet[4], vehicle.gravity)
+    _, u_dot, u_ddot = unit_derivatives(lift, lift_dot, lift_ddot)
+    return 2.0 * dot(u_dot, u_ddot), 2.0 * dot(u_ddot, u_ddot)
+
+
+@kernel
 def position_jet(
     state: State,
     motion: LoadMotion,
@@ -100,7 +124,7 @@ def position_jet(
     k_v: Vec3,
     vehicle: Vehicle,
 ) -> PositionJet:
-    """A, A', A'' along the motion of the model; the gains are diagonals in the world frame.
+    """A, A', A'' as the load moves under the pull that A asks for; gains are diagonals in the world frame.
 
     With k_i = 0 and small errors it is (3-43), but where that lets the load fall (`held_up`).
     """
@@ -122,27 +146,29 @@ def position_jet(
     )
     mass = vehicle.quad_mass + vehicle.load_mass
     reach = vehicle.quad_mass * vehicle.cable_length
-    e_a = sub(motion.a_load, jet[2])
-    e_j = sub(motion.j_load, jet[3])
+    weight = mass * vehicle.gravity
+    limit = GREATEST_FEEDBACK * weight
     s = dot(q_dot, q_dot)
-    s_dot = 2.0 * dot(q_dot, motion.q_ddot)
-    s_ddot = 2.0 * (dot(motion.q_ddot, motion.q_ddot) + dot(q_dot, motion.q_dddot))
-    swing_dot = add(scale(s_dot, q), scale(s, q_dot))
-    swing_ddot = add3(scale(s_ddot, q), scale(2.0 * s_dot, q_dot), scale(s, motion.q_ddot))
+    s_dot, s_ddot = swing_of(jet, vehicle)
+
     wanted = add3(times(k_i, e_i), times(k_x, at.e_x), times(k_v, at.e_v))
-    closed, closed_dot, closed_ddot = saturated(
-        wanted,
-        add3(times(k_i, at.e_x), times(k_x, at.e_v), times(k_v, e_a)),
-        add3(times(k_i, at.e_v), times(k_x, e_a), times(k_v, e_j)),
-        GREATEST_FEEDBACK * mass * vehicle.gravity,
-    )
-    open_loop = add(at.A, add(times(k_x, at.e_x), times(k_v, at.e_v)))
-    A, A_dot, A_ddot = held_up(
-        sub(open_loop, closed),
-        sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), closed_dot),
-        sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), closed_ddot),
-        mass * vehicle.gravity,
-    )
+    closed, _, _ = saturated(wanted, ZERO, ZERO, limit)
+    raised = sub(add3(at.A, times(k_x, at.e_x), times(k_v, at.e_v)), closed)
+    T = dot(q, raised) - reach * s
+    e_a = sub(axpy(T / mass, q, (0.0, 0.0, -vehicle.gravity)), jet[2])
+
+    wanted_dot = add3(times(k_i, at.e_x), times(k_x, at.e_v), times(k_v, e_a))
+    _, closed_dot, _ = saturated(wanted, wanted_dot, ZERO, limit)
+    swing_dot = add(scale(s_dot, q), scale(s, q_dot))
+    raised_dot = sub(add(scale(mass, jet[3]), scale(reach, swing_dot)), closed_dot)
+    T_dot = dot(q_dot, raised) + dot(q, raised_dot) - reach * s_dot
+    e_j = sub(scale(1.0 / mass, add(scale(T_dot, q), scale(T, q_dot))), jet[3])
+
+    wanted_ddot = add3(times(k_i, at.e_v), times(k_x, e_a), times(k_v, e_j))
+    _, _, closed_ddot = saturated(wanted, wanted_dot, wanted_ddot, limit)
+    swing_ddot = add3(scale(s_ddot, q), scale(2.0 * s_dot, q_dot), scale(s, tangent(q, motion.q_ddot)))
+    raised_ddot = sub(add(scale(mass, jet[4]), scale(reach, swing_ddot)), closed_ddot)
+    A, A_dot, A_ddot = held_up(raised, raised_dot, raised_ddot, weight)
     return PositionJet(A, A_dot, A_ddot, at.e_x, at.e_v)
 
 

@@ -16,17 +16,16 @@
 What the thesis filters is computed here:
 
 * e_x, e_v and all that follows are taken from the reference itself, with its derivatives up to the sixth.
-* q_c' and q_c'' are those of (3-42) along the motion of the model under the thrust that the rotors give now
-  (`load_motion`, `direction_jet`), feedback and all.
+* q_c' and q_c'' are those of (3-42) along the motion of the load under the pull that is asked for
+  (`direction_jet`), feedback and all.
 * F' and F'' are differences of F along the motion of the model, under the thrust and moment that the rotors
   give now, whose own second derivative is left out: on the path F hardly depends on it. Near hover F depends
   on load and cable alone, F' on the attitude, F'' on the body rate besides: so the poles are those of the
   three loops, each by itself (`design`). R_c, Omega_c, Omega_c' follow from F, F', F'' exactly.
 * The rotors are asked for F - D, so that the air's force D on the vehicle, as far as it is known, does not
   count.
-* Where turning the vehicle takes much of what the rotors can give, load and cable are followed more slowly
-  for a while: their bandwidths are multiplied by `pace`. Three loops inside each other hold on to what
-  saturates by turns the longer the faster they are; a slower pace asks for less.
+* While the load is lifted, it is followed more slowly: the bandwidths of load and cable are multiplied by
+  `pace`.
 * f' is that of f = F . R e_3, with F' from the tick before: f' = F' . R e_3 + F . (W x R e_3), W = R Omega.
 
 Memory comes in and goes out. `thrust` of `load_position` is what the rotors give at this instant, which the
@@ -52,7 +51,6 @@ from autopilot.control.quad_attitude import AttitudeCommand, attitude_from_axes,
 from autopilot.control.records import Command, Jet, Reference, State, Vehicle
 from autopilot.control.thesis_cascade import attitude_towards
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.lanes import if_above
 from autopilot.geometry.linear import (
     Vec3,
     add,
@@ -85,11 +83,7 @@ _LEAST_LIFT = 0.2
 # of the pull along the cable: what errors may exert across it at most, besides what the reference asks for
 _GREATEST_ACROSS = 0.7
 _GREATEST_RATE = 15.0  # rad/s
-LEAST_PACE = 0.5
-# share of the moment about a level axis that counts as much; s, in which so much of it again would stop load
-# and cable, and in which they are back at their full pace
-_MUCH = 0.55
-_SLOWING_TIME, _HASTENING_TIME = 0.005, 0.3
+_HASTENING_TIME = 0.3  # s, in which load and cable come from a standstill to their full pace
 _FULL_RANGE_TIME = 0.1  # s, in which the thrust is thought to pass through its whole range at the fastest
 
 
@@ -166,16 +160,6 @@ def paced(gains: PlumblineGains, pace: float) -> PlumblineGains:
         scale(pace, gains.k_v),
         scale(pace * square, gains.k_i),
     )
-
-
-@kernel
-def next_pace(pace: float, moment: Vec3, period: float, vehicle: Vehicle) -> float:
-    """The pace a period (s) later, the law having asked for this moment (N m)."""
-    whole = 0.5 * vehicle.level * vehicle.arm * (vehicle.rotor_max - vehicle.rotor_min)
-    beyond = norm((moment[0], moment[1], 0.0)) / (_MUCH * whole) - 1.0
-    slower = max(LEAST_PACE, pace * (1.0 - period / _SLOWING_TIME * min(max(beyond, 0.0), 1.0)))
-    faster = min(1.0, pace + period / _HASTENING_TIME)
-    return if_above(beyond, 0.0, slower, faster)
 
 
 @kernel
@@ -401,5 +385,5 @@ def load_position(
         integral = scale(GREATEST_HELD * weight / held, integral)
     fastest = vehicle.lift * (vehicle.rotor_max - vehicle.rotor_min) / _FULL_RANGE_TIME
     thrust_rate = min(fastest, max(-fastest, dot(F_dot, b3) + dot(F, b3_dot)))
-    pace = next_pace(memory.pace, result.moment, period, vehicle)
+    pace = min(1.0, memory.pace + period / _HASTENING_TIME)
     return PlumblineMemory(thrust_rate, integral, pace), command

@@ -30,6 +30,9 @@ from autopilot.geometry.linear import ZERO, Mat3, Vec3, add, axpy, scale, sub
 from autopilot.geometry.packed import Row, with_field
 from autopilot.wire.parameter_table import ParameterTable
 
+# pace at which load and cable are followed where the load leaves the ground; m, above which it is in full
+LIFTING_PACE, LIFTED = 0.5, 0.7
+
 
 class PlumblineConstants(NamedTuple):
     """Everything derived from parameters that load position uses."""
@@ -175,6 +178,15 @@ def start(law: PlumblineLaw, state: State, x_d: Vec3, v_d: Vec3) -> PlumblineMem
 
 
 @kernel
+def greatest_pace(state: State, reference: Reference, observed: Observed) -> float:
+    """The pace at which a load may be followed that is being lifted: how it lay, the wind in it and what it
+    weighs show only by and by."""
+    height = max(0.0, state.x_load[2] - observed.load_ground)
+    rising = LIFTING_PACE + (1.0 - LIFTING_PACE) * height / LIFTED
+    return if_above(reference.jet[1][2], 0.0, min(1.0, rising), 1.0)
+
+
+@kernel
 def load_position(
     law: PlumblineLaw,
     memory: PlumblineMemory,
@@ -193,9 +205,9 @@ def load_position(
         # the ground gives what the rotors do not yet; where it is lifted, how it hangs shows only afterwards
         vehicle = constants.vehicle
         thrust = max(thrust, (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity)
-        pace = if_above(reference.jet[1][2], 0.0, cascade.LEAST_PACE, position.pace)
-        position = cascade.PlumblineMemory(0.0, position.integral, pace)
+        position = cascade.PlumblineMemory(0.0, position.integral, position.pace)
         then = with_field(with_field(then, "x_load", state.x_load), "v_load", state.v_load)
+    position = with_field(position, "pace", min(position.pace, greatest_pace(state, reference, observed)))
     drag, push = air_of(state, 1.0, observed, constants)
     position, wanted = cascade.load_position(
         position,
