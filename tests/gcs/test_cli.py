@@ -53,7 +53,8 @@ def commands():
 @pytest.fixture(autouse=True)
 def nothing_left_to_compile(monkeypatch):
     """What is said of compiling is looked at in test_warmup."""
-    monkeypatch.setattr("gcs.workflows.warmup.flight_parts", lambda laws: [])
+    monkeypatch.setattr("gcs.workflows.fly.flight_parts", lambda laws: [])
+    monkeypatch.setattr("gcs.workflows.flight_here.flight_parts", lambda laws: [])
 
 
 def one_line(result, code):
