@@ -24,11 +24,18 @@ from numpy.typing import NDArray
 
 from autopilot.geometry.compiler import INLINED
 from autopilot.geometry.lanes import each
+from autopilot.geometry.row_moves import is_numbers, is_row, numbers_at, put_numbers
 
 Row = NDArray[np.float64]
 R = TypeVar("R")
 Each = Annotated[int, "each"]  # where flights are flown in lanes, each has its own
 _NUMBERS: dict[Any, str] = {float: "{}", int: "int({})", Each: "each({})", bool: "{} != 0.0"}
+_COMPILED: dict[Any, Any] = {
+    float: types.float64,
+    int: types.int64,
+    Each: types.int64,
+    bool: types.boolean,
+}  # of one flight
 
 
 @cache
@@ -136,16 +143,40 @@ def with_field(record: R, name: str, value: Any) -> R:
     return record._replace(**{name: value})  # type: ignore[attr-defined,no-any-return]
 
 
+def _compiled_type(kind: Any) -> Any:
+    """numba's type of a record of this type, a tuple or a number, of one flight."""
+    if kind in _COMPILED:
+        return _COMPILED[kind]
+    if _is_record(kind):
+        return types.BaseTuple.from_types([_compiled_type(part) for _, part in _fields(kind)], kind)
+    return types.BaseTuple.from_types([_compiled_type(part) for part in get_args(kind)])
+
+
 @overload(unpack, jit_options=INLINED)
 def _unpack(kind: Any, row: Any, first: Any) -> Any:
     record: Any = kind.instance_class if isinstance(kind, types.NamedTupleClass) else None
-    return None if record is None else _unpacker(record)
+    if record is None or not is_row(row):
+        return None if record is None else _unpacker(record)
+    width(record)
+    taken = _compiled_type(record)
+
+    def take(kind: Any, row: Any, first: Any) -> Any:
+        return numbers_at(taken, row, first)
+
+    return take
 
 
 @overload(pack, jit_options=INLINED)
 def _pack(record: Any, row: Any, first: Any) -> Any:
     kind: Any = getattr(record, "instance_class", None)
-    return _packer(kind) if _is_record(kind) else None
+    if not _is_record(kind) or not (is_row(row) and is_numbers(record)):
+        return _packer(kind) if _is_record(kind) else None
+    width(kind)
+
+    def put(record: Any, row: Any, first: Any) -> Any:
+        put_numbers(record, row, first)
+
+    return put
 
 
 @overload(with_field, jit_options=INLINED, prefer_literal=True)

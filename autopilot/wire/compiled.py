@@ -25,6 +25,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from autopilot.geometry.kernel import kernel
+from autopilot.geometry.row_moves import field_putter, field_taker, is_numbers, is_row
 
 Bytes = NDArray[np.uint8]
 
@@ -96,17 +97,24 @@ def wire_record(message_type: Any, module: str) -> Any:
     return record
 
 
+def _places(layout: _Layout) -> tuple[tuple[int, str], ...]:
+    """Of each number: its first byte, and NumPy's type."""
+    sizes = {number: np.dtype(number).itemsize for _, _, number in layout.fields}
+    return tuple(
+        (at + i * sizes[number], number) for at, count, number in layout.fields for i in range(max(count, 1))
+    )
+
+
 def _numbers(layout: _Layout) -> tuple[str, list[str]]:
     """Source of the views of `payload` that its numbers are seen through, and of each number."""
     views, found = set(), []
-    for at, count, number in layout.fields:
+    for first, number in _places(layout):
         size = np.dtype(number).itemsize
-        for first in range(at, at + max(count, 1) * size, size):
-            if first % size:  # an extension: they are not laid out by size
-                found.append(f"payload[{first} : {first + size}].view(np.{number})[0]")
-            else:
-                views.add(number)
-                found.append(f"{number}s[{first // size}]")
+        if first % size:  # an extension: they are not laid out by size
+            found.append(f"payload[{first} : {first + size}].view(np.{number})[0]")
+        else:
+            views.add(number)
+            found.append(f"{number}s[{first // size}]")
     return "".join(f"    {view}s = payload.view(np.{view})\n" for view in sorted(views)), found
 
 
@@ -242,10 +250,42 @@ def _record_of(kind: Any) -> Any:
     return record if record in _LAYOUTS else None
 
 
+@cache
+def _compiled_putter(record: Any) -> Any:
+    """`_putter` for kernels."""
+    layout = _LAYOUTS[record]
+    size, message_id, crc_extra = layout.size, layout.message_id, layout.crc_extra
+    put_fields = field_putter(_places(layout))
+
+    def put(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:
+        put_fields(values, payload)
+        return _framed(payload, size, message_id, crc_extra, buffer, at, origin)
+
+    return put
+
+
+@cache
+def _compiled_taker(record: Any) -> Any:
+    """`_taker` for kernels."""
+    layout = _LAYOUTS[record]
+    parts = []
+    for _, count, number in layout.fields:
+        wide = types.float64 if number.startswith("float") else types.int64
+        parts.append(types.UniTuple(wide, count) if count else wide)
+    take_fields = field_taker(_places(layout), types.BaseTuple.from_types(parts, record))
+
+    def take(kind: Any, payload: Any) -> Any:
+        return take_fields(payload)
+
+    return take
+
+
 @overload(put_frame)
 def _put_frame(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:
     record = _record_of(kind)
-    return None if record is None else _putter(record)
+    if record is None or not (is_row(payload, types.uint8) and is_numbers(values)):
+        return None
+    return _compiled_putter(record)
 
 
 @overload(holds)
@@ -257,4 +297,6 @@ def _holds(kind: Any, data: Any, start: Any, payload: Any) -> Any:
 @overload(taken)
 def _taken(kind: Any, payload: Any) -> Any:
     record = _record_of(kind)
-    return None if record is None else _taker(record)
+    if record is None or not is_row(payload, types.uint8):
+        return None
+    return _compiled_taker(record)

@@ -1,0 +1,156 @@
+"""Machine code that moves the numbers of a record to a row of float64 or to bytes, and back.
+
+`packed` and `compiled` write such moves as source, an assignment for each number, for Python to run. numba
+takes a quarter of a second for each record to compile that; here the same loads, stores and conversions are
+emitted at once. Records whose numbers are those of eight flights, and arrays that are not contiguous, are
+left to the source.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+
+def _intrinsic(function: Callable[..., Any]) -> Any:
+    """numba's, whose results are called without the first argument."""
+    return intrinsic(function)
+
+
+def is_row(array: Any, of: Any = types.float64) -> bool:
+    """Whether an array, by its numba type, is a contiguous row of such numbers."""
+    return isinstance(array, types.Array) and (array.dtype, array.ndim, array.layout) == (of, 1, "C")
+
+
+def _parts(kind: Any) -> tuple[Any, ...]:
+    """The types in that of a tuple."""
+    return tuple(kind)
+
+
+def is_numbers(kind: Any) -> bool:
+    """Whether a numba type is a number, or a tuple, at any depth, of nothing but numbers."""
+    if isinstance(kind, types.BaseTuple):
+        return all(is_numbers(part) for part in _parts(kind))
+    return isinstance(types.unliteral(kind), types.Integer | types.Float | types.Boolean)
+
+
+def _numbers_of(context: Any, builder: Any, value: Any, kind: Any) -> Iterator[tuple[Any, Any]]:
+    """The numbers of a value of this type, in order, each with its own type."""
+    if isinstance(kind, types.BaseTuple):
+        for i, part in enumerate(_parts(kind)):
+            yield from _numbers_of(context, builder, builder.extract_value(value, i), part)
+    else:
+        plain = types.unliteral(kind)
+        yield (value if plain == kind else context.cast(builder, value, kind, plain)), plain
+
+
+def _made_of(context: Any, builder: Any, numbers: Iterator[tuple[Any, Any]], kind: Any) -> Any:
+    """The value of this type that is made of the next of some numbers, each given with its own type."""
+    if isinstance(kind, types.BaseTuple):
+        parts = [_made_of(context, builder, numbers, part) for part in _parts(kind)]
+        return context.make_tuple(builder, kind, parts)
+    number, plain = next(numbers)
+    return context.cast(builder, number, plain, kind)
+
+
+def _data(context: Any, builder: Any, kind: Any, array: Any) -> Any:
+    return context.make_array(kind)(context, builder, array).data
+
+
+# ---- rows of float64
+
+
+def _places(builder: Any, data: Any, first: Any) -> Iterator[Any]:
+    i = 0
+    while True:
+        yield builder.gep(data, [builder.add(first, ir.Constant(first.type, i))])
+        i += 1
+
+
+@_intrinsic
+def put_numbers(_: Any, record: Any, row: Any, first: Any) -> Any:
+    """In a kernel: write the numbers of a record to `row[first]` and behind; `first` is not negative."""
+    if not (is_row(row) and is_numbers(record)):
+        return None
+
+    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kind, row_type, _ = signature.args
+        places = _places(builder, _data(context, builder, row_type, given[1]), given[2])
+        for number, plain in _numbers_of(context, builder, given[0], kind):
+            builder.store(context.cast(builder, number, plain, types.float64), next(places))
+        return context.get_dummy_value()
+
+    return types.none(record, row, types.intp), made
+
+
+@_intrinsic
+def numbers_at(_: Any, kind: Any, row: Any, first: Any) -> Any:
+    """In a kernel: the tuple of the numba type `kind` whose first number is `row[first]`; `first` is not
+    negative."""
+    if not (is_row(row) and isinstance(kind, types.TypeRef) and is_numbers(kind.instance_type)):
+        return None
+    whole = kind.instance_type
+
+    def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        places = _places(builder, _data(context, builder, signature.args[1], given[1]), given[2])
+        numbers = ((builder.load(place), types.float64) for place in places)
+        return _made_of(context, builder, numbers, whole)
+
+    return whole(kind, row, types.intp), made
+
+
+# ---- bytes
+
+
+def _field(builder: Any, data: Any, first: int, size: int, double: bool) -> Any:
+    """The place of a number of so many bytes that begins at this byte."""
+    number: Any = {4: ir.FloatType(), 8: ir.DoubleType()}[size] if double else ir.IntType(8 * size)
+    place = builder.gep(data, [ir.Constant(ir.IntType(64), first)])
+    return builder.bitcast(place, number.as_pointer())
+
+
+def _fields(builder: Any, data: Any, layout: Sequence[tuple[int, str]]) -> Iterator[tuple[Any, Any]]:
+    """The place and the type of each number of a layout."""
+    for first, name in layout:
+        kind = getattr(types, name)
+        yield _field(builder, data, first, kind.bitwidth // 8, isinstance(kind, types.Float)), kind
+
+
+def field_putter(layout: Sequence[tuple[int, str]]) -> Any:
+    """For kernels: put(values, payload) writes the numbers of a tuple to bytes.
+
+    `layout` says of each number the byte that it begins with, and NumPy's name of its type.
+    """
+
+    @_intrinsic
+    def put(_: Any, values: Any, payload: Any) -> Any:
+        def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            data = _data(context, builder, signature.args[1], given[1])
+            numbers = _numbers_of(context, builder, given[0], signature.args[0])
+            for (number, plain), (place, kind) in zip(numbers, _fields(builder, data, layout), strict=True):
+                builder.store(context.cast(builder, number, plain, kind), place, align=1)
+            return context.get_dummy_value()
+
+        return types.none(values, payload), made
+
+    return put
+
+
+def field_taker(layout: Sequence[tuple[int, str]], whole: Any) -> Any:
+    """For kernels: take(payload) is the tuple of the numba type `whole` whose numbers lie so in bytes."""
+
+    @_intrinsic
+    def take(_: Any, payload: Any) -> Any:
+        def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            data = _data(context, builder, signature.args[0], given[0])
+            fields = _fields(builder, data, layout)
+            numbers = ((builder.load(place, align=1), kind) for place, kind in fields)
+            return _made_of(context, builder, numbers, whole)
+
+        return whole(payload), made
+
+    return take
