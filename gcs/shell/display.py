@@ -176,10 +176,9 @@ class CompileDisplay(LiveBars):
 
     _transient = True
 
-    def update(self, running: Mapping[str, str], remain: int, total: int, elapsed_s: float) -> None:
-        """Show the kernel of each running part by the part's title, and that `remain` of `total` parts are
-        not done after so long."""
-        left = _left(remain, total, elapsed_s)
+    def update(self, running: Mapping[str, str], remain: int, total: int, left: str) -> None:
+        """Show the kernel of each running part by the part's title, that `remain` of `total` parts are not
+        done, and in words what is left."""
         self._show(
             lambda: {
                 "all": {
@@ -196,10 +195,10 @@ class CompileDisplay(LiveBars):
             lambda: f"compiling {_parts(running)}; {left}",
         )
 
-    def done(self, title: str, seconds: float, remain: int, total: int, elapsed_s: float) -> None:
-        """Elsewhere than on a terminal say that a part is done, and took so long."""
+    def done(self, title: str, seconds: float, left: str) -> None:
+        """Elsewhere than on a terminal say that a part is done, how long it took, and what is left."""
         if not self._quiet and not is_live():
-            say(f"compiled {title} in {seconds:.0f} s; {_left(remain, total, elapsed_s)}")
+            say(f"compiled {title} in {seconds:.0f} s; {left}")
             self._line_said()
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
@@ -226,10 +225,6 @@ class StepDisplay(LiveBars):
         from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn
 
         return (SpinnerColumn(), "{task.description}", BarColumn(), MofNCompleteColumn())
-
-
-def _left(remain: int, total: int, elapsed_s: float) -> str:
-    return f"{remain} of {total} parts remain after {elapsed_s:.0f} s" if remain else "that was the last part"
 
 
 def _parts(running: Mapping[str, str]) -> str:

@@ -79,8 +79,9 @@ class Session:
         if self._connection.target is None or self.view.armed is None:
             other = 14540 if self.address.port != 14540 else 14550
             raise NoVehicleError(
-                f"no vehicle heard on UDP {self.address} within {self._find_s:g} s; is autopilot running "
-                f"and sending there? (other addresses: --connect {other} or --connect HOST:PORT)"
+                f"no vehicle heard on UDP {self.address} within {self._find_s:g} s; is autopilot running, "
+                f"with its simulator, and sending there? (other addresses: --connect {other} or "
+                "--connect HOST:PORT)"
             )
         return self._connection.target
 

@@ -1,4 +1,4 @@
-"""How long a batch of unequal parts takes on an idle machine."""
+"""How long a batch of unequal parts takes: on an idle machine, and at the pace at which it goes."""
 
 from __future__ import annotations
 
@@ -13,6 +13,25 @@ def expected_s(costs: Sequence[float], cores: int) -> float:
     for cost in costs:
         heapq.heapreplace(ends, ends[0] + cost)
     return max(ends)
+
+
+def remaining_s(
+    done: Sequence[tuple[float, float]],
+    running: Sequence[tuple[float, float]],
+    waiting: Sequence[float],
+    cores: int,
+) -> float:
+    """Seconds until all parts are done, at the pace at which it goes so far.
+
+    `done` and `running` give of each part what it takes on an idle machine, and how long it took, or has been
+    running; `waiting` what the others take on an idle machine.
+    """
+    cost = sum(idle_s for idle_s, _ in done)
+    paces = [sum(took_s for _, took_s in done) / cost] if cost else []
+    # a part that runs tells of the pace as soon as it has taken longer than it should
+    slowness = max(1.0, *paces, *(so_far_s / idle_s for idle_s, so_far_s in running))
+    left = [max(idle_s * slowness - so_far_s, 0.0) for idle_s, so_far_s in running]
+    return expected_s([*left, *(idle_s * slowness for idle_s in waiting)], cores)
 
 
 def in_words(seconds: float) -> str:

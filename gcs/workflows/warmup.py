@@ -13,7 +13,7 @@ from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
 from gcs.errors import GcsError
 from gcs.shell.display import CompileDisplay, say
 from gcs.shell.processes import Child, Processes
-from gcs.workflows.expected import expected_s, in_words
+from gcs.workflows.expected import expected_s, in_words, remaining_s
 
 _LOOK_S = 0.05
 _CHECK = Part(
@@ -50,10 +50,16 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
         CompileDisplay(quiet) as display,
     ):
         running: dict[str, tuple[Part, Child, float]] = {}
+        done: list[tuple[float, float]] = []  # s on an idle machine, s that it took
         all_begun_s = time.monotonic()
 
-        def left(now_s: float) -> tuple[int, int, float]:
-            return len(waiting) + len(running), total, now_s - all_begun_s
+        def left(now_s: float) -> str:
+            remain = len(waiting) + len(running)
+            if not remain:
+                return "that was the last part"
+            begun = [(part.cost_s, now_s - begun_s) for part, _, begun_s in running.values()]
+            more = in_words(remaining_s(done, begun, [part.cost_s for part in waiting], cores))
+            return f"{remain} of {total} parts remain after {now_s - all_begun_s:.0f} s, {more} more"
 
         while waiting or running:
             while waiting and len(running) < cores:
@@ -63,7 +69,9 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
                 running[part.title] = part, child, time.monotonic()
             display.update(
                 {title: child.last_line() for title, (_, child, _) in running.items()},
-                *left(time.monotonic()),
+                len(waiting) + len(running),
+                total,
+                left(time.monotonic()),
             )
             time.sleep(_LOOK_S)
             for title, (part, child, begun_s) in list(running.items()):
@@ -74,4 +82,5 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
                 part.done()
                 del running[title]
                 now_s = time.monotonic()
-                display.done(title, now_s - begun_s, *left(now_s))
+                done.append((part.cost_s, now_s - begun_s))
+                display.done(title, now_s - begun_s, left(now_s))

@@ -1,10 +1,10 @@
-"""How long parts take on an idle machine."""
+"""How long parts take, on an idle machine and on a busy one."""
 
 from __future__ import annotations
 
 import pytest
 
-from gcs.workflows.expected import expected_s, in_words
+from gcs.workflows.expected import expected_s, in_words, remaining_s
 
 COSTS = [26.0, 10.0, 8.0, 3.0]
 
@@ -14,6 +14,19 @@ def test_parts_share_the_cores():
     assert expected_s(COSTS, 2) == pytest.approx(26.0)
     assert expected_s(COSTS[1:], 2) == pytest.approx(11.0)
     assert expected_s(COSTS[3:], 2) == pytest.approx(3.0)
+
+
+def test_what_remains_is_told_at_the_pace_of_what_is_done():
+    assert remaining_s([], [(26.0, 6.0), (10.0, 6.0)], [8.0], 2) == pytest.approx(20.0)
+    # what took 10 s on an idle machine took 30 s
+    assert remaining_s([(10.0, 30.0)], [(26.0, 30.0)], [8.0], 2) == pytest.approx(48.0)
+    # nothing is done yet, but both have taken three times as long as they should
+    assert remaining_s([], [(26.0, 78.0), (10.0, 30.0)], [8.0], 2) == pytest.approx(24.0)
+    assert remaining_s([(10.0, 10.0)], [(26.0, 30.0)], [], 2) == pytest.approx(0.0)
+
+
+def test_a_fast_machine_is_not_promised_to_stay_fast():
+    assert remaining_s([(10.0, 1.0)], [], [8.0], 1) == pytest.approx(8.0)
 
 
 @pytest.mark.parametrize(
