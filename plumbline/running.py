@@ -163,7 +163,7 @@ class RunningVehicle:
         pace_m_s = None if speed_m_s is None else positive("speed_m_s", speed_m_s)
         limit_s = positive("timeout_s", timeout_s)
         self._must_be_armed("goto")
-        self._command(lambda session: reposition(session, place, False, pace_m_s))
+        self._command(lambda session: reposition(session, place, False, pace_m_s).operation)
         if wait:
             self.wait(lambda state: _is_there(state, place), limit_s)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isnan
 
 import click
 
@@ -122,12 +123,16 @@ def goto_command(
     """Take the load to a place and hold it there.
 
     EAST, NORTH and UP are the place of the load in m; without UP it keeps its height. The vehicle must be
-    flying.
+    flying. It is told how far the load has to go; the vehicle refuses what is more than 100 km off, or beyond
+    its fence.
     """
     from gcs.workflows.reposition import reposition
 
-    place = (east, north, up)
-    _send(address, lambda session: reposition(session, place, frame == "load", speed))
+    with Session(address) as session:
+        session.find()
+        move = reposition(session, (east, north, up), frame == "load", speed)
+        way = "" if isnan(move.distance_m) else f"; {move.distance_m:.1f} m to go"
+        click.echo(session.run(move.operation).text + way)
 
 
 @click.command("land")
@@ -138,12 +143,13 @@ def land_command(address: Address) -> None:
 
 
 @click.command("mode")
-@click.argument("name", type=click.Choice(sorted(FLOWN_MODES)))
+@click.argument("name", metavar="MODE", type=click.Choice(sorted(FLOWN_MODES), case_sensitive=False))
 @connect_option
 def mode_command(name: str, address: Address) -> None:
     """Change the flight mode.
 
-    NAME is a PX4 mode that the vehicle has, in plain words.
+    MODE is a PX4 mode that the vehicle has, in plain words: hold, land, mission, offboard, position, return
+    or takeoff.
     """
     main, sub = FLOWN_MODES[name]
     _send(

@@ -81,7 +81,13 @@ from gcs.shell.display import say
     help="Fly the flights that stand out again, each with a report: of each law the worst, the median and "
     "the first that was lost.",
 )
-@click.option("--fresh", is_flag=True, help="Fly everything anew, also what has been flown already.")
+@click.option(
+    "--fresh",
+    "--overwrite",
+    "fresh",
+    is_flag=True,
+    help="Fly everything anew, also what has been flown already: what --out holds is lost.",
+)
 @require_options
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress.")
@@ -114,6 +120,8 @@ def sweep_command(
     on each core. Every parameter of the simulator and of the autopilot can be varied. The directory then
     holds flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that
     was stopped goes on when the same command is given again.
+
+    What the vehicle cannot do is flown as well, as by gcs fly --force: gcs check MISSION tells it beforehand.
 
     \b
     gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 _WAYS = ("mission", "law", "sensors", "vehicle", "seed")  # keys of the record that say how it was flown
 _CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
+_HEADING = 14  # characters in a line of the name of a flight, in the terminal
 _DRAWN = {"load", "vehicle", "asked", "quat", "cable", "tension", "rotor", "taut", "attached", "scored"}
 SCRIPTS = (
     *PLOT_SCRIPTS,
@@ -130,9 +132,9 @@ def comparison_table(runs: Sequence[Run]) -> Table:
     from rich.text import Text
 
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("")
+    table.add_column("", no_wrap=True)
     for run in runs:
-        table.add_column(Text(run.name), justify="right", overflow="fold")
+        table.add_column(Text(_heading(run.name)), justify="right", overflow="fold")
     different = differences(runs)
     for one in different:
         cells = [Text(_brief(value)) for value in one.values]
@@ -143,6 +145,16 @@ def comparison_table(runs: Sequence[Run]) -> Table:
             cells = [_cell(value, i in row.best) for i, value in enumerate(row.values)]
             table.add_row(f"  {row.metric.label}", *cells, end_section=row is rows[-1])
     return table
+
+
+def _heading(name: str) -> str:
+    """A name in lines of up to `_HEADING` characters that end where its parts do, if these are shorter."""
+    lines = [""]
+    for part in re.findall(r"[^-_/. ]*[-_/. ]?", name):
+        if lines[-1] and len(lines[-1] + part) > _HEADING:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
 
 
 def _cell(value: str, best: bool) -> Any:

@@ -32,7 +32,7 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
         if differing:
             kind = "another sweep" if "settings" in differing else "a sweep flown by other code"
             raise PlanError(
-                f"{directory} holds {kind} ({', '.join(differing)} differ); choose another --out, or add"
+                f"--out {directory}: holds {kind} ({', '.join(differing)} differ); name another, or add"
                 " --fresh to discard its flights"
             )
         return

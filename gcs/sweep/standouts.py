@@ -84,7 +84,10 @@ def flight_settings(plan: SweepPlan, varied: Mapping[str, float]) -> tuple[str, 
 
 
 def base_command(plan: SweepPlan) -> str:
-    """What the commands of all flights begin with; law, seed and what is varied follow."""
+    """What the commands of all flights begin with; law, seed and what is varied follow.
+
+    A sweep flies what the vehicle cannot do as well, hence --force.
+    """
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
     words += own_words(plan.estimator, plan.planner)
     for setting in flight_settings(plan, {}):
@@ -93,9 +96,9 @@ def base_command(plan: SweepPlan) -> str:
 
 
 def command_of(plan: SweepPlan, flight: Standout, directory: Path) -> str:
-    """The command that flies it again into the directory of the sweep."""
+    """The command that flies it again into the directory of the sweep, whatever of it lies there already."""
     words = ["--law", flight.reference, "--seed", str(flight.seed)]
     for name, value in flight.varied.items():
         words += ["--set", f"{name}={value!r}"]
-    out = shlex.join(["--out", str(directory / FOLDER / flight.name)])
+    out = shlex.join(["--out", str(directory / FOLDER / flight.name), "--overwrite"])
     return f"{base_command(plan)} {shlex.join(words)} {out}"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-from autopilot.geometry.linear import Vec3, add
+from autopilot.geometry.linear import Vec3, add, norm, sub
 from autopilot.wire.convert import Home
 from autopilot.wire.convert.geodesy import enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
@@ -16,18 +17,33 @@ from gcs.shell.session import Session
 LOAD_S = 2.0  # in which a vehicle tells where its load is
 
 
+@dataclass(frozen=True)
+class Move:
+    """A place that the load is sent to: what sends it, and how far it has to go."""
+
+    operation: Operation
+    distance_m: float  # of a load that a vehicle does not tell of: NaN
+
+
 def reposition(
     session: Session, offset: tuple[float, float, float | None], from_load: bool, speed_m_s: float | None
-) -> Operation:
+) -> Move:
     """What takes the load to a place, `offset` (east, north, up in m; None: at its height) from the vehicle's
     home or from where its load is."""
     message = session.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     origin = Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
-    begin = _load(session) if from_load else _home(session, origin)
+    load = _load(session)
+    if from_load and load is None:
+        raise GcsError("the vehicle does not tell where its load is")
+    begin = load if from_load and load is not None else _home(session, origin)
     east, north, up = add(begin, (offset[0], offset[1], offset[2] or 0.0))
     latitude, longitude, _ = geodetic_from_enu((east, north, up), origin)
     height_m = math.nan if offset[2] is None else up
-    return command.reposition(session.target, latitude, longitude, height_m, speed_m_s)
+    operation = command.reposition(session.target, latitude, longitude, height_m, speed_m_s)
+    if load is None:
+        return Move(operation, math.nan)
+    there = (east, north, load[2] if offset[2] is None else up)  # without a height it keeps its own
+    return Move(operation, norm(sub(there, load)))
 
 
 def _home(session: Session, origin: Home) -> Vec3:
@@ -35,9 +51,9 @@ def _home(session: Session, origin: Home) -> Vec3:
     return enu_from_geodetic(home.latitude, home.longitude, home.altitude, origin)
 
 
-def _load(session: Session) -> Vec3:
+def _load(session: Session) -> Vec3 | None:
     latest = session.view.latest
     if not session.watch(lambda: "LOAD_STATE" in latest, LOAD_S):
-        raise GcsError("the vehicle does not tell where its load is")
+        return None
     load = latest["LOAD_STATE"]
     return (load.y, load.x, -load.z)

@@ -557,19 +557,20 @@ def test_arming_waits_no_longer_than_it_says(live, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "east_m", "north_m", "up_m", "speed"),
+    ("arguments", "east_m", "north_m", "up_m", "speed", "distance_m"),
     [
-        (("3", "-1.5"), 3.0, -1.5, None, -1.0),
-        (("-3", "1.5", "2", "--speed", "0.5"), -3.0, 1.5, 2.0, 0.5),
-        (("1", "0", "0.5", "--frame", "load"), 3.0, 1.0, 2.5, -1.0),
+        (("3", "-1.5"), 3.0, -1.5, None, -1.0, 2.7),  # from (2, 1, 2): hypot(1, 2.5)
+        (("-3", "1.5", "3", "--speed", "0.5"), -3.0, 1.5, 3.0, 0.5, 5.1),  # sqrt(25 + 0.25 + 1)
+        (("1", "0", "0.5", "--frame", "load"), 3.0, 1.0, 2.5, -1.0, 1.1),  # hypot(1, 0.5)
     ],
 )
-def test_the_load_is_sent_to_a_place(live, arguments, east_m, north_m, up_m, speed):
+def test_the_load_is_sent_to_a_place(live, arguments, east_m, north_m, up_m, speed, distance_m):
     vehicle, port = live
     vehicle.script = lambda scripted, t: scripted.tell_load(east_m=2.0, north_m=1.0, up_m=2.0)
     vehicle.started_us = 0
     result = run("goto", *arguments, "--connect", port)
-    assert (result.exit_code, result.stdout) == (EXIT_DONE, "reposition: accepted\n"), result.output
+    told = f"reposition: accepted; {distance_m} m to go\n"
+    assert (result.exit_code, result.stdout) == (EXIT_DONE, told), result.output
     sent = vehicle.commands[-1]
     assert (sent.command, sent.param1) == (mavlink.MAV_CMD_DO_REPOSITION, speed)
     east, north, _ = enu_from_geodetic(sent.x, sent.y, 0, Home())
@@ -581,6 +582,15 @@ def test_the_load_is_sent_to_a_place(live, arguments, east_m, north_m, up_m, spe
 def test_a_place_that_is_none_is_wrong_usage():
     assert "must be a number" in one_line(run("goto", "1", "north"), EXIT_USAGE)
     assert "must be a number" in one_line(run("goto", "1", "nan"), EXIT_USAGE)
+
+
+def test_a_mode_is_named_in_any_case_and_one_that_is_none_is_told_with_all(live):
+    vehicle, port = live
+    vehicle.armed = True
+    result = run("mode", "Hold", "--connect", port)
+    assert (result.exit_code, result.stdout) == (EXIT_DONE, "mode hold: accepted\n"), result.output
+    line = one_line(run("mode", "hover"), EXIT_USAGE)
+    assert line.startswith("gcs: Invalid value for 'MODE': 'hover' is not one of 'hold', 'land', ")
 
 
 def test_the_nearest_command_is_named():

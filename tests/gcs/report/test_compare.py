@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from rich.console import Console
 
 from gcs.analysis.record import FlightMeta
 from gcs.cli import gcs
-from gcs.report.compare import Run, begins, comparison, comparison_table, differences, load_run
+from gcs.report.compare import Run, begins, comparison, comparison_table, differences, figures, load_run
 from tests.doubles import recorded_flights as flights
 from tests.doubles.browser import Browser
 
@@ -88,6 +89,19 @@ def test_the_table_has_a_star_at_the_best(runs: list[Path]) -> None:
     cells = line.split("mm")
     best = comparison(found)["best"]["load_error_rms_m"]
     assert [i for i in (0, 1) if "*" in cells[i]] == best
+
+
+def test_headings_of_the_table_are_whole_in_a_narrow_terminal(runs: list[Path]) -> None:
+    found = [replace(loaded(run), name=f"case-b-20260301-10000{i}") for i, run in enumerate(runs)]
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(comparison_table(found))
+    lines = [line.strip() for line in console.export_text().splitlines()]
+    titles = {group.title for group, _ in figures(found)}
+    assert titles <= set(lines)
+    heading = [line.split() for line in lines[1:4]]
+    assert heading == [["case-b-"] * 3, ["20260301-"] * 3, ["100000", "100001", "100002"]]
+    labels = {row.metric.label for _, rows in figures(found) for row in rows}
+    assert all(any(line.startswith(label) for line in lines) for label in labels)
 
 
 def test_the_command_prints_json_and_makes_the_page(runs: list[Path], tmp_path: Path) -> None:

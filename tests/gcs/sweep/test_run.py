@@ -152,6 +152,7 @@ def test_flights_that_stand_out_are_those_of_the_table(whole: tuple[SweepPlan, P
     assert words[:3] == ["gcs", "fly", plan.mission]
     assert words[words.index("--seed") + 1] == "1"
     assert "SIM_ACT_DELAY_MS=60.0" in words
+    assert {"--force", "--overwrite"} <= set(words), "it flies whatever it is, and as often as it is given"
 
 
 def test_a_click_on_a_cell_gives_the_command_of_its_flight(
