@@ -39,7 +39,7 @@ class Part:
 
 _ONBOARD = ROOT / "autopilot" / "onboard" / "onboard.py"
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
-SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 16.0)
+SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 18.0)
 
 
 OWN = "own"  # stands for any law that somebody has brought: they are compiled for once
@@ -54,12 +54,12 @@ def autopilot_parts(*laws: str) -> tuple[Part, ...]:
     """What the autopilot needs to fly with these laws, the longest first; what they share is there once."""
     module, any_law = "autopilot.shell.warmup", compiled_for(laws)[0]
     return (
-        Part("the autopilot", module, ("tick", any_law), _AUTOPILOT, "tick", 34.0),
+        Part("the autopilot", module, ("tick", any_law), _AUTOPILOT, "tick", 25.0),
         *(
-            Part(f"the law {law}", module, ("law", law), _AUTOPILOT, f"law-{law}", 15.0)
+            Part(f"the law {law}", module, ("law", law), _AUTOPILOT, f"law-{law}", 12.0)
             for law in compiled_for(laws)
         ),
-        Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 18.0),
+        Part("the messages", module, ("messages", any_law), _ONBOARD, "messages", 13.0),
         Part("the paths", module, ("paths", any_law), _AUTOPILOT, "paths", 5.0),
     )
 

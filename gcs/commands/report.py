@@ -34,6 +34,7 @@ def report_command(
     DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. Made are
     summary.json, flight.parquet, pictures and report.html, from the telemetry alone.
     """
+    from gcs.shell.display import say
     from gcs.workflows.report import make_common, make_mcap, print_record, report_again
 
     record, folder = report_again(source, out, quiet or as_json)
@@ -43,6 +44,8 @@ def report_command(
         print_record(record)
     if record["outcome"] == "no telemetry":
         raise GcsError(f"{source}: holds no telemetry of a Plumbline vehicle")
+    if not record["samples"]:
+        say(f"{source}: holds no moment of a mission with the load in the air; its figures are empty")
     beside = [make_common(source, folder)] if common else []
     beside += [make_mcap(source, folder)] if mcap else []
     if not as_json:

@@ -635,6 +635,8 @@ def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):
     again = run("report", str(out), "--json")
     assert again.exit_code == EXIT_DONE, again.output
     assert json.loads(again.stdout) == record
+    assert record["samples"] == 0  # from the lift it is lowered at once
+    assert f"{out}: holds no moment of a mission with the load in the air" in again.stderr
     sentence = "The figures that need the truth of the simulator are missing: "
     assert record["load_error_max_m"] is None and record["estimator_error_max_m"] is None
     assert sentence in (out / "report.html").read_text()
