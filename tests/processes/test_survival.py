@@ -77,9 +77,11 @@ def test_a_closed_terminal_ends_a_flight_as_ctrl_c_does(tmp_path: Path) -> None:
     """The terminal is gone first, so that nothing more can be said; then shell and system tell of it."""
     ours, theirs = pty.openpty()
     words = ["gcs", "fly", "hover", "--sensors", "ideal", "--speed", "2", "--out", str(tmp_path / "out")]
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # a child takes it over, as ignored under nohup
     flight = subprocess.Popen(
         [sys.executable, "-m", *words], stdin=theirs, stdout=theirs, stderr=theirs, cwd=tmp_path
     )
+    signal.signal(signal.SIGHUP, before)
     os.close(theirs)
     try:
         said = b""
