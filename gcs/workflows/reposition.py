@@ -33,9 +33,9 @@ def reposition(
     message = session.request(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
     origin = Home(message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3)
     load = _load(session)
-    if from_load and load is None:
+    begin = load if from_load else _home(session, origin)
+    if begin is None:
         raise GcsError("the vehicle does not tell where its load is")
-    begin = load if from_load and load is not None else _home(session, origin)
     east, north, up = add(begin, (offset[0], offset[1], offset[2] or 0.0))
     latitude, longitude, _ = geodetic_from_enu((east, north, up), origin)
     height_m = math.nan if offset[2] is None else up
