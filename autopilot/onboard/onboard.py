@@ -677,7 +677,8 @@ class Onboard:
         self.endpoint.state_changed()
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             self.core.change(off_mission(self.core.flight))
-            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, verdict.text or "Mission denied")
+            text, about = verdict.text or "Mission denied", mavlink.MAV_CMD_MISSION_START
+            self.endpoint.say(mavlink.MAV_SEVERITY_WARNING, text, about)
 
     def _have_prepared(self, prepared: Prepared) -> None:
         flight = self.core.flight

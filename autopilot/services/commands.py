@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from autopilot.geometry.linear import Vec3
 from autopilot.services.identity import FLOWN, Flavour, Identity, Mode
-from autopilot.services.records import Announce, Decide, Output, Peer, Say, Send, Verdict
+from autopilot.services.records import Announce, Decide, Output, Peer, Say, Send, Settled, Verdict
 from autopilot.services.requests import (
     Answered,
     Arm,
@@ -551,7 +551,7 @@ class CommandService:
         """Execute MISSION_SET_CURRENT; it is answered by MISSION_CURRENT, a refusal also by a text."""
         verdict = decide(SetCurrent(message.seq))
         outputs: list[Output] = [Announce(peer.link, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,))]
-        return _said(verdict) + outputs
+        return _said(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, verdict) + outputs
 
     def _execute(self, call: Call, peer: Peer, now_us: int, decide: Decide) -> list[Output]:
         parser = PARSERS.get(call.command)
@@ -574,11 +574,11 @@ class CommandService:
         return done.call == call and now_us - done.at_us <= REPEAT_US
 
 
-def _said(verdict: Verdict) -> list[Output]:
-    if verdict.text is None:
-        return []
-    severity = mavlink.MAV_SEVERITY_INFO if verdict.result == ACCEPTED else mavlink.MAV_SEVERITY_WARNING
-    return [Say(severity, verdict.text)]
+def _said(command: int, verdict: Verdict) -> list[Output]:
+    if verdict.result == ACCEPTED:
+        news = [] if verdict.text is None else [Say(mavlink.MAV_SEVERITY_INFO, verdict.text)]
+        return [Settled(command), *news]
+    return [] if verdict.text is None else [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text, command)]
 
 
 def _ack(command: int, result: int, peer: Peer) -> Output:
@@ -593,4 +593,4 @@ def _ack(command: int, result: int, peer: Peer) -> Output:
 
 def _answer(command: int, verdict: Verdict, peer: Peer) -> list[Output]:
     """The reason first, so that it is there when the ACK is shown."""
-    return [*_said(verdict), _ack(command, verdict.result, peer)]
+    return [*_said(command, verdict), _ack(command, verdict.result, peer)]

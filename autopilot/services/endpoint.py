@@ -10,7 +10,7 @@ The shell owns sockets, clock and files. It calls `receive` for each datagram, t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ from autopilot.services.records import (
     Peer,
     Say,
     Send,
+    Settled,
     Source,
     Verdict,
     WorldSaved,
@@ -283,9 +284,9 @@ class VehicleEndpoint:
         self._stood_us += passed_us
         self._stirred = True
 
-    def say(self, severity: int, text: str) -> None:
-        """A text for the operators of all links."""
-        self._do([Say(severity, text)], [])
+    def say(self, severity: int, text: str, about: Hashable = None) -> None:
+        """A text for the operators of all links; of a refusal, what it is `about`."""
+        self._do([Say(severity, text, about)], [])
 
     def inherit_texts(self, before: VehicleEndpoint) -> None:
         """What the vehicle said in the run that ended as this one begins."""
@@ -459,8 +460,10 @@ class VehicleEndpoint:
                 case Send(link, message, source):
                     for state in self._states(link):
                         state.queue.append((source or self._own, message))
-                case Say(severity, text):
-                    self.kept_texts.keep(severity, text, self._now_us + self._stood_us)
+                case Settled(about):
+                    self.kept_texts.settle(about)
+                case Say(severity, text, about):
+                    self.kept_texts.keep(severity, text, self._now_us + self._stood_us, about)
                     if self.on_text is not None:
                         self.on_text(severity, text)
                     for message in self._texts.messages(severity, text):

@@ -2,20 +2,23 @@
 
 A text that is said again takes the place of the one before: a complaint that comes back every few seconds
 does not crowd out the reason of a failsafe. Kept texts go out at a steady pace, to the link that asked alone,
-and say which of how many they are and how old: `[2/7, 12.3 s ago] Landed, disarmed`.
+and say which of how many they are and how old: `[2/7, 12.3 s ago] Landed, disarmed`. A refusal that was
+overtaken, as what was refused has been accepted since, is told again as a notice and no warning.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import NamedTuple
 
 from autopilot.services.records import Link, Output, Send
 from autopilot.services.statustext import TextWriter
 from autopilot.services.streams import NEVER_US
+from autopilot.wire.dialect import plumbline as mavlink
 
 MOST = 50  # texts that are kept
 PACE_US = 4000  # between two of them on a link
+_OVERTAKEN = mavlink.MAV_SEVERITY_NOTICE
 _MICRO = 1e-6
 
 
@@ -33,6 +36,7 @@ class KeptTexts:
     def __init__(self, writer: TextWriter) -> None:
         self._writer = writer
         self._texts: dict[tuple[int, str], int] = {}  # when each was said last, in that order
+        self._refusals: dict[tuple[int, str], Hashable] = {}  # of these, and what was refused
         self._asked: dict[Link, tuple[tuple[KeptText, ...], int, int]] = {}  # which, the next one, and when
 
     @property
@@ -40,12 +44,29 @@ class KeptTexts:
         """What is kept, the oldest first."""
         return tuple(KeptText(now_us, *said) for said, now_us in self._texts.items())
 
-    def keep(self, severity: int, text: str, now_us: int) -> None:
-        """A text is said now; the oldest one may be forgotten for it."""
-        self._texts.pop((severity, text), None)
-        self._texts[severity, text] = now_us
+    def keep(self, severity: int, text: str, now_us: int, about: Hashable = None) -> None:
+        """A text is said now, maybe that something is refused; the oldest one may be forgotten for it."""
+        said = severity, text
+        self._texts.pop(said, None)
+        self._texts[said] = now_us
         if len(self._texts) > MOST:
             del self._texts[next(iter(self._texts))]
+        if about is not None:
+            self._refusals[said] = about
+        if len(self._refusals) > MOST:
+            self._refusals = {one: what for one, what in self._refusals.items() if one in self._texts}
+
+    def settle(self, about: Hashable) -> None:
+        """What was refused is accepted now."""
+        overtaken = [said for said, what in self._refusals.items() if what == about]
+        if not overtaken:
+            return
+        for said in overtaken:
+            del self._refusals[said]
+        self._texts = {
+            (_OVERTAKEN, said[1]) if said in overtaken else said: now_us
+            for said, now_us in self._texts.items()
+        }
 
     def inherit(self, texts: Iterable[KeptText], ended_us: int) -> None:
         """Texts of a run that ended at this time of its clock, as this one begins."""

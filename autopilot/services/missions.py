@@ -26,7 +26,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from autopilot.services.mission_store import MAX_ITEMS, StoredMission, plan_id
-from autopilot.services.records import Announce, AreasChanged, Decide, MissionChanged, Output, Peer, Say, Send
+from autopilot.services.records import (
+    Announce,
+    AreasChanged,
+    Decide,
+    MissionChanged,
+    Output,
+    Peer,
+    Say,
+    Send,
+    Settled,
+)
 from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.convert import Home, enu_from_geodetic, geodetic_from_enu
@@ -240,17 +250,20 @@ class MissionService:
             if kind in _AREAS:
                 _READERS[kind](items, self.home)
                 self._end(_ACCEPTED, now_us)
-                return [*self._area_replaced(kind, items), self._accepted(upload.peer, kind)]
+                settled = Settled(_upload_of(kind))
+                return [settled, *self._area_replaced(kind, items), self._accepted(upload.peer, kind)]
             steps = located_steps(items, self.home)
         except MissionItemError as error:
             self._end(error.result, now_us)
-            return [Say(mavlink.MAV_SEVERITY_WARNING, str(error)), _ack(upload.peer, error.result, kind)]
+            said = Say(mavlink.MAV_SEVERITY_WARNING, str(error), _upload_of(kind))
+            return [said, _ack(upload.peer, error.result, kind)]
         refused = self._refusal(steps, upload.count, upload.peer, decide)
         if refused:
             self._end(mavlink.MAV_MISSION_DENIED, now_us)
             return refused
         self._end(_ACCEPTED, now_us)
-        return [*self._replaced(StoredMission(items)), self._accepted(upload.peer, kind)]
+        replaced = self._replaced(StoredMission(items))
+        return [Settled(_upload_of(kind)), *replaced, self._accepted(upload.peer, kind)]
 
     def _accepted(self, peer: Peer, kind: int) -> Output:
         """The acknowledgement of a plan that is in force by now."""
@@ -332,7 +345,8 @@ class MissionService:
         verdict = decide(ReplaceMission(count, steps))
         if verdict.result == mavlink.MAV_RESULT_ACCEPTED:
             return []
-        said: list[Output] = [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text)] if verdict.text else []
+        warning, what = mavlink.MAV_SEVERITY_WARNING, _upload_of(kind)
+        said: list[Output] = [Say(warning, verdict.text, what)] if verdict.text else []
         return [*said, _ack(peer, mavlink.MAV_MISSION_DENIED, kind)]
 
     def _area_replaced(self, kind: int, items: tuple[WireItem, ...]) -> list[Output]:
@@ -413,6 +427,11 @@ def _home_item(home: Home) -> WireItem:
     x, y, _ = geodetic_from_enu((0.0, 0.0, 0.0), home)
     frame, command = mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_CMD_NAV_WAYPOINT
     return WireItem(frame, command, 1, 1, 0.0, 0.0, 0.0, 0.0, x, y, home.altitude_m)
+
+
+def _upload_of(kind: int) -> tuple[str, int]:
+    """What a refusal of items of this kind is about."""
+    return "upload", kind
 
 
 def _ack(peer: Peer, result: int, kind: int = _MISSION, number: int = 0) -> Output:

@@ -41,10 +41,21 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Say:
-    """A text for the operators of all links; MAV_SEVERITY 0 (emergency) ... 7 (debug)."""
+    """A text for the operators of all links; MAV_SEVERITY 0 (emergency) ... 7 (debug).
+
+    A refusal says what it is `about`, a command or an upload: it counts until that is accepted (`Settled`).
+    """
 
     severity: int
     text: str
+    about: Hashable = None
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """What was refused before is accepted now: the refusals `about` it are no warnings any more."""
+
+    about: Hashable
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +136,7 @@ Event = (
     | WorldSaved
     | ServiceFailed
 )
-Output = Send | Say | Announce | Event
+Output = Send | Say | Settled | Announce | Event
 
 
 class Verdict(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from autopilot.services.kept_texts import MOST, PACE_US, KeptText, KeptTexts
+from autopilot.services.records import Verdict
 from autopilot.services.statustext import TextWriter
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.dialect import plumbline as mavlink
@@ -108,3 +109,26 @@ def test_a_link_that_is_gone_is_told_nothing() -> None:
     kept.forget("gone")
     assert kept.poll(10 * PACE_US) == []
     assert kept.next_timer() == NEVER_US
+
+
+def test_a_refusal_is_a_warning_until_what_was_refused_is_accepted(rig: Rig) -> None:
+    start = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_MISSION_START, 0, 0, 0, 0, 0, 0, 0, 0)
+    land = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_NAV_LAND, 0, 0, 0, 0, 0, 0, 0, 0)
+    rig.verdict = lambda request: Verdict(mavlink.MAV_RESULT_DENIED, f"{type(request).__name__} denied")
+    rig.send(start)
+    rig.send(land)
+    rig.endpoint.say(WARNING, "Machine busy")
+
+    def severities():
+        rig.run(100_000)
+        return {HEAD.fullmatch(text)[4]: severity for severity, text in asked(rig)}
+
+    assert severities() == {"StartMission denied": WARNING, "Land denied": WARNING, "Machine busy": WARNING}
+    rig.verdict = lambda request: Verdict(mavlink.MAV_RESULT_ACCEPTED)
+    rig.send(start)
+    notice = mavlink.MAV_SEVERITY_NOTICE
+    assert severities() == {"StartMission denied": notice, "Land denied": WARNING, "Machine busy": WARNING}
+    rig.verdict = lambda request: Verdict(mavlink.MAV_RESULT_DENIED, f"{type(request).__name__} denied")
+    rig.run(4_000_000)
+    rig.send(start)
+    assert severities()["StartMission denied"] == WARNING, "it is refused once more"

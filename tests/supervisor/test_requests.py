@@ -254,7 +254,7 @@ def test_a_reposition_keeps_what_is_not_given_and_holds_there() -> None:
 def test_a_reposition_that_is_far_off_is_a_mistake(place: tuple[float, float, float]) -> None:
     sky = Sky().airborne()
     verdict = sky.ask(R.Reposition(*place, True))
-    assert verdict.text == "Reposition denied: more than 100000 m away"
+    assert verdict.text == "Reposition denied: more than 100000 m from home"
 
 
 def test_a_reposition_out_of_motion_goes_on_from_that_motion() -> None:

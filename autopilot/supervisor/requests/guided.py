@@ -96,7 +96,7 @@ def follow_setpoint(flight: Flight, request: FollowSetpoint, view: View, setting
     elif settings.setpoints.guides_vehicle and not flight.cable.released:
         position = (position[0], position[1], position[2] - settings.cable_length_m)
     if any(abs(value) > FARTHEST_M for value in position):
-        return flight, denied(f"Setpoint refused: more than {FARTHEST_M:g} m away")
+        return flight, denied(f"Setpoint refused: more than {FARTHEST_M:g} m from home")
     asked = PositionSetpoint(
         position,
         turned(request.velocity),

@@ -25,5 +25,5 @@ def look_at(flight: Flight, request: LookAt, view: View, settings: Settings) -> 
         return flight, wrong_phase(flight, "ROI")
     place = (request.east_m, request.north_m)
     if any(at is not None and not (isfinite(at) and abs(at) <= FARTHEST_M) for at in place):
-        return flight, denied(f"ROI denied: more than {FARTHEST_M:g} m away")
+        return flight, denied(f"ROI denied: more than {FARTHEST_M:g} m from home")
     return looking(flight, request, view, settings), ACCEPTED

@@ -59,7 +59,7 @@ def set_home(flight: Flight, request: SetHome, view: View, settings: Settings) -
     """Make this place, or another, the one to which a return leads."""
     place = view.x_quad if request.position is None else request.position
     if not math.hypot(place[0], place[1]) <= FARTHEST_M:
-        return flight, denied(f"Home denied: more than {FARTHEST_M:g} m away")
+        return flight, denied(f"Home denied: more than {FARTHEST_M:g} m from the origin")
     if request.position is not None and not abs(place[2]) <= LEVEL_HOME_M:
         return flight, denied("Home denied: its height must be that of the ground here, which is flat")
     return replace(flight, area=replace(flight.area, home=(place[0], place[1], 0.0))), ACCEPTED

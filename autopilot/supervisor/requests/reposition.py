@@ -49,7 +49,7 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     if not all(map(math.isfinite, there)):
         return flight, denied("Reposition denied: not a place")
     if max(map(abs, there)) > FARTHEST_M:
-        return flight, denied(f"Reposition denied: more than {FARTHEST_M:g} m away")
+        return flight, denied(f"Reposition denied: more than {FARTHEST_M:g} m from home")
     if there[2] < LEAST_ALTITUDE_M:
         return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
     place = below(there, settings) if flight.cable.released else there

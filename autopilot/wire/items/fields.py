@@ -188,7 +188,7 @@ class Place:
 
     def write(self, seq: int, home: Home, *values: Any) -> dict[str, float]:
         east, north = values
-        check(seq, 5, "east or north", max(abs(east), abs(north)), "m", 0.0, FARTHEST_M)
+        check(seq, 5, "east or north of home", max(abs(east), abs(north)), "m", 0.0, FARTHEST_M)
         latitude, longitude, _ = geodetic_from_enu((east, north, 0.0), home)
         return {"x": latitude, "y": longitude}
 
