@@ -141,7 +141,7 @@ def gcs(signing_key: bytes | None) -> None:
     gcs upload, arm, start, status, param and the like command a vehicle that is running already (sitl and
     autopilot, or gcs fly --speed 1).
 
-    Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong usage,
+    Results are on stdout, everything else on stderr. Exit codes: 0 done, 1 a known error, 2 wrong input,
     3 flown, but the mission was not completed, 4 flown, but not as --require asks, 130 stopped by
     Ctrl-C.
     """

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 EXIT_DONE = 0
 EXIT_ERROR = 1  # a known error, told in one line
-EXIT_USAGE = 2  # the command line itself is wrong
+EXIT_USAGE = 2  # the command line is wrong, or a file that it names
 EXIT_NOT_MET = 3  # flown, but the mission was not completed
 EXIT_REQUIRED = 4  # a requirement of --require was not met
 EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, as shells count it
@@ -23,7 +23,7 @@ class GcsError(Exception):
 
 
 class InputError(GcsError):
-    """The command line names something that there is not, or a value that cannot be."""
+    """The command line names something that there is not, or a value or a file that cannot be."""
 
     exit_code = EXIT_USAGE
 
@@ -44,7 +44,7 @@ class RefusedError(GcsError):
 
 def input_error(error: FileError) -> GcsError:
     """What is wrong with a file that the command line names, or with the name."""
-    return (InputError if error.unknown else GcsError)(str(error))
+    return InputError(str(error))
 
 
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)

@@ -82,13 +82,13 @@ def _try_file(path: Path) -> None:
 
 
 def keep_others(path: Path, kind: str, written: Iterable[str] = ()) -> None:
-    """A folder holds the results of one thing: GcsError if this one holds those of another `kind`, by name of
-    the file that tells, or before it holds ours a file under a name that is `written`."""
+    """A folder holds the results of one thing: InputError if this one holds those of another `kind`, by name
+    of the file that tells, or before it holds ours a file under a name that is `written`."""
     for mark, what in _HOLDS.items():
         if mark != kind and (path / mark).exists():
-            raise GcsError(f"--out {path}: holds {what}; name another")
+            raise InputError(f"--out {path}: holds {what}; name another")
     if (path / kind).exists():
         return
     for name in written:
         if (path / name).exists():
-            raise GcsError(f"--out {path}: holds a {name} that is not of {_HOLDS[kind]}; name another")
+            raise InputError(f"--out {path}: holds a {name} that is not of {_HOLDS[kind]}; name another")

@@ -16,7 +16,9 @@ def text_of(path: Path) -> str:
     """The text of a file in UTF-8, without the mark at its beginning that some editors set (BOM);
     TextFileError for what is none, is too long, or would never end."""
     try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
+        if path.is_dir():
+            raise TextFileError("is a folder; must be a file")
+        if path.exists() and not path.is_file():
             raise TextFileError("cannot be read: a device or a pipe, which may have no end")
         with path.open("rb") as file:
             data = file.read(MOST_BYTES + 1)
@@ -31,5 +33,7 @@ def text_of(path: Path) -> str:
             else f"not a text file in UTF-8 (byte {error.start})"
         )
         raise TextFileError(found) from None
+    except FileNotFoundError:
+        raise TextFileError("no such file") from None
     except OSError as error:
         raise TextFileError(f"cannot be read: {error.strerror}") from None

@@ -47,8 +47,6 @@ _UNITS = {
 class FileError(ValueError):
     """The file or the name given is at fault. `problems` has one line each; str() has them all."""
 
-    unknown = False  # there is no such name
-
     def __init__(self, problems: Sequence[str]) -> None:
         self.problems = tuple(problems)
         super().__init__("; ".join(self.problems))
@@ -89,16 +87,13 @@ class TomlFiles:
             parts = (*self.package.split("."), self.folder, given + _SUFFIX)
             return TomlText(given, "/".join(filter(None, parts)), text)
         path = Path(given)
-        if not given or not (path.is_file() or path.suffix == _SUFFIX or len(path.parts) > 1):
-            hint, names = self._hint(given), ", ".join(self.names())
-            text = f"unknown {self.kind} {given!r}; {hint}shipped: {names}; or the path of a file"
-            error = self.error([text])
-            error.unknown = True
-            raise error
+        if not (given and (path.exists() or path.suffix or given != path.name)):  # a word, and no path
+            shipped = f"{self._hint(given)}shipped: {', '.join(self.names())}"
+            raise self.error([f"unknown {self.kind} {given!r}; {shipped}; or the path of a file"])
         try:
             return TomlText(path.stem, given, text_of(path))
         except TextFileError as error:
-            near = "" if path.exists() else nearest(path.stem, self.names())
+            near = "" if path.is_file() else nearest(path.stem, self.names())
             hint = f"; did you mean the shipped {near}?" if near else ""
             raise self.error([f"{given}: {error}{hint}"]) from None
 

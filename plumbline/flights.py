@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import time
+import warnings
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -46,7 +47,7 @@ def fly(
     settings: Settings | None = None,
     timeout_s: float | None = None,
     force: bool = False,
-    quiet: bool = False,
+    quiet: bool = True,
 ) -> Flight:
     """Fly a mission from take-off to landing, as fast as this machine does it.
 
@@ -57,7 +58,8 @@ def fly(
     simulator (`SIM_...`) and of the autopilot that are not to be their defaults. `timeout_s`: the flight is
     given up after so many seconds of its own clock; by default one and a half times what is expected, and a
     minute.
-    `force`: fly even what the vehicle cannot do. Progress is shown on stderr unless `quiet`.
+    `force`: fly even what the vehicle cannot do. `quiet=False` shows progress on stderr, also of compiling,
+    which takes a minute or more before the first flight. A setting that may not be meant so is a warning.
 
     A lost flight is a result: see `Flight.outcome`. `Error` if there is no such mission, vehicle, sensor
     profile, law, estimator, planner or parameter, if a value is no number or out of its range, if what you
@@ -89,9 +91,14 @@ def fly(
     log = io.BytesIO()
     began_s = time.perf_counter()
     with told_in_python():
-        outcome = fly_here(flown, options, TlogWriter(log))
+        outcome = fly_here(flown, options, TlogWriter(log), _doubt)
     wall_s = time.perf_counter() - began_s
     return Flight(flown, outcome, log.getvalue(), meta_of(flown, options, outcome, wall_s))
+
+
+def _doubt(line: str) -> None:
+    """A setting that can be flown, but may not be meant so: a warning at the line that called `fly`."""
+    warnings.warn(f"settings: {line}", stacklevel=4)
 
 
 class Flight:

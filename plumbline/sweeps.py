@@ -49,7 +49,7 @@ def sweep(
     jobs: int | None = None,
     scheduler: Any = None,
     out: str | Path | None = None,
-    quiet: bool = False,
+    quiet: bool = True,
     kind: str = "pandas",
 ) -> Any:
     """Fly a mission under every value of what is varied, with every law and the seeds 1 ... `seeds`.
@@ -59,8 +59,8 @@ def sweep(
     all flights. `estimator` and `planner`: one of your own, as `FILE.py:CLASS`, of all flights. `jobs`
     flights are flown at a time, by default one on each core; `scheduler` is the address
     of a Dask scheduler, or a Dask client, that flies them instead. `out`: the directory that keeps table and
-    page (docs/cli.md), from which a sweep that was interrupted goes on; by default nothing is kept. Progress
-    is shown on stderr unless `quiet`.
+    page (docs/cli.md), from which a sweep that was interrupted goes on; by default nothing is kept.
+    `quiet=False` shows progress on stderr.
 
     A table with a row for each flight, its columns those of flights.parquet (docs/cli.md): a DataFrame of
     pandas, or of polars, or a table of Arrow, as `kind` says. The flights are flown by a program of their

@@ -118,6 +118,7 @@ class FlightClient:
     ) -> None:
         self.outcome: Outcome | None = None
         self.fell_silent = False  # the vehicle did, which ended the flight
+        self.begun = False  # the vehicle was armed
         self.stage = Stage.FIND
         self.view = VehicleView()
         self.connection = Connection(link_timeout_us)
@@ -260,6 +261,7 @@ class FlightClient:
         self.stage = stage
         self._stage_began_us = now_us
         self._texts_before = len(self.view.texts)
+        self.begun = self.begun or stage is Stage.START
         if stage is Stage.ARM:
             self._texts_armed = len(self.view.texts)
         if stage is Stage.STREAMS and self.connection.target is not None:

@@ -24,7 +24,13 @@ def experiments_command() -> None:
     show_default=True,
     help="Where flights, tables and figures go.",
 )
-@click.option("--fresh", is_flag=True, help="Fly everything anew, also what has been flown already.")
+@click.option(
+    "--fresh",
+    "--overwrite",
+    "fresh",
+    is_flag=True,
+    help="Fly everything anew, also what has been flown already: what --out holds is lost.",
+)
 @click.option(
     "--jobs",
     type=WholeNumber(min=1),

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json
-from gcs.errors import GcsError
+from gcs.errors import InputError
 
 
 @click.command("report")
@@ -43,7 +43,7 @@ def report_command(
     elif not quiet:
         print_record(record)
     if record["outcome"] == "no telemetry":
-        raise GcsError(f"{source}: holds no telemetry of a Plumbline vehicle")
+        raise InputError(f"{source}: holds no telemetry of a Plumbline vehicle")
     if not record["samples"]:
         say(f"{source}: holds no moment of a mission with the load in the air; its figures are empty")
     beside = [make_common(source, folder)] if common else []

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import decimal_from_float32
-from gcs.errors import GcsError
+from gcs.errors import InputError
 
 NO_INT = 2**31 - 1  # a coordinate that is not given
 _FLOAT32 = struct.Struct("<f")
@@ -28,7 +28,7 @@ _LOCAL = frozenset(
 )
 
 
-class FormatError(GcsError):
+class FormatError(InputError):
     """A file that is not what it should be; says where and what."""
 
 

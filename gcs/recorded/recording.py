@@ -36,7 +36,7 @@ def read_recording(path: Path, columns: ColumnMap) -> Recording:
     """The recording in a file; RecordingError if it is none."""
     try:
         if not path.is_file():
-            raise RecordingError(f"{path}: {'not a file' if path.exists() else 'there is no such file'}")
+            raise RecordingError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
         found = _telemetry(path) if path.suffix == ".tlog" else _rows(path, columns)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None

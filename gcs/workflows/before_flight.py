@@ -9,14 +9,16 @@ from missions.model import Mission
 from sitl.sensors.shipped import PROFILES
 
 
-def check_options(options: FlightOptions) -> None:
+def check_options(options: FlightOptions) -> list[str]:
     """GcsError if there is no such vehicle or sensor profile, if a parameter cannot be set so, or if what
-    somebody brings cannot fly."""
+    somebody brings cannot fly; else a line for each setting that may not be meant so."""
     if _as_shipped(options):
-        return
-    from gcs.workflows.flight_inputs import check_flight_inputs
+        return []
+    from gcs.workflows.flight_inputs import check_flight_inputs, doubts
 
-    check_flight_inputs(options.vehicle, options.sensors, map(setting_of, options.settings), options.own)
+    settings = list(map(setting_of, options.settings))
+    check_flight_inputs(options.vehicle, options.sensors, settings, options.own)
+    return doubts(options.vehicle, settings)
 
 
 def _as_shipped(options: FlightOptions) -> bool:

@@ -39,7 +39,7 @@ def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]
     runs = [load_run(name, log, _meta(log)) for name, log in zip(names, logs, strict=True)]
     for source, run in zip(sources, runs, strict=True):
         if run.record["outcome"] == "no telemetry":
-            raise GcsError(f"{source}: holds no telemetry of a Plumbline vehicle")
+            raise CompareError(f"{source}: holds no telemetry of a Plumbline vehicle")
     page = out or FOLDER / f"{'-'.join(names)[:100].replace('/', '_')}.html"
     try:
         page.parent.mkdir(parents=True, exist_ok=True)
@@ -59,7 +59,7 @@ def _meta(log: Path) -> FlightMeta:
     try:
         return load_meta(log.parent / META_FILE)
     except ReportError as error:
-        raise GcsError(str(error)) from None
+        raise CompareError(str(error)) from None
 
 
 def _names(sources: Sequence[Path]) -> list[str]:

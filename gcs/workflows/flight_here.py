@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from autopilot.own.law import law_number
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.wire.convert import Home
@@ -16,9 +18,15 @@ from gcs.workflows.warmup import flight_parts, warm_up
 from missions.model import Mission
 
 
-def fly_here(mission: Mission, options: FlightOptions, log: FrameLog) -> Outcome:
-    """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown."""
-    check_options(options)
+def fly_here(
+    mission: Mission, options: FlightOptions, log: FrameLog, doubt: Callable[[str], None] = lambda _: None
+) -> Outcome:
+    """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
+
+    `doubt` is given a line for each setting that may not be meant so.
+    """
+    for line in check_options(options):
+        doubt(line)
     warm_up(flight_parts((options.law,)), options.quiet)
     check_mission(mission, options)
     settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(setting_of, options.settings))}

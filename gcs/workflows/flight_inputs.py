@@ -51,6 +51,19 @@ def check_flight_inputs(
         _try(given_own, own, given)
 
 
+def doubts(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
+    """A line for each setting that can be flown, but hardly as it was meant: a time of less than a
+    millisecond that is told in milliseconds, as by somebody who thinks in seconds."""
+    found = load_vehicle(vehicle)
+    tables = sim_parameters(truth_of(found)), parameters_for(load_belief(vehicle), NOTHING_OWN)
+    units = {name: table.describe(name).unit for table in tables for name in table.names}
+    return [
+        f"{name} = {value:g} is in milliseconds; {value * 1e3:g} if {value:g} s is meant"
+        for name, value in settings
+        if units.get(name) == "ms" and 0.0 < abs(value) < 1.0
+    ]
+
+
 def split_settings(
     vehicle: str, sensors: str, settings: Iterable[tuple[str, float]]
 ) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:

@@ -15,6 +15,7 @@ from gcs.errors import (
     EXIT_INTERRUPTED,
     EXIT_NOT_MET,
     GcsError,
+    InputError,
     StoppedError,
     disk_trouble,
 )
@@ -46,6 +47,7 @@ _EXIT = {
     "lost": EXIT_ERROR,
 }
 
+UNFLOWN_FILE = "unflown.tlog"  # what a vehicle said with which nothing was flown
 MOST_MISSED = 1e-3  # share of the commands that may come too late before it is told of
 
 Told = Callable[["Record", "Outcome"], None]
@@ -69,7 +71,9 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
     """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
     the report are drawn. With `view` a page shows it, and stays."""
     if options.connect is None and options.firmware is None:
-        check_options(options)
+        for doubt in check_options(options):
+            if not options.quiet:
+                say(f"--set {doubt}")
     mission = load(options.mission)
     out = options.out or fresh_folder(mission.name)
     with FlightFolder(out, options.overwrite) as folder:
@@ -190,6 +194,8 @@ def _end(
         if stop:
             raise StoppedError("stopped before the vehicle said anything")
         raise GcsError(outcome.reason or "the vehicle said nothing")
+    if stop and not client.begun:
+        raise StoppedError(f"stopped before the vehicle was armed; what it said is in {folder.set_aside()}")
     folder.keep()
     if options.real_time and outcome.name != "completed":
         outcome = outcome.because(_too_slow(tlog))
@@ -235,6 +241,11 @@ class FlightFolder:
     def keep(self) -> None:
         self._kept = True
 
+    def set_aside(self) -> Path:
+        """Keep what was captured under a name that is not a flight's: the next flight may have the folder."""
+        self._kept = True
+        return (self._path / TLOG_FILE).rename(self._path / UNFLOWN_FILE)
+
     def __enter__(self) -> FlightFolder:
         make_folder(self._path, f"--out {self._path}")
         keep_others(self._path, TLOG_FILE, () if self._overwrite else (SUMMARY_FILE, PAGE_FILE))
@@ -242,7 +253,7 @@ class FlightFolder:
             (self._path / TLOG_FILE).touch(exist_ok=self._overwrite)
         except FileExistsError:
             text = f"--out {self._path}: holds a flight already; name another, or add --overwrite"
-            raise GcsError(text) from None
+            raise InputError(text) from None
         return self
 
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:

@@ -10,7 +10,7 @@ from autopilot.wire.parameter_names import unknown_parameter
 from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
-from gcs.errors import GcsError, RefusedError
+from gcs.errors import GcsError, InputError, RefusedError
 from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
 from gcs.shell.display import StepDisplay, say
 from gcs.shell.link import Address
@@ -89,7 +89,7 @@ def load_parameters(file: Path, address: Address) -> tuple[int, int]:
     try:
         values = parse_text(text_of(file))
     except (TextFileError, ParameterError) as error:
-        raise GcsError(f"{file}: {error}") from None
+        raise InputError(f"{file}: {error}") from None
     refused = 0
     with Session(address) as session, StepDisplay("parameters") as display:
         target = session.find()

@@ -33,13 +33,13 @@ def identify(path: Path, columns: str | None) -> dict[str, Any]:
     _needs_load(path, motion)
     duration_s = float(motion.time_s[-1] - motion.time_s[0])
     if duration_s < LEAST_S:
-        raise GcsError(
+        raise InputError(
             f"{path}: {duration_s:.1f} s; at least {LEAST_S:.0f} s are needed to identify anything"
         )
     try:
         vehicle = identify_vehicle(motion, model)
     except TooLittleMotionError as error:
-        raise GcsError(f"{path}: {error}") from None
+        raise InputError(f"{path}: {error}") from None
     found: list[Identified] = [
         tracked_length(motion, asked.attachment.below_m),
         *identify_load(motion, model, asked.identify.parameters),
@@ -105,16 +105,16 @@ def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel
     except MapError as error:
         raise input_error(error) from None
     except RecordingError as error:
-        raise GcsError(str(error)) from None
+        raise InputError(str(error)) from None
     far = distances(motion)
     if asked.model.length_m is None and not np.isfinite(far).any():
-        raise GcsError(f"{path}: without measured loads the column map must say model.length_m")
+        raise InputError(f"{path}: without measured loads the column map must say model.length_m")
     return asked, motion, asked.load_model(float(np.nanmedian(far)) if np.isfinite(far).any() else 0.0)
 
 
 def _needs_load(path: Path, motion: Motion) -> None:
     if not np.isfinite(motion.load).all():
-        raise GcsError(f"{path}: the load was not measured in every row; nothing can be identified from it")
+        raise InputError(f"{path}: the load was not measured in every row; nothing can be identified from it")
 
 
 def _rows_record(path: Path, motion: Motion) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from autopilot.wire.tlog import read_tlog, write_common
-from gcs.errors import GcsError
+from gcs.errors import GcsError, InputError
 from gcs.folders import TLOG_FILE, keep_others
 from gcs.shell.display import StepDisplay
 
@@ -32,7 +32,7 @@ def make_report(
         try:
             return build_report(tlog, out, meta, display.update, figures)
         except ReportError as error:
-            raise GcsError(str(error)) from None
+            raise InputError(str(error)) from None
         except OSError as error:
             raise GcsError(f"{error.filename or out}: {error.strerror}") from None
 
@@ -40,10 +40,11 @@ def make_report(
 def find_log(source: Path) -> Path:
     """The log that is named, or that lies in the directory that is named."""
     tlog = source / TLOG_FILE if source.is_dir() else source
+    allowed = f"must be a .tlog, or a directory that holds {TLOG_FILE}"
     if not tlog.is_file():
-        raise GcsError(f"{tlog}: no such file; must be a .tlog, or a directory that holds {TLOG_FILE}")
+        raise InputError(f"{tlog}: no such file; {allowed}")
     if next(read_tlog(tlog), None) is None:
-        raise GcsError(f"{tlog}: holds no telemetry; must be a .tlog, or a directory that holds {TLOG_FILE}")
+        raise InputError(f"{tlog}: holds no telemetry; {allowed}")
     return tlog
 
 
@@ -62,7 +63,7 @@ def make_mcap(source: Path, folder: Path) -> Path:
     try:
         return build_mcap(find_log(source), folder)
     except ReportError as error:
-        raise GcsError(str(error)) from None
+        raise InputError(str(error)) from None
     except OSError as error:
         raise GcsError(f"{error.filename or folder}: {error.strerror}") from None
 

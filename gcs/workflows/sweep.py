@@ -18,6 +18,7 @@ from gcs.sweep.plan import MOST_FLIGHTS, SweepPlan, make_plan, read_varied
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
+from gcs.workflows.flight_inputs import doubts
 from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.warmup import warm_up
 
@@ -105,6 +106,8 @@ def run_sweep(options: SweepOptions) -> Sweep:
         options.sample or 0,
         options.own,
     )
+    if not options.quiet:
+        _tell_doubts(plan)
     directory = options.out or Path("sweeps") / Path(options.mission).stem
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
@@ -125,6 +128,17 @@ def run_sweep(options: SweepOptions) -> Sweep:
         page = write_report(directory, plan)
     flights = tuple(_told(plan, one, directory) for one in found)
     return Sweep(done, plan.flights, directory, page, flights)
+
+
+def _tell_doubts(plan: SweepPlan) -> None:
+    """Tell what can be flown and may not be meant; of the values of a parameter the first alone."""
+    for option, values in (
+        ("--set", list(plan.settings)),
+        ("--vary", [(one.name, value) for one in plan.varied for value in one.values]),
+    ):
+        told = doubts(plan.vehicle, values)
+        for line in {line.split(maxsplit=1)[0]: line for line in reversed(told)}.values():
+            say(f"{option} {line}")
 
 
 def _fly_again(plan: SweepPlan, found: Sequence[Standout], directory: Path, quiet: bool) -> None:

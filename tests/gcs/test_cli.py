@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -21,7 +22,7 @@ from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
-from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
 from gcs.shell.link import UdpSocket, free_port
@@ -159,7 +160,7 @@ def test_an_unknown_mission_is_wrong_usage_and_the_nearest_is_named(command):
 def test_what_holds_no_telemetry_makes_no_report(tmp_path):
     source = tmp_path / "flight.parquet"
     source.write_bytes(b"PAR1" + bytes(range(256)) * 50)
-    assert "holds no telemetry" in one_line(run("report", str(source)), EXIT_ERROR)
+    assert "holds no telemetry" in one_line(run("report", str(source)), EXIT_USAGE)
     assert [path.name for path in tmp_path.iterdir()] == ["flight.parquet"]
 
 
@@ -167,11 +168,15 @@ def test_a_height_is_given_either_way_and_once():
     assert "give one" in one_line(run("takeoff", "5", "--altitude", "5"), EXIT_USAGE)
 
 
-@pytest.mark.parametrize("command", ["fly", "check", "upload"])
+@pytest.mark.parametrize("command", ["fly", "check", "upload", "sweep"])
 @pytest.mark.parametrize(
     ("mission", "part"),
     [
-        ("nowhere/x.toml", "nowhere/x.toml"),
+        ("nowhere/x.toml", "nowhere/x.toml: no such file"),
+        ("nowhere.txt", "nowhere.txt: no such file"),
+        ("case-z.toml", "case-z.toml: no such file; did you mean the shipped case-c?"),
+        ("folder", "folder: is a folder; must be a file"),
+        ("folder/", "folder/: is a folder; must be a file"),
         ("bad.toml", "items[0].altitude_m"),
         ("torn.toml", "not TOML"),
         ("nan.toml", "finite"),
@@ -180,19 +185,20 @@ def test_a_height_is_given_either_way_and_once():
         ("/dev/zero", "a device or a pipe"),
     ],
 )
-def test_a_bad_mission_is_one_line_and_code_1(tmp_path, monkeypatch, command, mission, part):
+def test_a_bad_mission_is_one_line_and_code_2(tmp_path, monkeypatch, command, mission, part):
     monkeypatch.chdir(tmp_path)
     text = (
         'title = "t"\ndescription = "d"\n'
         '[[items]]\ntype = "takeoff"\naltitude_m = {}\n[[items]]\ntype = "land"\n'
     )
+    Path("folder").mkdir()
     Path("bad.toml").write_text(text.format(-2.0))
     Path("nan.toml").write_text(text.format("nan"))
     Path("torn.toml").write_text("[[items")
     Path("deep.toml").write_text("a = " + "[" * 5000 + "]" * 5000)
     os.mkfifo("pipe.toml")
     before = sorted(tmp_path.iterdir())
-    assert part in one_line(run(command, mission), EXIT_ERROR)
+    assert part in one_line(run(command, mission), EXIT_USAGE)
     assert sorted(tmp_path.iterdir()) == before, "nothing is left behind"
 
 
@@ -227,7 +233,7 @@ def test_a_bad_vehicle_file_is_one_line(tmp_path, text, part):
     path = tmp_path / "no-such.toml"
     if text is not None:
         path.write_text(text)
-    assert part in one_line(run("check", "hover", "--vehicle", str(path)), EXIT_ERROR)
+    assert part in one_line(run("check", "hover", "--vehicle", str(path)), EXIT_USAGE)
 
 
 def test_no_vehicle_is_one_line_after_the_stated_time(monkeypatch):
@@ -246,7 +252,7 @@ def test_a_busy_port_is_one_line():
 
 
 def test_a_report_of_nothing_is_one_line(tmp_path):
-    assert "flight.tlog" in one_line(run("report", str(tmp_path)), EXIT_ERROR)
+    assert "flight.tlog" in one_line(run("report", str(tmp_path)), EXIT_USAGE)
 
 
 def test_an_output_that_cannot_be_is_one_line(tmp_path):
@@ -423,11 +429,11 @@ def test_a_plan_beyond_the_vehicle_is_refused_unless_forced(live, tmp_path):
 
 def test_bad_files_of_others_are_one_line(tmp_path):
     file = tmp_path / "in.plan"
-    assert "No such file" in one_line(run("upload", str(file)), EXIT_ERROR)
+    assert "no such file" in one_line(run("upload", str(file)), EXIT_USAGE)
     file.write_bytes(b"\xff\xfe")
-    assert "not a text file" in one_line(run("upload", str(file)), EXIT_ERROR)
+    assert "not a text file" in one_line(run("upload", str(file)), EXIT_USAGE)
     file.write_text("{}")
-    assert "fileType" in one_line(run("upload", str(file)), EXIT_ERROR)
+    assert "fileType" in one_line(run("upload", str(file)), EXIT_USAGE)
     assert "must end in .plan" in one_line(run("download", str(tmp_path / "x.csv")), EXIT_USAGE)
 
 
@@ -457,7 +463,7 @@ def test_parameters(live, tmp_path):
     assert run("param", "load", str(file), "--connect", port).stdout.startswith("120 of 120 parameters set")
     assert vehicle.parameters == before
     file.write_text("P001 one\n")
-    assert "must be NAME value" in one_line(run("param", "load", str(file), "--connect", port), EXIT_ERROR)
+    assert "must be NAME value" in one_line(run("param", "load", str(file), "--connect", port), EXIT_USAGE)
 
 
 def test_status(live, monkeypatch):
@@ -611,6 +617,28 @@ def test_capture(live, tmp_path):
     assert stamps == sorted(stamps)
     told = {one.message.param_id for _, one in records if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE}
     assert told == set(vehicle.parameters)
+
+
+def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_next(
+    live, tmp_path, monkeypatch
+):
+    vehicle, port = live
+    vehicle.ready, asked, tick = False, [], vehicle.tick
+
+    def stop(now_us):
+        if vehicle.mission and not asked:
+            asked.append(True)
+            os.kill(os.getpid(), signal.SIGINT)
+        return tick(now_us)
+
+    monkeypatch.setattr(vehicle, "tick", stop)
+    out = tmp_path / "out"
+    result = run("fly", "hover", "--connect", port, "--out", str(out))
+    assert (result.exit_code, result.stdout) == (EXIT_INTERRUPTED, "")
+    told = f"stopped before the vehicle was armed; what it said is in {out / 'unflown.tlog'}"
+    assert result.stderr.splitlines()[-1] == f"gcs: {told}"
+    assert [path.name for path in out.iterdir()] == ["unflown.tlog"]
+    assert (out / "unflown.tlog").stat().st_size > 0
 
 
 def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):

@@ -6,10 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
-from gcs.errors import GcsError
+from gcs.cli import gcs
+from gcs.errors import EXIT_USAGE, GcsError
 from gcs.folders import PAGE_FILE, PLAN_FILE, RESULTS_FILE, SUMMARY_FILE, TLOG_FILE, fresh_folder, keep_others
-from gcs.workflows.fly import FlightFolder
+from gcs.workflows.fly import UNFLOWN_FILE, FlightFolder
 
 
 def test_flights_that_begin_in_one_second_have_folders_of_their_own(
@@ -49,6 +51,39 @@ def test_what_was_recorded_outlives_two_interrupts(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         interrupted(b"telemetry")
     assert (tmp_path / "out" / "flight.tlog").read_bytes() == b"telemetry"
+
+
+@pytest.mark.parametrize("telemetry", [b"", b"telemetry"])
+def test_a_folder_into_which_nothing_was_flown_is_free_for_the_next_flight(
+    tmp_path: Path, telemetry: bytes
+) -> None:
+    with FlightFolder(tmp_path / "out", overwrite=False) as folder:
+        (tmp_path / "out" / TLOG_FILE).write_bytes(telemetry)
+        if telemetry:
+            assert folder.set_aside().read_bytes() == telemetry
+    assert (tmp_path / "out").exists() == bool(telemetry)
+    with FlightFolder(tmp_path / "out", overwrite=False):
+        pass
+    assert not telemetry or (tmp_path / "out" / UNFLOWN_FILE).read_bytes() == telemetry
+
+
+@pytest.mark.parametrize(
+    ("command", "others"),
+    [
+        ("fly hover", PLAN_FILE),
+        ("fly hover", TLOG_FILE),
+        ("fly hover", SUMMARY_FILE),
+        ("sweep hover", TLOG_FILE),
+        ("sweep hover", PLAN_FILE),
+        ("experiments thesis", TLOG_FILE),
+    ],
+)
+def test_a_folder_that_holds_other_results_is_wrong_input_of_every_command(
+    tmp_path: Path, command: str, others: str
+) -> None:
+    (tmp_path / others).write_text('{"origin": {}}', encoding="utf-8")
+    result = CliRunner().invoke(gcs, [*command.split(), "--out", str(tmp_path)], prog_name="gcs")
+    assert (result.exit_code, "holds" in result.stderr) == (EXIT_USAGE, True)
 
 
 @pytest.mark.parametrize(

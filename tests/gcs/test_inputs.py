@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from autopilot.vehicle.file import VEHICLES
 from gcs.cli import gcs
-from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
-from gcs.workflows.flight_inputs import check_flight_inputs
+from gcs.errors import EXIT_DONE, EXIT_USAGE
+from gcs.workflows.flight_inputs import check_flight_inputs, doubts
 from sitl.sensors.shipped import PROFILES
 
 BEBOP = files("autopilot.vehicle").joinpath("vehicles", "bebop.toml").read_text(encoding="utf-8")
@@ -49,7 +49,7 @@ def refused(*arguments, code=EXIT_USAGE):
 def test_a_vehicle_that_the_simulator_refuses_no_command_takes(command, change, part, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(BEBOP.replace(*change), encoding="utf-8")
-    line = refused(command, "hover", "--vehicle", str(path), code=EXIT_ERROR)
+    line = refused(command, "hover", "--vehicle", str(path))
     assert line.startswith(f"gcs: {path}: {part}")
 
 
@@ -119,3 +119,39 @@ def test_help_names_the_shipped_vehicles(command):
     text = " ".join(CliRunner().invoke(gcs, [command, "--help"]).stdout.split())
     # a name with a hyphen may end a line at it
     assert ", ".join(VEHICLES.names()) in text.replace("- ", "-")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "meant"),
+    [
+        ("SIM_ACT_DELAY_MS", 0.072, "72 if 0.072 s is meant"),
+        ("VEH_ROTOR_TAU", 0.02, "20 if 0.02 s is meant"),
+        ("SIM_SENS_OFS_MS", -0.005, "-5 if -0.005 s is meant"),
+        ("SIM_ACT_DELAY_MS", 0.0, ""),
+        ("SIM_ACT_DELAY_MS", 1.0, ""),
+        ("SIM_SENS_JIT_MS", -1.0, ""),
+        ("PLB_T_MASS", 0.3, ""),
+    ],
+)
+def test_of_a_time_that_may_be_meant_in_seconds_the_unit_is_told(name, value, meant):
+    told = [f"{name} = {value:g} is in milliseconds; {meant}"] if meant else []
+    assert doubts("bebop", [(name, value)]) == told
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("fly hover --set SIM_ACT_DELAY_MS=0.072", ["--set SIM_ACT_DELAY_MS = 0.072"]),
+        (
+            "sweep hover --vary SIM_ACT_DELAY_MS=0,0.012,0.024 --set VEH_ROTOR_TAU=0.02",
+            ["--set VEH_ROTOR_TAU = 0.02", "--vary SIM_ACT_DELAY_MS = 0.012"],
+        ),
+        ("fly hover --set SIM_ACT_DELAY_MS=0.072 --quiet", []),
+    ],
+)
+def test_it_is_told_on_stderr_before_anything_flies(tmp_path, words, told):
+    (tmp_path / "flight.tlog").touch()  # nothing is flown into a folder that holds a flight
+    result = CliRunner().invoke(gcs, [*words.split(), "--out", str(tmp_path)], prog_name="gcs")
+    *lines, last = result.stderr.splitlines()
+    assert "holds a flight" in last
+    assert [line.split(" is in milliseconds")[0] for line in lines] == [f"gcs: {one}" for one in told]

@@ -205,16 +205,16 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\xff\x00\xfe")
     for path, expected in [
-        (tmp_path / "absent.toml", "cannot be read: No such file or directory"),
+        (tmp_path / "absent.toml", "no such file"),
         (
             tmp_path / "case-b.toml",
-            "cannot be read: No such file or directory; did you mean the shipped case-b?",
+            "no such file; did you mean the shipped case-b?",
         ),
         (
             tmp_path / "Hovr.toml",
-            "cannot be read: No such file or directory; did you mean the shipped hover?",
+            "no such file; did you mean the shipped hover?",
         ),
-        (tmp_path, "cannot be read: Is a directory"),
+        (tmp_path, "is a folder; must be a file"),
         (binary, "not a text file in UTF-8 (byte 0)"),
     ]:
         with pytest.raises(MissionFileError) as caught:

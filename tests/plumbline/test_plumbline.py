@@ -38,6 +38,20 @@ def test_a_mission_made_in_python_is_flown(flight: plumbline.Flight) -> None:
     assert repr(flight).startswith("<Flight short: completed, load error at most ")
 
 
+def test_a_script_hears_nothing_but_a_warning_of_what_may_not_be_meant(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.warns(
+        UserWarning, match="settings: SIM_ACT_DELAY_MS = 0.004 is in milliseconds; 4 if"
+    ) as told:
+        plumbline.fly(SHORT, sensors="ideal", settings={"SIM_ACT_DELAY_MS": 0.004})
+    assert told[0].filename == __file__
+    plumbline.sweep("hover", sensors="ideal", jobs=1, kind="arrow")
+    assert capfd.readouterr() == ("", "")
+    plumbline.fly(SHORT, sensors="ideal", quiet=False)
+    assert "gcs: " in capfd.readouterr().err
+
+
 def test_the_same_seed_is_the_same_flight(flight: plumbline.Flight) -> None:
     again = plumbline.fly(SHORT, sensors="ideal", seed=2, settings={"SIM_ACT_DELAY_MS": 4}, quiet=True)
     assert again.tlog == flight.tlog
@@ -57,13 +71,6 @@ def test_pictures_and_report(flight: plumbline.Flight, tmp_path: Path) -> None:
     page = flight.report(tmp_path / "out")
     assert page == tmp_path / "out" / "report.html" and "short" in page.read_text(encoding="utf-8")
     assert (tmp_path / "out" / "flight.tlog").read_bytes() == flight.tlog
-
-
-def test_progress_is_told_unless_it_is_not_wanted(capsys: pytest.CaptureFixture[str]) -> None:
-    plumbline.fly(SHORT, sensors="ideal", quiet=True)
-    assert capsys.readouterr().err == ""
-    plumbline.fly(SHORT, sensors="ideal")
-    assert "gcs: " in capsys.readouterr().err
 
 
 def test_a_sweep_is_a_table() -> None:

@@ -13,7 +13,7 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.wire.tlog import TlogWriter
 from gcs.cli import gcs
 from gcs.closed_loop import Conditions, fly
-from gcs.errors import EXIT_ERROR
+from gcs.errors import EXIT_USAGE
 from missions.fileformat import load_mission
 from missions.model import Delay, Land, Mission, Takeoff
 
@@ -64,7 +64,7 @@ def test_a_flight_that_tells_nothing_is_told_in_one_line(hold_s: float, says: st
         mission = Mission("still", "", "", (), (Takeoff(0.4), Delay(hold_s), Land()))
         assert fly(mission, Conditions(sensors="ideal"), TlogWriter(file)).name == "completed"
     result = CliRunner().invoke(gcs, ["identify", str(path)], prog_name="gcs")
-    assert result.exit_code == EXIT_ERROR
+    assert result.exit_code == EXIT_USAGE
     assert result.stdout == ""
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"gcs: {path}: ") and says in line

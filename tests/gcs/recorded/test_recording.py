@@ -73,7 +73,7 @@ def test_a_broken_file_is_told_in_one_line(
     path = tmp_path / "flight.csv"
     path.write_bytes(content)
     result = run(command, path, "--columns", columns)
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"gcs: {path}: ")
     assert says in line

@@ -118,8 +118,8 @@ def test_the_command_prints_json_and_makes_the_page(runs: list[Path], tmp_path: 
     [
         (["one"], "flights to be compared: 1; name 2 to 12", 2),
         (["one", "one"], "is named twice", 2),
-        (["one", "nowhere"], "nowhere: no such file", 1),
-        (["one", "empty.tlog"], "empty.tlog: holds no telemetry", 1),
+        (["one", "nowhere"], "nowhere: no such file", 2),
+        (["one", "empty.tlog"], "empty.tlog: holds no telemetry", 2),
     ],
 )
 def test_what_cannot_be_compared_is_one_clear_line(
