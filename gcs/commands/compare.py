@@ -23,7 +23,8 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
 
     RUN is the output of gcs fly or gcs capture, or any telemetry log of a Plumbline vehicle. The figures
     stand beside each other, the best of each marked, with what differed in mission, law, sensors, seed and
-    parameters; the page lays tracks and errors over each other.
+    parameters; the page lays tracks and errors over each other. Of more flights than the terminal has columns
+    for, the main figures are shown, a row for each flight.
 
     \b
     gcs compare flights/plumbline flights/thesis
@@ -33,7 +34,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
 
     found, page = compare(runs, out)
 
-    from gcs.report.compare import comparison, comparison_table
+    from gcs.report.compare import comparison, comparison_table, in_columns
 
     if as_json:
         print_json(comparison(found))
@@ -41,5 +42,14 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
     if not quiet:
         from rich.console import Console
 
-        Console().print(comparison_table(found))
+        console = Console()
+        if in_columns(found, console.width):
+            console.print(comparison_table(found))
+        else:
+            from gcs.report.overview import overview
+
+            table, missed = overview(found, console.width)
+            console.print(table)
+            too = f" What differs too: {', '.join(missed)}." if missed else ""
+            click.echo(f"The page and --json have all figures.{too}")
     click.echo(f"comparison: {page}")

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 _WAYS = ("mission", "law", "sensors", "vehicle", "seed")  # keys of the record that say how it was flown
 _CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
 _HEADING = 14  # characters in a line of the name of a flight, in the terminal
+_LABELS = 32  # before the columns of the flights
 _DRAWN = {"load", "vehicle", "asked", "quat", "cable", "tension", "rotor", "taut", "attached", "scored"}
 SCRIPTS = (
     *PLOT_SCRIPTS,
@@ -125,6 +126,11 @@ def comparison(runs: Sequence[Run]) -> Json:
     }
 
 
+def in_columns(runs: Sequence[Run], width: int) -> bool:
+    """Whether a terminal of so many characters has place for a column for each flight."""
+    return _LABELS + len(runs) * (_HEADING + 2) <= width
+
+
 def comparison_table(runs: Sequence[Run]) -> Table:
     """For the terminal: differences first, then the figures, a star at the best."""
     from rich.box import SIMPLE_HEAD
@@ -142,7 +148,7 @@ def comparison_table(runs: Sequence[Run]) -> Table:
     for group, rows in figures(runs):
         table.add_row(Text(group.title, style="bold"))
         for row in rows:
-            cells = [_cell(value, i in row.best) for i, value in enumerate(row.values)]
+            cells = [cell(value, i in row.best) for i, value in enumerate(row.values)]
             table.add_row(f"  {row.metric.label}", *cells, end_section=row is rows[-1])
     return table
 
@@ -157,7 +163,8 @@ def _heading(name: str) -> str:
     return "\n".join(lines)
 
 
-def _cell(value: str, best: bool) -> Any:
+def cell(value: str, best: bool) -> Any:
+    """A value in the terminal, with a star if it is the best."""
     from rich.text import Text
 
     return Text(f"* {value}", style="bold green") if best else Text(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta
     from gcs.report.compare import Run
 
+LONGEST_NAME = 100  # of a page, in characters
 MOST_RUNS = 12  # whose lines can be told apart, on a page of some megabytes
 FOLDER = Path("comparisons")
 
@@ -40,13 +42,23 @@ def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]
     for source, run in zip(sources, runs, strict=True):
         if run.record["outcome"] == "no telemetry":
             raise CompareError(f"{source}: holds no telemetry of a Plumbline vehicle")
-    page = out or FOLDER / f"{'-'.join(names)[:100].replace('/', '_')}.html"
+    page = out or FOLDER / f"{_page_name(names, logs)}.html"
     try:
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text(comparison_page(runs), encoding="utf-8")
     except OSError as error:
         raise GcsError(f"{page}: {error.strerror}") from None
     return runs, page
+
+
+def _page_name(names: Sequence[str], logs: Sequence[Path]) -> str:
+    """RUN-RUN as far as that is a name of a file; of more flights the first, and a mark that these logs alone
+    have."""
+    whole = "-".join(names).replace("/", "_")
+    if len(whole) <= LONGEST_NAME:
+        return whole
+    mark = hashlib.sha256("\n".join(str(log.resolve()) for log in logs).encode()).hexdigest()[:8]
+    return f"{names[0].replace('/', '_')[-LONGEST_NAME:]}-and-{len(names) - 1}-more-{mark}"
 
 
 def _meta(log: Path) -> FlightMeta:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,17 @@ from rich.console import Console
 
 from gcs.analysis.record import FlightMeta
 from gcs.cli import gcs
-from gcs.report.compare import Run, begins, comparison, comparison_table, differences, figures, load_run
+from gcs.report.compare import (
+    Run,
+    begins,
+    comparison,
+    comparison_table,
+    differences,
+    figures,
+    in_columns,
+    load_run,
+)
+from gcs.report.overview import overview
 from tests.doubles import recorded_flights as flights
 from tests.doubles.browser import Browser
 
@@ -102,6 +113,65 @@ def test_headings_of_the_table_are_whole_in_a_narrow_terminal(runs: list[Path]) 
     assert heading == [["case-b-"] * 3, ["20260301-"] * 3, ["100000", "100001", "100002"]]
     labels = {row.metric.label for _, rows in figures(found) for row in rows}
     assert all(any(line.startswith(label) for line in lines) for label in labels)
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_a_dozen_flights_are_a_row_each_in_a_narrow_terminal(runs: list[Path], width: int) -> None:
+    three = [loaded(run) for run in runs]
+    found = [replace(three[i % 3], name=f"case-b-20260301-1000{i:02}") for i in range(12)]
+    assert not in_columns(found, 80) and in_columns(found[:3], 80)
+    table, missed = overview(found, width)
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(table)
+    lines = [line.strip() for line in console.export_text().splitlines() if line.strip()]
+    heading, rows = lines[0].split(), lines[2:]
+    assert heading[:6] == ["flight", "outcome", "error", "RMS", "error", "max"]
+    assert {"law", "seed"} <= set(heading) and missed == [
+        name for name in ("law", "seed", "SIM_WIND_E") if name not in heading
+    ]
+    assert [row.split()[0] for row in rows] == [run.name for run in found]
+    assert all(row.split()[1] == "completed" for row in rows)
+    best = comparison(found)["best"]["load_error_rms_m"]
+    assert [i for i, row in enumerate(rows) if row.split()[2] == "*"] == best
+
+
+def test_the_pages_of_many_flights_have_names_of_their_own(
+    runs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pages = []
+    for last in "ab":
+        folders = [tmp_path / f"case-b-20260301-1000{i}{last if i == 9 else 0}" for i in range(10)]
+        for folder in folders:
+            shutil.copytree(runs[0], folder, dirs_exist_ok=True)
+        code, out, _ = called(*folders, "--quiet")
+        assert code == 0
+        pages.append(out.split()[-1])
+    assert len(set(pages)) == 2 and all((tmp_path / page).is_file() for page in pages)
+    assert all("/case-b-20260301-100000-and-9-more-" in page for page in pages)
+
+
+@pytest.mark.parametrize("width", [390, 1100])
+def test_names_and_buttons_do_not_lie_over_each_other(
+    browser: Browser, runs: list[Path], tmp_path: Path, width: int
+) -> None:
+    folders = [tmp_path / f"case-b-20260301-10000{i}" for i in range(3)]
+    for run, folder in zip(runs, folders, strict=True):
+        shutil.copytree(run, folder)
+    page = tmp_path / "page.html"
+    assert called(*folders, "--quiet", "--out", page)[0] == 0
+    browser.open(page.as_uri(), width=width)
+    browser.wait("document.documentElement.dataset.ready === '1'")
+    boxes = [
+        browser.run(
+            f"const b = document.querySelector('{one}').getBoundingClientRect();"
+            "return [b.left, b.right, b.top, b.bottom]"
+        )
+        for one in (".readings", ".cameras")
+    ]
+    (left, right, top, bottom), (other_left, other_right, other_top, other_bottom) = boxes
+    assert right <= other_left or other_right <= left or bottom <= other_top or other_bottom <= top
+    assert all(box[0] >= 0 and box[1] <= width for box in boxes)
 
 
 def test_the_command_prints_json_and_makes_the_page(runs: list[Path], tmp_path: Path) -> None:

@@ -1,0 +1,79 @@
+"""Many flights in a terminal that is too narrow for a column each: a row a flight, with the main figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from gcs.report.compare import Run, cell, differences, figures
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+# by the names of metrics, the most important first; what they are called over a narrow column
+_MAIN = {
+    "outcome": "outcome",
+    "load_error_rms_m": "error RMS",
+    "load_error_max_m": "error max",
+}
+_MORE = {
+    "swing_max_deg": "swing max",
+    "tilt_max_deg": "tilt max",
+    "saturated_fraction": "saturated",
+    "mission_s": "mission",
+    "estimator_error_max_m": "estimate max",
+}
+_LONGEST = 14  # characters of a value that is shown
+_NAME = 36  # of a flight, in a line
+_BETWEEN = 3
+
+
+class _Column(NamedTuple):
+    """What it is called, and a value for each flight; `best` are the places of the best ones."""
+
+    title: str
+    values: tuple[str, ...]
+    best: tuple[int, ...] = ()
+
+    @property
+    def width(self) -> int:
+        cells = (f"* {value}" if i in self.best else value for i, value in enumerate(self.values))
+        return max(map(len, (self.title, *cells))) + _BETWEEN
+
+
+def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
+    """The table, as many columns as find place in `width` characters, and what differs and found none."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
+
+    left = width - min(_NAME, max(len(run.name) for run in runs)) - _BETWEEN
+    columns, missed = [], [one.name for one in differences(runs)]
+    for column in _columns(runs):
+        if column.width <= left:
+            left -= column.width
+            columns.append(column)
+            if column.title in missed:
+                missed.remove(column.title)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("flight", overflow="fold", min_width=12)
+    for column in columns:
+        table.add_column(Text(column.title), justify="right", no_wrap=True)
+    for i, run in enumerate(runs):
+        table.add_row(Text(run.name), *(cell(one.values[i], i in one.best) for one in columns))
+    return table, missed
+
+
+def _columns(runs: Sequence[Run]) -> Iterator[_Column]:
+    """The main figures, what differs and is short, and more figures."""
+    known = {figure.metric.name: figure for _, rows in figures(runs) for figure in rows}
+
+    def chosen(names: Mapping[str, str]) -> list[_Column]:
+        found = ((title, known[name]) for name, title in names.items() if name in known)
+        return [_Column(title, figure.values, figure.best) for title, figure in found]
+
+    yield from chosen(_MAIN)
+    for one in differences(runs):
+        if max(map(len, one.values)) <= _LONGEST:
+            yield _Column(one.name, one.values)
+    yield from chosen(_MORE)
