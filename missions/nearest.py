@@ -13,9 +13,13 @@ def nearest(word: str, known: Iterable[str], likeness: float = LIKENESS) -> str:
 
     `likeness` is the least that counts, as `difflib.SequenceMatcher.ratio` has it.
     """
+    return next(iter(nearest_few(word, known, likeness, most=1)), "")
+
+
+def nearest_few(word: str, known: Iterable[str], likeness: float = LIKENESS, most: int = 3) -> list[str]:
+    """The known names that are most like `word`, the nearest first; see `nearest`."""
     names = {name.lower(): name for name in known}
-    found = get_close_matches(word.lower(), names, n=1, cutoff=likeness)
-    return names[found[0]] if found else ""
+    return [names[found] for found in get_close_matches(word.lower(), names, n=most, cutoff=likeness)]
 
 
 def did_you_mean(word: str, known: Iterable[str], likeness: float = LIKENESS) -> str:

@@ -190,7 +190,7 @@ def fly_command(
     if required:
         from gcs.analysis.definitions import METRICS
 
-        requirements = read_requirements(required, list(METRICS))
+        requirements = read_requirements(required, list(METRICS), "gcs fly --json and docs/report.md")
 
     def told(record: Record, outcome: Outcome) -> None:
         if as_json:

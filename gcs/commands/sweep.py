@@ -134,7 +134,7 @@ def sweep_command(
     from gcs.workflows.requirements import COMPLETED, conclude, judge, read_requirements, reporting
     from gcs.workflows.sweep import FIGURES, SweepOptions, run_sweep
 
-    requirements = read_requirements(required, FIGURES)
+    requirements = read_requirements(required, FIGURES, "gcs sweep --json")
     run = f"gcs sweep {mission}"
     options = SweepOptions(
         mission=mission,

@@ -14,7 +14,7 @@ from typing import Any
 
 from gcs.errors import GcsError, InputError
 from gcs.shell.display import say
-from missions.nearest import did_you_mean
+from missions.nearest import nearest_few
 
 COMPLETED = "completed"
 Value = float | str
@@ -54,19 +54,21 @@ class Verdict:
         return f"required {self.requirement.text}; found {found}"
 
 
-def read_requirements(texts: Iterable[str], keys: Sequence[str]) -> list[Requirement]:
-    """Requirements as they were typed, on the figures `keys`. InputError names what is wrong with one."""
-    return [_read(text, keys) for text in texts]
+def read_requirements(texts: Iterable[str], keys: Sequence[str], listed: str) -> list[Requirement]:
+    """Requirements as they were typed, on the figures `keys`, which are `listed` there. InputError names what
+    is wrong with one."""
+    return [_read(text, keys, listed) for text in texts]
 
 
-def _read(text: str, keys: Sequence[str]) -> Requirement:
+def _read(text: str, keys: Sequence[str], listed: str) -> Requirement:
     form = _FORM.fullmatch(text)
     if form is None:
         raise InputError(f'--require {text!r}: must be KEY SIGN VALUE, e.g. "load_error_max_m < 0.01"')
     key, sign, word = form.groups()
     if key not in keys:
-        hint = did_you_mean(key, keys)
-        raise InputError(f"--require {text!r}: no figure {key}; {hint}there are {', '.join(keys)}")
+        near = " or ".join(nearest_few(key, keys))
+        known = f"did you mean {near}? all are listed by {listed}" if near else f"there are {', '.join(keys)}"
+        raise InputError(f"--require {text!r}: no figure {key}; {known}")
     value = _value(word)
     if isinstance(value, str) and sign not in ("==", "!="):
         raise InputError(f"--require {text!r}: {word} is no number; a word is compared by == or !=")

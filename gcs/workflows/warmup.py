@@ -10,6 +10,7 @@ from pathlib import Path
 
 from autopilot.geometry.machine_code import ROOT
 from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
+from autopilot.vehicle.parameters import LAWS
 from gcs.errors import GcsError
 from gcs.shell.display import CompileDisplay, say
 from gcs.shell.processes import Child, Processes
@@ -31,6 +32,15 @@ def flight_parts(laws: Sequence[str]) -> list[Part]:
     """What `gcs fly` needs for flights with these laws; with none, by an autopilot of others."""
     own = autopilot_parts(*laws) if laws else ()
     return [*own, SIMULATOR, _CHECK, _REPORT]
+
+
+def all_sweep_parts(laws: Sequence[str]) -> list[Part]:
+    """What sweeps with these laws need beside that, and eight flights at once of each law of ours."""
+    from gcs.sweep.warmup import lanes_part, sweep_parts
+
+    shared = {part.mark for part in flight_parts(laws)}
+    alone = [part for part in sweep_parts(laws) if part.mark not in shared]
+    return [*alone, *(lanes_part(law) for law in laws if law in LAWS)]
 
 
 def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:

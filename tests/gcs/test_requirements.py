@@ -38,7 +38,7 @@ RECORD = {"load_error_max_m": 0.004, "outcome": "completed", "slack_events": Non
     ],
 )
 def test_a_requirement_is_met_or_not(text: str, met: bool) -> None:
-    (verdict,) = judge(read_requirements([text], KEYS), RECORD)
+    (verdict,) = judge(read_requirements([text], KEYS, "gcs fly --json"), RECORD)
     assert verdict.met is met
 
 
@@ -49,14 +49,15 @@ def test_a_requirement_is_met_or_not(text: str, met: bool) -> None:
         ("load_error_max_m <", "must be KEY SIGN VALUE"),
         ("< 3", "must be KEY SIGN VALUE"),
         ("", "must be KEY SIGN VALUE"),
-        ("load_eror_max_m < 1", "did you mean load_error_max_m? there are load_error_max_m, outcome"),
+        ("load_eror_max_m < 1", "did you mean load_error_max_m? all are listed by gcs fly --json"),
+        ("nothing_like_it < 1", "no figure nothing_like_it; there are load_error_max_m, outcome"),
         ("outcome < completed", "a word is compared by == or !="),
         ("load_error_max_m < nan", "nothing compares to nan"),
     ],
 )
 def test_what_is_no_requirement_is_refused_with_what_to_write(text: str, says: str) -> None:
     with pytest.raises(InputError) as told:
-        read_requirements([text], KEYS)
+        read_requirements([text], KEYS, "gcs fly --json")
     assert says in str(told.value) and repr(text) in str(told.value)
 
 
@@ -66,12 +67,22 @@ def test_a_command_refuses_it_before_it_flies() -> None:
         assert result.exit_code == 2 and "no figure no_such" in result.output
 
 
+def test_a_mistyped_figure_is_told_with_those_that_are_near_and_no_list_of_all() -> None:
+    words = ["fly", "hover", "--require", "load_error_mx_m < 1"]
+    (line,) = CliRunner().invoke(gcs, words, prog_name="gcs").stderr.splitlines()
+    told = "no figure load_error_mx_m; did you mean load_error_max_m or load_error_"
+    assert told in line and line.endswith("? all are listed by gcs fly --json and docs/report.md")
+    assert len(line) < 240
+
+
 def test_what_was_missed_is_told_and_stands_in_the_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     junit = tmp_path / "deep" / "report.xml"
     texts = ["load_error_max_m < 0.001", "outcome == completed"]
-    assert not conclude("run", junit, "completed", 2.5, judge(read_requirements(texts, KEYS), RECORD))
+    assert not conclude(
+        "run", junit, "completed", 2.5, judge(read_requirements(texts, KEYS, "gcs fly --json"), RECORD)
+    )
     assert capsys.readouterr().err == "gcs: required load_error_max_m < 0.001; found 0.004\n"
     (suite,) = ET.parse(junit).getroot()
     assert (suite.get("tests"), suite.get("failures"), suite.get("time")) == ("3", "1", "2.500")

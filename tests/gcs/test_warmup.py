@@ -6,8 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from autopilot.shell.compiling import Part
+from gcs.cli import gcs
 from gcs.errors import GcsError
 from gcs.shell.display import CompileDisplay
 from gcs.sweep.warmup import sweep_parts
@@ -39,6 +41,18 @@ def test_a_sweep_needs_no_report_but_flights_of_its_own():
     marks = [part.mark for part in sweep_parts(["lqr", "thesis"])]
     fly = {"tick", "law-lqr", "law-thesis", "messages", "paths", "world"}
     assert sorted(marks) == sorted({*fly, "alone"})
+
+
+def test_who_sweeps_can_have_eight_flights_at_once_compiled_beforehand(monkeypatch):
+    asked = []
+    monkeypatch.setattr("gcs.workflows.warmup.warm_up", lambda parts, quiet: asked.extend(parts))
+    assert CliRunner().invoke(gcs, ["warmup", "--law", "lqr", "--sweeps"]).exit_code == 0
+    marks = [part.mark for part in asked]
+    fly = {part.mark for part in flight_parts(["lqr"])}
+    assert sorted(marks) == sorted({*fly, "alone", "lanes-lqr"})
+    asked.clear()
+    assert CliRunner().invoke(gcs, ["warmup", "--all"]).exit_code == 0
+    assert not [part.mark for part in asked if part.mark.startswith(("alone", "lanes"))]
 
 
 def test_what_is_compiled_is_not_compiled_again_and_the_longest_part_comes_first(tmp_path):
