@@ -13,10 +13,10 @@ from gcs.shell.display import say
 
 
 class StopRequest:
-    """True once somebody asked to stop. In force within its `with` block."""
+    """True once somebody asked to stop, who is told the `hint` then. In force within its `with` block."""
 
     def __init__(self, hint: str) -> None:
-        self._hint = hint
+        self.hint = hint
         self._asked = False
         self._before: dict[signal.Signals, object] = {}
 
@@ -29,7 +29,7 @@ class StopRequest:
                 raise KeyboardInterrupt
             return
         self._asked = True
-        say(self._hint)
+        say(self.hint)
 
     def __enter__(self) -> StopRequest:
         for number in stop_signals():

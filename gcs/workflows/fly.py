@@ -105,6 +105,7 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
             flight = _end(mission, options, client, truth_missing, watch.stop(), out, folder, stop, tell)
             if page is not None:
                 page.tell(report=str(out.resolve()))
+                stop.hint = "the page is closed"  # there is no report left to be abandoned
                 page.stay(stop)
             return flight
 

@@ -1,0 +1,38 @@
+"""Pictures drawn by two processes, of which one alone is asked to stop."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gcs.report import draw
+from gcs.report.draw import Drawing
+from gcs.report.plots import Picture
+from gcs.shell.stopping import StopRequest
+
+
+@pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core: one process draws")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_who_draws_beside_us_leaves_the_terminals_signals_to_us(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], number: signal.Signals
+) -> None:
+    ours = os.getpid()
+
+    def asked_to_stop(view: Any, target: Any) -> None:
+        if os.getpid() != ours:
+            os.kill(os.getpid(), number)
+            os.kill(os.getpid(), number)
+
+    monkeypatch.setattr(draw, "PICTURES", [Picture("one", "", asked_to_stop)])
+    view: Any = None
+    drawn: list[str] = []
+    with StopRequest("stopping") as stop, Drawing(view, Path()) as drawing:
+        assert drawing._done.poll(20.0), "the other process has drawn it"
+        drawing.finish(lambda picture: drawn.append(picture.file))
+        assert not stop
+    assert drawn == ["one.png"]
+    assert capfd.readouterr().err == ""
