@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -14,9 +13,6 @@ from typing import Any
 
 from gcs.report.plots import PICTURES, Picture, View
 from gcs.report.style import style
-
-# what a terminal sends to all processes before it
-_ASKED = (signal.SIGINT, *((signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()))
 
 
 class Drawing:
@@ -79,9 +75,7 @@ class Drawing:
             self._helper = None
 
     def _help(self, answer: Connection) -> None:
-        for number in _ASKED:  # our parent hears of it too, and decides
-            signal.signal(number, signal.SIG_IGN)
-        with suppress(KeyboardInterrupt), style():
+        with suppress(KeyboardInterrupt), style():  # our parent has its own interrupt
             for picture in self._next():
                 self._draw(picture)
                 answer.send(picture.file)

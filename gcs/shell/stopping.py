@@ -5,6 +5,7 @@ A terminal that is closed asks to stop, too, however often that is said: shell a
 
 from __future__ import annotations
 
+import os
 import signal
 from types import FrameType, TracebackType
 
@@ -18,12 +19,15 @@ class StopRequest:
     def __init__(self, hint: str) -> None:
         self.hint = hint
         self._asked = False
+        self._process = os.getpid()
         self._before: dict[signal.Signals, object] = {}
 
     def __bool__(self) -> bool:
         return self._asked
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
+        if os.getpid() != self._process:
+            return  # a process that was forked from ours: a terminal asks both, and we decide
         if self._asked:
             if number != signal.SIGHUP:
                 raise KeyboardInterrupt
