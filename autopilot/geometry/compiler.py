@@ -20,6 +20,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
+from numba.extending import intrinsic as _intrinsic
 
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -157,6 +158,12 @@ _OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False}
 # of functions that only kernels call, and of those of which less than a call is left
 INSIDE: Any = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler}
 INLINED: Any = {**INSIDE, "forceinline": True}
+
+
+def intrinsic(function: Callable[..., Any]) -> Any:
+    """numba's, untyped for type checkers: what comes of it is called without the first argument, which is the
+    compiler's own."""
+    return _intrinsic(function)
 
 
 class _Inner(CPUDispatcher):  # type: ignore[misc]

@@ -6,28 +6,22 @@ of this file, which does the plain thing to plain numbers, in Python and in mach
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import overload
 from numba.np.arrayobj import populate_array
 
-from autopilot.geometry.compiler import INLINED
+from autopilot.geometry.compiler import INLINED, intrinsic
 from autopilot.geometry.lane_numbers import BITS, INDEX, LANES, VECTOR, WHOLE, WHOLES, WIDE, flag_of
 
 _SINGLES = ir.VectorType(ir.FloatType(), LANES)
 
 
-def _intrinsic(function: Callable[..., Any]) -> Any:
-    """numba's, whose results are called without the first argument."""
-    return intrinsic(function)
-
-
-@_intrinsic
+@intrinsic
 def parted(_: Any) -> Any:
     """In a kernel: which lanes have parted from lane 0 since this was asked last, a bit each."""
 
@@ -45,7 +39,7 @@ def _retyped(kind: Any) -> Any:
     return known.get(getattr(kind, "dtype", None))
 
 
-@_intrinsic
+@intrinsic
 def in_lanes(_: Any, array: Any) -> Any:
     """In a kernel: an array whose last axis is the lanes, and begins at whole 64 bytes, as one of `Wide` or
     `Whole`."""
@@ -80,7 +74,7 @@ def single(value: float) -> float:
     return float(np.float32(value))
 
 
-@_intrinsic
+@intrinsic
 def _single_lanes(_: Any, value: Any) -> Any:
     def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
         return builder.fpext(builder.fptrunc(given[0], _SINGLES), VECTOR)
@@ -104,7 +98,7 @@ def if_above(value: float, limit: float, then: float, otherwise: float) -> float
     return then if value > limit else otherwise
 
 
-@_intrinsic
+@intrinsic
 def _chosen_lanes(_: Any, value: Any, limit: Any, then: Any, otherwise: Any) -> Any:
     def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
         wide = [context.cast(builder, one, kind, WIDE) for one, kind in zip(given, sig.args, strict=True)]
@@ -129,7 +123,7 @@ def each(value: float) -> int:
     return int(value)
 
 
-@_intrinsic
+@intrinsic
 def _each_lane(_: Any, value: Any) -> Any:
     def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
         return builder.fptosi(given[0], WHOLES)
@@ -167,7 +161,7 @@ def _tables(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
     return [context.make_array(kind.dtype)(context, builder, part) for part in parts]
 
 
-@_intrinsic
+@intrinsic
 def _rows_each(_: Any, tables: Any) -> Any:
     def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
         found = ir.Constant(WHOLES, ir.Undefined)
@@ -179,7 +173,7 @@ def _rows_each(_: Any, tables: Any) -> Any:
     return WHOLE(tables), made
 
 
-@_intrinsic
+@intrinsic
 def _taken_each(_: Any, tables: Any, at: Any, column: Any) -> Any:
     def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
         found = ir.Constant(VECTOR, ir.Undefined)
@@ -229,7 +223,7 @@ def of_bits(bits: int) -> float:
 
 
 def _reinterpreting(before: Any, after: Any, before_lanes: Any, after_lanes: Any) -> Any:
-    @_intrinsic
+    @intrinsic
     def done(_: Any, value: Any) -> Any:
         result = after_lanes if value == before_lanes else after
 

@@ -49,16 +49,19 @@ def _is_record(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
 
 
+def _parts(kind: Any) -> tuple[Any, ...]:
+    """Types of the fields of a record, or of the elements of a tuple. Raises TypeError for others."""
+    if _is_record(kind):
+        return tuple(part for _, part in _fields(kind))
+    if get_origin(kind) is tuple and Ellipsis not in get_args(kind):
+        return get_args(kind)
+    raise TypeError(f"{kind!r} has no fixed number of floats, ints or bools")
+
+
 @cache
 def width(kind: Any) -> int:
     """How many numbers a record of this type has, or a tuple, or a number. Raises TypeError for others."""
-    if kind in _NUMBERS:
-        return 1
-    if _is_record(kind):
-        return sum(width(part) for _, part in _fields(kind))
-    if get_origin(kind) is tuple and Ellipsis not in get_args(kind):
-        return sum(width(part) for part in get_args(kind))
-    raise TypeError(f"{kind!r} has no fixed number of floats, ints or bools")
+    return 1 if kind in _NUMBERS else sum(map(width, _parts(kind)))
 
 
 def place_of(record: Any, name: str) -> int:
@@ -73,10 +76,7 @@ def _taken(kind: Any, at: int, known: dict[str, Any]) -> tuple[str, int]:
     if kind in _NUMBERS:
         return _NUMBERS[kind].format(f"row[first + {at}]"), at + 1
     parts = []
-    inner = [part for _, part in _fields(kind)] if _is_record(kind) else list(get_args(kind))
-    if not _is_record(kind) and get_origin(kind) is not tuple:
-        raise TypeError(f"{kind!r} has no fixed number of floats, ints or bools")
-    for part in inner:
+    for part in _parts(kind):
         text, at = _taken(part, at, known)
         parts.append(text)
     if not _is_record(kind):
@@ -147,17 +147,17 @@ def _compiled_type(kind: Any) -> Any:
     """numba's type of a record of this type, a tuple or a number, of one flight."""
     if kind in _COMPILED:
         return _COMPILED[kind]
-    if _is_record(kind):
-        return types.BaseTuple.from_types([_compiled_type(part) for _, part in _fields(kind)], kind)
-    return types.BaseTuple.from_types([_compiled_type(part) for part in get_args(kind)])
+    parts = [_compiled_type(part) for part in _parts(kind)]
+    return types.BaseTuple.from_types(parts, kind if _is_record(kind) else None)
 
 
 @overload(unpack, jit_options=INLINED)
 def _unpack(kind: Any, row: Any, first: Any) -> Any:
-    record: Any = kind.instance_class if isinstance(kind, types.NamedTupleClass) else None
-    if record is None or not is_row(row):
-        return None if record is None else _unpacker(record)
-    width(record)
+    if not isinstance(kind, types.NamedTupleClass):
+        return None
+    record: Any = kind.instance_class
+    if not is_row(row):
+        return _unpacker(record)
     taken = _compiled_type(record)
 
     def take(kind: Any, row: Any, first: Any) -> Any:
@@ -169,9 +169,11 @@ def _unpack(kind: Any, row: Any, first: Any) -> Any:
 @overload(pack, jit_options=INLINED)
 def _pack(record: Any, row: Any, first: Any) -> Any:
     kind: Any = getattr(record, "instance_class", None)
-    if not _is_record(kind) or not (is_row(row) and is_numbers(record)):
-        return _packer(kind) if _is_record(kind) else None
-    width(kind)
+    if not _is_record(kind):
+        return None
+    if not (is_row(row) and is_numbers(record)):
+        return _packer(kind)
+    width(kind)  # what could not be taken out again is not put in
 
     def put(record: Any, row: Any, first: Any) -> Any:
         put_numbers(record, row, first)

@@ -8,17 +8,13 @@ left to the source.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
-
-def _intrinsic(function: Callable[..., Any]) -> Any:
-    """numba's, whose results are called without the first argument."""
-    return intrinsic(function)
+from autopilot.geometry.compiler import intrinsic
 
 
 def is_row(array: Any, of: Any = types.float64) -> bool:
@@ -71,7 +67,7 @@ def _places(builder: Any, data: Any, first: Any) -> Iterator[Any]:
         i += 1
 
 
-@_intrinsic
+@intrinsic
 def put_numbers(_: Any, record: Any, row: Any, first: Any) -> Any:
     """In a kernel: write the numbers of a record to `row[first]` and behind; `first` is not negative."""
     if not (is_row(row) and is_numbers(record)):
@@ -87,7 +83,7 @@ def put_numbers(_: Any, record: Any, row: Any, first: Any) -> Any:
     return types.none(record, row, types.intp), made
 
 
-@_intrinsic
+@intrinsic
 def numbers_at(_: Any, kind: Any, row: Any, first: Any) -> Any:
     """In a kernel: the tuple of the numba type `kind` whose first number is `row[first]`; `first` is not
     negative."""
@@ -126,7 +122,7 @@ def field_putter(layout: Sequence[tuple[int, str]]) -> Any:
     `layout` says of each number the byte that it begins with, and NumPy's name of its type.
     """
 
-    @_intrinsic
+    @intrinsic
     def put(_: Any, values: Any, payload: Any) -> Any:
         def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             data = _data(context, builder, signature.args[1], given[1])
@@ -143,7 +139,7 @@ def field_putter(layout: Sequence[tuple[int, str]]) -> Any:
 def field_taker(layout: Sequence[tuple[int, str]], whole: Any) -> Any:
     """For kernels: take(payload) is the tuple of the numba type `whole` whose numbers lie so in bytes."""
 
-    @_intrinsic
+    @intrinsic
     def take(_: Any, payload: Any) -> Any:
         def made(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             data = _data(context, builder, signature.args[0], given[0])

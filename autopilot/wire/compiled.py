@@ -119,7 +119,8 @@ def _numbers(layout: _Layout) -> tuple[str, list[str]]:
 
 
 @cache
-def _putter(record: Any) -> Any:
+def _python_putter(record: Any) -> Any:
+    """put(kind, values, payload, buffer, at, origin) for Python: an assignment for each number."""
     layout = _LAYOUTS[record]
     views, numbers = _numbers(layout)
     lines = "".join(f"    {number} = values[{i}]\n" for i, number in enumerate(numbers))
@@ -134,7 +135,22 @@ def _putter(record: Any) -> Any:
 
 
 @cache
-def _taker(record: Any) -> Any:
+def _kernel_putter(record: Any) -> Any:
+    """The same for kernels: the stores at once, which compiles sooner."""
+    layout = _LAYOUTS[record]
+    size, message_id, crc_extra = layout.size, layout.message_id, layout.crc_extra
+    put_fields = field_putter(_places(layout))
+
+    def put(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:
+        put_fields(values, payload)
+        return _framed(payload, size, message_id, crc_extra, buffer, at, origin)
+
+    return put
+
+
+@cache
+def _python_taker(record: Any) -> Any:
+    """take(kind, payload) for Python."""
     layout = _LAYOUTS[record]
     views, numbers = _numbers(layout)
     parts, i = [], 0
@@ -149,7 +165,24 @@ def _taker(record: Any) -> Any:
 
 
 @cache
+def _kernel_taker(record: Any) -> Any:
+    """The same for kernels: the loads at once."""
+    layout = _LAYOUTS[record]
+    parts = []
+    for _, count, number in layout.fields:
+        wide = types.float64 if number.startswith("float") else types.int64
+        parts.append(types.UniTuple(wide, count) if count else wide)
+    take_fields = field_taker(_places(layout), types.BaseTuple.from_types(parts, record))
+
+    def take(kind: Any, payload: Any) -> Any:
+        return take_fields(payload)
+
+    return take
+
+
+@cache
 def _finder(record: Any) -> Any:
+    """find(kind, data, start, payload) for both."""
     layout = _LAYOUTS[record]
     known: dict[str, Any] = {"copied": _copied}
     exec(
@@ -229,7 +262,7 @@ def put_frame(kind: Any, values: Any, payload: Bytes, buffer: Bytes, at: int, or
 
     `payload` is scratch. A float beyond float32 is sent as infinite; integers must be within their fields.
     """
-    return int(_putter(kind)(kind, values, payload, buffer, at, origin))
+    return int(_python_putter(kind)(kind, values, payload, buffer, at, origin))
 
 
 def holds(kind: Any, data: Any, start: int, payload: Bytes) -> bool:
@@ -242,7 +275,7 @@ def holds(kind: Any, data: Any, start: int, payload: Bytes) -> bool:
 
 def taken(kind: Any, payload: Bytes) -> Any:
     """The record of this type whose bytes `payload` begins with."""
-    return _taker(kind)(kind, payload)
+    return _python_taker(kind)(kind, payload)
 
 
 def _record_of(kind: Any) -> Any:
@@ -250,42 +283,12 @@ def _record_of(kind: Any) -> Any:
     return record if record in _LAYOUTS else None
 
 
-@cache
-def _compiled_putter(record: Any) -> Any:
-    """`_putter` for kernels."""
-    layout = _LAYOUTS[record]
-    size, message_id, crc_extra = layout.size, layout.message_id, layout.crc_extra
-    put_fields = field_putter(_places(layout))
-
-    def put(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:
-        put_fields(values, payload)
-        return _framed(payload, size, message_id, crc_extra, buffer, at, origin)
-
-    return put
-
-
-@cache
-def _compiled_taker(record: Any) -> Any:
-    """`_taker` for kernels."""
-    layout = _LAYOUTS[record]
-    parts = []
-    for _, count, number in layout.fields:
-        wide = types.float64 if number.startswith("float") else types.int64
-        parts.append(types.UniTuple(wide, count) if count else wide)
-    take_fields = field_taker(_places(layout), types.BaseTuple.from_types(parts, record))
-
-    def take(kind: Any, payload: Any) -> Any:
-        return take_fields(payload)
-
-    return take
-
-
 @overload(put_frame)
 def _put_frame(kind: Any, values: Any, payload: Any, buffer: Any, at: Any, origin: Any) -> Any:
     record = _record_of(kind)
     if record is None or not (is_row(payload, types.uint8) and is_numbers(values)):
         return None
-    return _compiled_putter(record)
+    return _kernel_putter(record)
 
 
 @overload(holds)
@@ -299,4 +302,4 @@ def _taken(kind: Any, payload: Any) -> Any:
     record = _record_of(kind)
     if record is None or not is_row(payload, types.uint8):
         return None
-    return _compiled_taker(record)
+    return _kernel_taker(record)
