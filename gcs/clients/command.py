@@ -84,7 +84,7 @@ class RepositionOperation(CommandOperation):
         height_m: float,
         speed_m_s: float | None = None,
     ) -> None:
-        super().__init__(target, "reposition", mavlink.MAV_CMD_DO_REPOSITION)
+        super().__init__(target, "goto", mavlink.MAV_CMD_DO_REPOSITION)
         self._latitude_degE7 = latitude_degE7
         self._longitude_degE7 = longitude_degE7
         self._height_m = height_m

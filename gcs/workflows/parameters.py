@@ -17,6 +17,8 @@ from gcs.shell.link import Address
 from gcs.shell.session import Session
 from missions.text_files import TextFileError, text_of
 
+_ANY = "bebop"  # parameters have the same units with all vehicles
+
 
 def list_parameters(pattern: str, address: Address) -> dict[str, float]:
     """Values by name of those that match a shell pattern; GcsError if none does."""
@@ -41,10 +43,16 @@ def get_parameters(names: Sequence[str], address: Address) -> dict[str, float | 
 
 
 def set_parameter(name: str, value: float, address: Address) -> str:
-    """Set one parameter and read it back; a line that says so."""
+    """Set one parameter and read it back; a line that says so. A value that may not be meant so is told."""
     with Session(address) as session:
         operation = ParameterSet(session.find(), name.upper(), value)
-        return exchange(session, operation, name).text
+        done = exchange(session, operation, name).text
+    if 0.0 < abs(value) < 1.0:
+        from gcs.workflows.flight_inputs import doubts
+
+        for doubt in doubts(_ANY, [(name.upper(), value)]):
+            say(doubt)
+    return done
 
 
 def exchange(

@@ -437,6 +437,14 @@ def test_bad_files_of_others_are_one_line(tmp_path):
     assert "must end in .plan" in one_line(run("download", str(tmp_path / "x.csv")), EXIT_USAGE)
 
 
+def test_a_delay_that_may_be_meant_in_seconds_is_set_and_told(live):
+    vehicle, port = live
+    vehicle.parameters["SIM_ACT_DELAY_MS"] = 0.0
+    result = run("param", "set", "SIM_ACT_DELAY_MS", "0.5", "--connect", port)
+    assert (result.exit_code, result.stdout) == (EXIT_DONE, "SIM_ACT_DELAY_MS = 0.5\n")
+    assert result.stderr == "gcs: SIM_ACT_DELAY_MS = 0.5 is in milliseconds; 500 if 0.5 s is meant\n"
+
+
 def test_parameters(live, tmp_path):
     vehicle, port = live
     assert run("param", "set", "p001", "0.1", "--connect", port).stdout == "P001 = 0.1\n"
@@ -575,7 +583,7 @@ def test_the_load_is_sent_to_a_place(live, arguments, east_m, north_m, up_m, spe
     vehicle.script = lambda scripted, t: scripted.tell_load(east_m=2.0, north_m=1.0, up_m=2.0)
     vehicle.started_us = 0
     result = run("goto", *arguments, "--connect", port)
-    told = f"reposition: accepted; {distance_m} m to go\n"
+    told = f"goto: accepted; {distance_m} m to go\n"
     assert (result.exit_code, result.stdout) == (EXIT_DONE, told), result.output
     sent = vehicle.commands[-1]
     assert (sent.command, sent.param1) == (mavlink.MAV_CMD_DO_REPOSITION, speed)

@@ -85,7 +85,7 @@ def test_a_flight_is_seen_and_led_by_hand(
         f"const p = {STATE}.load.position; return Plumbline.live.scene.project([p[0], p[1] + 1, p[2]])"
     )
     browser.click_at("#scene", x, y, clicks=2)
-    browser.wait(f"{ANSWER} === 'reposition: accepted'")
+    browser.wait(f"{ANSWER} === 'goto: accepted'")
     browser.wait(f"{STATE}.load.position[1] > 0.9 && {STATE}.error < 0.05")
 
     slider = "document.querySelector('[data-parameter=SIM_WIND_E]')"

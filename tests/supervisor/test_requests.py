@@ -250,6 +250,12 @@ def test_a_reposition_keeps_what_is_not_given_and_holds_there() -> None:
     assert sky.view.x_load == pytest.approx((1.5, 0.0, 2.0))
 
 
+def test_a_phase_is_named_in_words() -> None:
+    flight = replace(Sky().airborne().flight, phase=Phase.SET_DOWN)
+    _, verdict = decide(flight, R.Reposition(1.0, None, None, True), hanging(), SETTINGS)
+    assert (verdict.result, verdict.text) == (LATER, "Reposition denied while set down")
+
+
 @pytest.mark.parametrize("place", [(2e5, 0.0, 2.0), (0.0, -2e5, 2.0), (0.0, 0.0, 2e5)])
 def test_a_reposition_that_is_far_off_is_a_mistake(place: tuple[float, float, float]) -> None:
     sky = Sky().airborne()

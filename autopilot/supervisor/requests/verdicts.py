@@ -27,4 +27,5 @@ def later(text: str) -> Verdict:
 
 def wrong_phase(flight: Flight, what: str) -> Verdict:
     """The request cannot be followed in the present phase."""
-    return later(f"{what} denied while {flight.phase.name.lower()}")
+    phase = flight.phase.name.lower().replace("_", " ")
+    return later(f"{what} denied while {phase}")
