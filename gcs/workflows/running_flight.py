@@ -10,6 +10,7 @@ from autopilot.wire.signing import Signing, timestamp_of
 from gcs.clients import command
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.flight import FlightClient
+from gcs.errors import GcsError, RefusedError
 from gcs.shell.display import FlightDisplay, say
 from gcs.shell.link import Address, unix_us
 from gcs.shell.session import Session
@@ -35,7 +36,8 @@ def fly_running(
     watch: Stopwatch,
     page: FlightPage | None = None,
 ) -> tuple[FlightClient, str]:
-    """Fly with the vehicle at `address`; if the flight is stopped early, it is told to hold.
+    """Fly with the vehicle at `address`; if the flight is stopped early, it is told to hold, or to land
+    where it cannot hold yet.
 
     Returns why there is no truth of the world that it flew in, too; empty where there is.
     """
@@ -71,10 +73,25 @@ def _fly(
     finally:
         vehicle.close()
     if client.outcome is not None and client.outcome.name in ("interrupted", "timeout") and client.view.armed:
+        say(_left_in_the_air(address))
+
+
+def _left_in_the_air(address: Address) -> str:
+    """Have a vehicle that flies on hold, or land where it cannot hold yet; what is to be told of it.
+
+    Nothing of this is an error: what was captured is to be reported.
+    """
+    try:
         with Session(address) as session:
             session.find()
-            session.run(command.pause(session.target))
-            say("the vehicle holds; gcs land brings it down")
+            try:
+                session.run(command.pause(session.target))
+            except RefusedError as error:
+                session.run(command.land(session.target))
+                return f"the vehicle lands, as it would not hold ({error})"
+            return "the vehicle holds; gcs land brings it down"
+    except GcsError as error:
+        return f"the vehicle may fly on: {error}; gcs land brings it down"
 
 
 def vehicle_home(session: Session) -> Home:

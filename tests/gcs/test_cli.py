@@ -22,7 +22,7 @@ from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog
 from gcs.cli import COMMANDS, gcs
 from gcs.clients import command as command_module
-from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE
+from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_NOT_MET, EXIT_USAGE
 from gcs.formats.missions import write_foreign
 from gcs.shell import session as session_module
 from gcs.shell.link import UdpSocket, free_port
@@ -647,6 +647,33 @@ def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_
     assert result.stderr.splitlines()[-1] == f"gcs: {told}"
     assert [path.name for path in out.iterdir()] == ["unflown.tlog"]
     assert (out / "unflown.tlog").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("refused", "told"),
+    [
+        ((), "the vehicle holds; gcs land brings it down"),
+        ((mavlink.MAV_CMD_DO_PAUSE_CONTINUE,), "the vehicle lands, as it would not hold (pause: "),
+        (
+            (mavlink.MAV_CMD_DO_PAUSE_CONTINUE, mavlink.MAV_CMD_NAV_LAND),
+            "the vehicle may fly on: land: temporarily rejected",
+        ),
+    ],
+)
+def test_a_flight_that_times_out_is_reported_whether_the_vehicle_holds_or_not(live, tmp_path, refused, told):
+    vehicle, port = live
+    for number in refused:
+        vehicle.command_results[number] = [mavlink.MAV_RESULT_TEMPORARILY_REJECTED] * 10
+
+    def tautens(scripted, t):
+        scripted.phase = mavlink.PLUMBLINE_PHASE_TAUTEN
+
+    vehicle.script = tautens
+    out = tmp_path / "out"
+    result = run("fly", "hover", "--connect", port, "--out", str(out), "--timeout", "0.2", "--quiet")
+    assert result.exit_code == EXIT_NOT_MET, result.output
+    assert f"gcs: {told}" in result.stderr
+    assert json.loads((out / "summary.json").read_text())["outcome"] == "timeout"
 
 
 def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):
