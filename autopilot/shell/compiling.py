@@ -39,7 +39,7 @@ class Part:
 
 _ONBOARD = ROOT / "autopilot" / "onboard" / "onboard.py"
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
-SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 18.0)
+SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "shell" / "tick_loop.py", "world", 18.0)
 
 
 OWN = "own"  # stands for any law that somebody has brought: they are compiled for once
