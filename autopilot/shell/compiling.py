@@ -37,7 +37,7 @@ class Part:
         mark_ready(self.source, (self.mark,))
 
 
-_ONBOARD = ROOT / "autopilot" / "onboard" / "onboard.py"
+_ONBOARD = ROOT / "autopilot" / "shell" / "tick_loop.py"
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
 SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "shell" / "tick_loop.py", "world", 18.0)
 

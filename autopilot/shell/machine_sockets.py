@@ -17,6 +17,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+SUPPORTED = sys.platform == "linux"  # as far as it is tried
 SYSTEM_ADDRESS_BYTES = 16  # of an IPv4 address with its port
 
 _INT, _WIDE = ir.IntType(32), ir.IntType(64)
@@ -25,7 +26,7 @@ _POINTER = cgutils.voidptr_t
 
 def usable(sock: socket.socket) -> bool:
     """Whether machine code can exchange datagrams by this socket: IPv4, on Linux."""
-    return sys.platform == "linux" and sock.family == socket.AF_INET
+    return SUPPORTED and sock.family == socket.AF_INET
 
 
 def system_address(address: tuple[str, int]) -> bytes | None:

@@ -16,6 +16,7 @@ from autopilot.geometry.addresses import ask_kernel_at, bytes_at, call_kernel_at
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.kernel import kernel, threaded
 from autopilot.shell.machine_sockets import (
+    SUPPORTED,
     SYSTEM_ADDRESS_BYTES,
     address_of_system,
     receive_from_at,
@@ -218,5 +219,5 @@ def _new_wire(fd: int, truth_fd: int, peer: bytes, truth_to: bytes) -> Wire:
 def rehearse(simulator: HilSimulator) -> None:
     """Have the machine code of `exchange` ready, if this simulator can use it."""
     run = simulator.running()
-    if run is not None:
+    if SUPPORTED and run is not None:
         entry_of(exchange, _new_wire(-1, -1, b"", b""), run)
