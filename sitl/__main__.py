@@ -31,6 +31,7 @@ from sitl.sensors.shipped import PROFILES
 from sitl.shell.autopilots import AUTOPILOTS, PLUMBLINE, parameter_file
 from sitl.shell.link import Link
 from sitl.shell.loops import SPIN_NS, meet, run_lockstep, run_real_time
+from sitl.shell.tick_loop import rehearse
 
 
 def _run_on(cpu: int) -> None:
@@ -192,6 +193,7 @@ def main(
         if not compiled:
             say(ONCE)
         warm = build()  # compiles, or loads, every kernel
+        rehearse(warm)
         warm.truth_datagram()
         warm.receive(b"")
         warm.advance()

@@ -33,6 +33,11 @@ class ParameterServer:
                 return self._set(message.param_id, decimal_from_float32(message.param_value))
         return False
 
+    @property
+    def speaks(self) -> bool:
+        """Whether a message waits to go out."""
+        return bool(self._waiting)
+
     def take(self) -> list[Any]:
         """The messages that go out with this tick."""
         waiting = self._waiting

@@ -29,7 +29,8 @@ from sitl.world import (
 )
 
 Forces = tuple[float, ...]  # N, one of each rotor
-_SNAP_SPEED = width(World) - 1  # where it stands among the numbers of the world
+SNAP_SPEED = width(World) - 1  # where it stands among the numbers of the world
+NEVER_US = 2**62  # later than any flight lasts
 
 
 class SimCore:
@@ -92,7 +93,7 @@ class SimCore:
     @property
     def snap_speed(self) -> float:
         """Speed (m/s) at which the cable came taut in the last tick; 0: it did not."""
-        return float(self.rows.world.item(_SNAP_SPEED))
+        return float(self.rows.world.item(SNAP_SPEED))
 
     @property
     def cable_length(self) -> float:
@@ -105,6 +106,20 @@ class SimCore:
         begins_us = self._pulse_at_us
         blows = begins_us >= 0 and begins_us <= self.now_us < begins_us + self.settings.pulse_for_us
         return self.settings.pulse if blows else ZERO
+
+    @property
+    def pulse_changes_us(self) -> int:
+        """When the gust pulse will begin to blow, or cease to; NEVER_US where it will not."""
+        begins_us = self._pulse_at_us
+        if begins_us < 0:
+            return NEVER_US
+        changes = (begins_us, begins_us + self.settings.pulse_for_us)
+        return min((at_us for at_us in changes if at_us > self.now_us), default=NEVER_US)
+
+    def came_to(self, now_us: int, tick_count: int) -> None:
+        """The rows have been moved on to this tick by whoever called `world_tick`."""
+        self._world = None
+        self.now_us, self.tick_count = now_us, tick_count
 
     def tick(self, command: Forces, gripper_open: bool = False, reel_rate: float = 0.0) -> None:
         """Integrate to the next tick; see `world_tick`. Rotors that `command` does not name stand still."""

@@ -10,8 +10,10 @@ def main() -> None:
     name_what_is_compiled()
     # only now: the import itself compiles the first ones
     from sitl.hil import HilSimulator
+    from sitl.shell.tick_loop import rehearse
 
     simulator = HilSimulator.build()
+    rehearse(simulator)
     simulator.truth_datagram()
     simulator.receive(b"")
     simulator.advance()

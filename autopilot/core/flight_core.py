@@ -46,7 +46,7 @@ from autopilot.estimation.records import (
     blank_state,
     new_history,
 )
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_of, native_address_of
 from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
 from autopilot.geometry.packed import pack, packed, place_of, unpack
 from autopilot.guidance.layout import COLUMNS, jets_ahead
@@ -123,6 +123,7 @@ class FlightCore:
         self._seat: Seat | None = None
         self._fly: Callable[..., int] | None = None  # the tick's machine code, once it was run
         self._law: Any = None  # `law`, once it was asked for
+        self._address: int | None = None  # the same of `address`
         self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
         pilot = Pilot(NO_COMMAND, STOPPED, 1.0, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
@@ -271,10 +272,31 @@ class FlightCore:
         fly = self._fly or self.compile()
         report = _NOTHING
         if fly(self.rows, self.law, count, now_us, tick, dt, False) == TO_DECIDE:
-            report = self.decide(now_us, round(dt * 1e6))
-            fly(self.rows, self.law, count, now_us, tick, dt, True)
+            return self.complete(count, now_us, tick, dt)
         self.raise_interruption()
         return report
+
+    def complete(self, count: int, now_us: int, tick: int, dt: float) -> Report:
+        """The rest of a tick that is estimated, and is to be decided upon."""
+        report = self.decide(now_us, round(dt * 1e6))
+        fly = self._fly or self.compile()
+        fly(self.rows, self.law, count, now_us, tick, dt, True)
+        self.raise_interruption()
+        return report
+
+    @property
+    def runs(self) -> bool:
+        """Whether the next tick needs nothing of Python unless the supervisor is to decide."""
+        return self._host is None and self._seat is None and not self._dirty and not self.reels
+
+    @property
+    def address(self) -> int:
+        """Where the machine code of `fly_tick` is; 0 where nothing is compiled."""
+        if self._address is None:
+            arguments = (self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
+            compiled = hasattr(fly_tick, "overloads")
+            self._address = native_address_of(fly_tick, *arguments) if compiled else 0
+        return self._address
 
     def raise_interruption(self) -> None:
         """Raise what has interrupted law or estimator amid the tick and is not its fault, as Ctrl-C."""
@@ -379,6 +401,13 @@ class FlightCore:
         stop_us = min(stretch.stop_us, now_us + stretch.period_us * len(targets))
         pack(stretch._replace(stop_us=stop_us), self.rows.stretch, 0)
         self.rows = self.rows._replace(targets=targets, references=references)
+
+    def setpoints_until_us(self, period_us: int) -> int:
+        """When `setpoint_row` has no row any more for ticks of this period; 0: it has none now."""
+        laid, flight = self.laid, self.flight
+        if laid is None or flight.legs is not laid.legs or flight.leg_start_us != laid.leg_start_us:
+            return 0
+        return laid.first_us + period_us * len(laid.times_s) if laid.period_us == period_us else 0
 
     def setpoint_row(self, now_us: int) -> int:
         """The row of `rows.targets` with the setpoint of the present leg at this instant; -1: none has it."""

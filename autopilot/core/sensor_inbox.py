@@ -32,7 +32,7 @@ from autopilot.estimation.records import (
     LoadReading,
     PoseReading,
 )
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_of, native_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack, packed, unpack, width
@@ -212,20 +212,29 @@ def _read(
     return (count, now_us, sensor.fields, fixed)
 
 
+def address_of_read(inbox: SensorInbox) -> int:
+    """The address of the kernel by which this inbox reads datagrams, compiled or loaded where need be."""
+    return native_address_of(_read, b"", *inbox.kept(0))
+
+
 class SensorInbox:
     """Reads datagrams of sensors into the rows that the estimate is made from."""
 
     def __init__(self, home: Home, rows: Array) -> None:
         self.rows = rows
-        self._home = packed(home)
+        self.home = packed(home)
         self.imu = np.full(width(ImuReading), np.nan)  # `ImuReading` of the last tick
         self.slow = packed(SlowSensors())
         self.fix = np.zeros(width(HilGps))  # `HilGps`, the last one
-        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
+        self.payload = np.zeros(PAYLOAD_ROOM, np.uint8)
         self._writer = FrameWriter(1, 1)
         self._entry: Callable[..., tuple[int, int, int, bool]] | None = (
             None  # machine code, once it was asked for
         )
+
+    def kept(self, since_us: int) -> Any:
+        """What `_read` is given beside a datagram."""
+        return (self.home, since_us, self.rows, self.imu, self.slow, self.fix, self.payload)
 
     def read(self, datagram: bytes, since_us: int) -> Tick | None:
         """The tick in a datagram, or None where there is none (garbage, another message).
@@ -234,7 +243,7 @@ class SensorInbox:
         than `since_us` the sample and the fix are kept.
         """
         aside: tuple[Any, ...] = ()
-        kept = (self._home, since_us, self.rows, self.imu, self.slow, self.fix, self._payload)
+        kept = self.kept(since_us)
         if self._entry is None:
             self._entry = entry_of(_read, datagram, *kept)
         count, now_us, fields, fixed = self._entry(datagram, *kept)
@@ -246,6 +255,5 @@ class SensorInbox:
             count, now_us, fields, fixed = self._entry(datagram, *kept)
         if count > len(self.rows):
             self.rows = new_inbox(2 * count)
-            kept = (self._home, since_us, self.rows, *kept[3:])
-            self._entry(datagram, *kept)
+            self._entry(datagram, *self.kept(since_us))
         return Tick(now_us, count, fields, fixed, aside) if count >= 0 else None

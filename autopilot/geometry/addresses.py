@@ -5,9 +5,10 @@
 work in kernels, and where nothing is compiled in Python.
 
 `call_kernel_at(address, arguments)` calls a kernel that was compiled apart and returns nothing,
-`ask_kernel_at` one that returns a whole number. Nothing is checked: the arguments, a tuple, must be of the
-types for which it was compiled (`autopilot.geometry.entry.native_address_of`), or the members of its tuples
-one after another. Both work in kernels alone.
+`ask_kernel_at` one that returns a whole number; `kernel_giving(types)` makes what calls one that returns
+values of these types. Nothing is checked: the arguments, a tuple, must be of the types for which it was
+compiled (`autopilot.geometry.entry.native_address_of`), or the members of its tuples one after another.
+All of them work in kernels alone, as does `bytes_at(address, size)`: the bytes at an address, kept by nobody.
 """
 
 from __future__ import annotations
@@ -66,6 +67,24 @@ def _calling(returned: Any) -> Any:
     return intrinsic(typed)
 
 
+def kernel_giving(*returned: Any) -> Any:
+    """What calls a kernel at an address that returns a tuple of these types of numba's."""
+    return _calling(types.BaseTuple.from_types(returned))
+
+
+def _bytes(_: Any, address: Any, size: Any) -> Any:
+    kind = types.Bytes(types.uint8, 1, "C")
+
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        found = context.make_helper(builder, kind)
+        one = context.get_constant(types.intp, 1)
+        data = builder.inttoptr(arguments[0], found.data.type)
+        populate_array(found, data, (arguments[1],), (one,), one, None)
+        return found._getvalue()
+
+    return kind(types.int64, types.int64), lower
+
+
 def _call(context: Any, function: Any, address: Any) -> Any:
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t])
@@ -80,3 +99,4 @@ numbers_at: Any = _numbers_in_python if numba.config.DISABLE_JIT else intrinsic(
 call_at: Any = _call_in_python if numba.config.DISABLE_JIT else intrinsic(_call)
 call_kernel_at: Any = _calling(types.none)
 ask_kernel_at: Any = _calling(types.int64)
+bytes_at: Any = intrinsic(_bytes)

@@ -36,6 +36,15 @@ class LogChunk(NamedTuple):
     ended: bool
 
 
+class LogRunning(NamedTuple):
+    """What of the log machine code writes."""
+
+    due_us: int
+    period_us: int
+    until_us: int
+    records: SampleRecords
+
+
 class FlightLog:
     """Makes one log for each flight. `step` at every tick at which it is `due`, `take` whenever the shell can
     store."""
@@ -77,6 +86,23 @@ class FlightLog:
     def due(self, now_us: int, armed: bool) -> bool:
         """Whether `step` has anything to do."""
         return now_us >= self._next_us or armed is not self._armed or self._table.version != self._stepped
+
+    def running(self, now_us: int, armed: bool, phase: int) -> LogRunning | None:
+        """When the fast topics are due, which machine code can write, and when `step` has more to do than
+        that, if nothing changes but the time; None: it has, at the tick `now_us`."""
+        if armed is not self._armed or self._table.version != self._stepped or self._dropped_us >= 0:
+            return None
+        if self._path is None or not armed:
+            return None if now_us >= self._next_us else LogRunning(NEVER_US, 1, self._next_us, self._records)
+        if self._state != (armed, phase) or self._table.version != self._version:
+            return None
+        period_us = round(1e6 / self._table["LOG_RATE_HZ"])
+        return LogRunning(self._due_us, period_us, self._slow_us, self._records)
+
+    def wrote(self, records: bytes, due_us: int, now_us: int) -> None:
+        """Machine code has written these records of the fast topics; the next are due then."""
+        self._due_us = self._next_us = due_us
+        self._add(records, now_us)
 
     def step(
         self,

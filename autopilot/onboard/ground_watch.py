@@ -34,6 +34,10 @@ class GroundWatch:
         """Whether it has become silent, or is heard again."""
         return (now_us - heard_us > self._patience_us) != self.lost
 
+    def changes_us(self, heard_us: int) -> int:
+        """When it will have become silent, if it was not lost; it is not heard meanwhile."""
+        return NEVER_US if self.lost else heard_us + self._patience_us + 1
+
     def request(self, phase: Phase) -> tuple[Any, str] | None:
         """What to ask of the vehicle, and the word for it; None in a phase that needs nothing."""
         homing = phase in LANDING or phase == Phase.RETURN

@@ -13,7 +13,7 @@ from typing import Any, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_of, native_address_of
 from autopilot.geometry.frames import quat_ned_frd_from_enu_flu
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, packed, width
@@ -127,7 +127,7 @@ class SampleRecords:
     def __init__(self, writer: UlogWriter, home: Home) -> None:
         copies: list[tuple[int, int, int, int]] = []
         records: list[bytes] = []
-        self._home = packed(home)
+        self.home = packed(home)
         at = 0
         for number, (topic, columns) in enumerate(FAST):
             constants: list[float] = []
@@ -144,22 +144,27 @@ class SampleRecords:
                     constants.append(0)
             records.append(writer.record(number, 0, *constants))
             if number == _SENSED:
-                self._sensed = (at, at + len(records[-1]))
+                self.sensed = (at, at + len(records[-1]))
             at += len(records[-1])
-        self._copies = np.array(copies)
-        self._records = np.frombuffer(b"".join(records), np.uint8).copy()
-        self._row = np.zeros(_TIME + 1)
-        self._wide = np.zeros(8, np.uint8)
+        self.copies = np.array(copies)
+        self.records = np.frombuffer(b"".join(records), np.uint8).copy()
+        self.row = np.zeros(_TIME + 1)
+        self.wide = np.zeros(8, np.uint8)
         self._put: Callable[..., None] | None = None  # machine code, once it was asked for
+
+    def address(self, instant: Row, imu: Row) -> int:
+        """The address of `put_sample`, compiled or loaded where need be."""
+        arguments = (instant, imu, self.home, 0, self.row, self.copies, self.wide, self.records)
+        return native_address_of(put_sample, *arguments)
 
     def of(self, sample: Sample, now_us: int) -> bytes:
         """The records of an instant, one behind the other; that of the inertial sample only if it is sane."""
-        arguments = (sample.instant, sample.imu, self._home, now_us, self._row, self._copies)
+        arguments = (sample.instant, sample.imu, self.home, now_us, self.row, self.copies)
         if self._put is None:
-            self._put = entry_of(put_sample, *arguments, self._wide, self._records)
-        self._put(*arguments, self._wide, self._records)
-        data = self._records.tobytes()
+            self._put = entry_of(put_sample, *arguments, self.wide, self.records)
+        self._put(*arguments, self.wide, self.records)
+        data = self.records.tobytes()
         if sample.imu_is_sane:
             return data
-        begin, end = self._sensed
+        begin, end = self.sensed
         return data[:begin] + data[end:]

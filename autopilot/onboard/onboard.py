@@ -34,6 +34,7 @@ from autopilot.onboard.ground_watch import BACK_TEXT, LOST_TEXT, GroundWatch
 from autopilot.onboard.log_topics import Sample
 from autopilot.onboard.packet_loss import LOSS_PARAMETER, Loss
 from autopilot.onboard.punctuality import Punctuality
+from autopilot.onboard.running import NO_QUESTIONS, Questions, Runner, Running
 from autopilot.onboard.simulator_parameters import SIMULATOR_COMPONENT, WorldParameters
 from autopilot.onboard.snapshot import UNARMED, MeasuredBattery, Moment, Moments, Options
 from autopilot.onboard.tick_answer import answer_tick
@@ -61,10 +62,11 @@ from autopilot.services.requests import (
     SetHome,
     StartMission,
 )
+from autopilot.services.streams import NEVER_US
 from autopilot.supervisor.mission import with_plan
 from autopilot.supervisor.recovery import Found
 from autopilot.supervisor.settings import settings_from
-from autopilot.supervisor.state import MissionPlan, Phase, off_mission
+from autopilot.supervisor.state import MissionPlan, Phase, Report, off_mission
 from autopilot.trajectory.prepare import PENDING, Limits, Prepared, prepare
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
@@ -241,6 +243,7 @@ class Onboard:
         # values of our parameters that are in force, or will be, and the period of the ticks
         self._followed: tuple[dict[str, float], int] = ({}, 0)
         self._prepared_for = (self.core.setup.settings.limits, self.core.setup.planner)
+        self._runner = Runner(self._moments, self._battery_row, self._writer, options.lockstep)
         self._take_plan(self.endpoint.mission)
         self.logged = False  # since the log was taken last
         self._log: FlightLog | None = None
@@ -349,7 +352,22 @@ class Onboard:
         core, sensors = self.core, self._sensors
         if sensors.rows is not core.rows.inbox:
             core.take_inbox(sensors.rows)
-        report = core.step(tick.readings, now_us, self.tick, dt)
+        return self._end_tick(tick, dt, core.step(tick.readings, now_us, self.tick, dt))
+
+    def complete(self, tick: Tick) -> bytes:
+        """The answer to a tick that machine code has begun, and that is to be decided upon."""
+        dt = (tick.now_us - self.now_us) * 1e-6
+        self.tick += 1
+        self.now_us, self.out_of_time = tick.now_us, 0
+        if tick.fixed:
+            self._moments.fixed = True
+        report = self.core.complete(tick.readings, tick.now_us, self.tick, dt)
+        self._answer = self._end_tick(tick, dt, report)
+        return self._answer
+
+    def _end_tick(self, tick: Tick, dt: float, report: Report) -> bytes:
+        """What comes behind a tick of the flight software; the answer to it."""
+        now_us = tick.now_us
         answer = self._put_answer(tick, dt)
         for severity, text in report.texts:
             self.endpoint.say(severity, text)
@@ -362,6 +380,64 @@ class Onboard:
             self.logged = True
             self.endpoint.files.protected = log.path
         return answer
+
+    # ---- ticks without Python
+
+    def running(self, questions: Questions = NO_QUESTIONS) -> Running | None:
+        """With what, and until when, machine code can fly the ticks that come next; None: not the next."""
+        now_us, period_us, core = self.now_us, self._shortest_us, self.core
+        heard_us = self.endpoint.ground_us
+        if (
+            not (self._world_told and self._options.lockstep and core.runs and self.tick > FIRST_TICKS)
+            or (self._world.speaks or self._reboot or self.fault or self.restarted)
+            or (self.parameters.version != self._version or self.parameters[LOSS_PARAMETER] > 0.0)
+            or self._sensors.rows is not core.rows.inbox
+            or self._ground.changed(now_us + period_us, heard_us)
+        ):
+            return None
+        flight = core.flight
+        told = self._moments.told(flight, len(self.endpoint.mission.items))
+        known = self._moments.standing(flight)
+        ends_us = core.setpoints_until_us(period_us) if known.tracks else NEVER_US
+        next_us = now_us + period_us
+        log = None if self._log is None else self._log.running(next_us, told.armed, told.phase)
+        if log is None and self._log is not None:
+            return None
+        until_us = min(ends_us, NEVER_US if log is None else log.until_us, self._ground.changes_us(heard_us))
+        if self._next_question_us >= questions.until_us or questions.most == 0:
+            until_us = min(until_us, self._next_question_us)
+        if until_us <= next_us:
+            return None
+        written = self.endpoint.written(told, now_us, LOCKSTEP_COMPONENT)
+        if written is None or written.until_us <= next_us:
+            return None
+        times = (now_us, self.tick, period_us, min(until_us, written.until_us))
+        asked = (self._next_question_us, GROUND_WINDOW_US, questions)
+        return self._runner.running(times, known, told.seq, written, log, asked)
+
+    def rehearsed_running(self) -> Running:
+        """What `running` gives, to compile for; it cannot be flown."""
+        return self._runner.rehearsed()
+
+    def ran(self) -> bool:
+        """Take over what machine code has made of `running`; whether there were any ticks."""
+        ran = self._runner.ran()
+        if ran is None:
+            return False
+        self.now_us, self.tick, self._sensed, self._answer = ran
+        self.out_of_time = 0
+        self.endpoint.wrote(self._runner.written, self.now_us)
+        self._next_question_us = self._runner.next_question_us
+        if self._log is not None and (records := self._runner.logged):
+            self._log.wrote(records, self._runner.next_log_us, self.now_us)
+            self.logged = True
+        return True
+
+    @property
+    def said(self) -> list[bytes]:
+        """What machine code has said to the ground station, for the shell to send: each window that ends with
+        a question, and what belongs to the one that is open."""
+        return self._runner.said
 
     def _miss_ground(self) -> None:
         """Act upon a ground station that fell silent, once the phase allows it; or say that it is back."""

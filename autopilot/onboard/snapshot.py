@@ -15,7 +15,7 @@ from autopilot.core.flight_core import FlightCore, LaidOut, Setup
 from autopilot.core.health import Condition, battery_constants, remaining, sensors, vibration, voltage
 from autopilot.core.sensor_inbox import SensorInbox, SlowSensors
 from autopilot.estimation.records import TRACKER, Array, EstimatorState, ImuReading
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_of, native_address_of
 from autopilot.geometry.linear import Vec3, norm, scale
 from autopilot.geometry.packed import Row, unpack, width
 from autopilot.guidance.layout import jets
@@ -264,12 +264,16 @@ class Moments:
             self._flight, self._items, self._told = flight, items, told(flight, items)
         return self._told
 
-    def instant(self, flight: Flight, seq: int, now_us: int) -> Row:
-        """The packed `Instant` at which the core stands with this flight."""
-        core = self.core
-        known = self._standing
+    def standing(self, flight: Flight) -> Standing:
+        """What is the same in the instants to come, while this flight record is."""
+        core, known = self.core, self._standing
         if flight is not known.flight or core.laid is not known.laid or core.setup is not known.setup:
             known = self._standing = _standing(core, flight, known)
+        return known
+
+    def instant(self, flight: Flight, seq: int, now_us: int) -> Row:
+        """The packed `Instant` at which the core stands with this flight."""
+        core, known = self.core, self.standing(flight)
         elapsed_s = (now_us - known.since_us) * 1e-6
         targets, asked, at = known.targets, known.asked, 0
         if known.tracks:
@@ -287,7 +291,13 @@ class Moments:
         return instant
 
 
-class _Standing(NamedTuple):
+def address_of_instant(known: Standing, instant: Row) -> int:
+    """The address of `put_instant`, compiled or loaded where need be."""
+    flown = (*known.rows, known.targets, known.asked, 0, known.control_mode, 0.0, known.duration_s, 0)
+    return native_address_of(put_instant, *flown, known.phase, 0, *known.facts, instant)
+
+
+class Standing(NamedTuple):
     """What is the same in each instant while flight record, setpoints and parameters are: arguments of
     `put_instant`."""
 
@@ -305,7 +315,7 @@ class _Standing(NamedTuple):
     facts: tuple[bool, bool, float, float, int]  # `carrying`, `carries`, `rotor_min`, `rotor_max`, `rotors`
 
 
-def _standing(core: FlightCore, flight: Flight, before: _Standing | None) -> _Standing:
+def _standing(core: FlightCore, flight: Flight, before: Standing | None) -> Standing:
     rows, setup, laid = core.rows, core.setup, core.laid
     targets = asked = rows.targets
     mode, since_us, duration_s = NO_LEG, flight.phase_start_us, nan
@@ -318,7 +328,7 @@ def _standing(core: FlightCore, flight: Flight, before: _Standing | None) -> _St
             same = before is not None and before.laid is laid and before.flight.legs is flight.legs
             asked = before.asked if before and same else jets(leg, laid.times_s, asked=True)
     limits = (setup.vehicle.rotor_min, setup.vehicle.rotor_max) if setup.limited else (-inf, inf)
-    return _Standing(
+    return Standing(
         flight,
         laid,
         setup,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from autopilot.core.health import follow
 from autopilot.estimation.inbox import is_sane
 from autopilot.estimation.records import ImuReading
+from autopilot.geometry.entry import native_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.packed import Row, unpack
 from autopilot.wire.compiled import Bytes
@@ -48,3 +51,10 @@ def answer_tick(
         reel_rate,
     )
     return end, is_sane(unpack(ImuReading, imu, 0))
+
+
+def address_of_answer() -> int:
+    """The address of `answer_tick`, compiled or loaded where need be."""
+    row, scratch = np.zeros(1), np.zeros(1, np.uint8)
+    rows, room, said = (row, row, row, row), (scratch, scratch), (False, False, False, 0.0)
+    return native_address_of(answer_tick, *rows, 0, False, 0, 0.0, *room, 0, 0, 0, *said)

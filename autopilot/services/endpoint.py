@@ -11,9 +11,10 @@ The shell owns sockets, clock and files. It calls `receive` for each datagram, t
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.services.commands import CommandService
 from autopilot.services.components import ComponentService
@@ -70,7 +71,7 @@ from autopilot.services.requests import (
 from autopilot.services.signing import SigningService
 from autopilot.services.snapshot import Snapshot
 from autopilot.services.statustext import TextWriter
-from autopilot.services.stream_frames import parts_of
+from autopilot.services.stream_frames import BITS, StreamFrames, parts_of
 from autopilot.services.streams import DEFAULT, NEVER_US, OFF
 from autopilot.services.telemetry import (
     COMPONENT_STREAMS,
@@ -86,7 +87,7 @@ from autopilot.services.telemetry import (
 )
 from autopilot.services.timesync import answer_ping, answer_timesync
 from autopilot.services.virtual_files import information_message, made_files, metadata_message
-from autopilot.wire.codec import Received, decode
+from autopilot.wire.codec import FrameWriter, Received, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
@@ -115,6 +116,20 @@ _METADATA = {
 }
 
 SnapshotFactory = Callable[[], Snapshot]
+
+
+class Written(NamedTuple):
+    """Streams of a link that machine code writes."""
+
+    link: Link
+    until_us: int  # when something else is due
+    due: NDArray[np.int64]  # as of `Streams.written_by`
+    frames: StreamFrames
+    aside: FrameWriter  # of a component that asks
+
+
+# streams that machine code writes, or that say nothing: FILTER_STATE speaks of estimators that are not ours
+_WRITTEN = BITS | {mavlink.MAVLINK_MSG_ID_FILTER_STATE: 0}
 
 
 class VehicleEndpoint:
@@ -366,6 +381,29 @@ class VehicleEndpoint:
         self._next_us = next_us
         snapshot = self._look(make_snapshot) if streams else None
         return self._datagrams(due, snapshot)
+
+    def written(self, told: object, now_us: int, aside: int) -> Written | None:
+        """What machine code can say at the ticks to come in place of `poll`, on the only link there is, while
+        what the flight record says is `told` and our own estimator flies; None: there may be more to say.
+        A component (`aside`) asks beside that."""
+        if self._work or self._learned or self._signing.signing is not None or len(self._links) != 1:
+            return None
+        if self._stirred:
+            self._look_ahead()
+        (link, state), seen = next(iter(self._links.items())), self._seen
+        # what has changed is announced, which is for `poll`
+        changed = told is not seen[0] or seen[1] != self._missions.plan_ids
+        if changed or state.queue or state.announced or self._next_us <= now_us:
+            return None
+        due, others_us = state.streams.written_by(_WRITTEN)
+        writer = state.writer((self.identity.system, aside))
+        return Written(link, min(self._timer_us, others_us), due, state.frames, writer)
+
+    def wrote(self, written: Written, now_us: int) -> None:
+        """All that was due until now has been said."""
+        streams = self._links[written.link].streams
+        streams.take_due(now_us)
+        self._now_us, self._next_us = now_us, min(self._timer_us, streams.next_us)
 
     def _look(self, make_snapshot: SnapshotFactory) -> Snapshot:
         """The instant at which streams are due; what has changed is announced."""

@@ -26,8 +26,8 @@ class LinkState:
     """What the endpoint keeps for a link; a new one begins with a HEARTBEAT."""
 
     __slots__ = (
-        "_streams",
         "announced",
+        "frames",
         "heard_us",
         "number",
         "queue",
@@ -50,17 +50,18 @@ class LinkState:
         self.heard_us = now_us
         self.streams = Streams(defaults, now_us)
         self.writers: dict[Source, FrameWriter] = {}
-        own, dialect = self._writer((system, AUTOPILOT_COMPONENT)), self._writer((system, DIALECT_COMPONENT))
-        self._streams = StreamFrames(own, dialect, home)
+        own, dialect = self.writer((system, AUTOPILOT_COMPONENT)), self.writer((system, DIALECT_COMPONENT))
+        self.frames = StreamFrames(own, dialect, home)
         self.queue: list[Outgoing] = []  # answers
         # streamed messages out of turn, in their order
         self.announced: dict[int, None] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: None}
 
     def frame(self, source: Source, message: Any) -> bytes:
         """The next frame of a source on this link."""
-        return self._writer(source).frame(message, self.signer(self.number))
+        return self.writer(source).frame(message, self.signer(self.number))
 
-    def _writer(self, source: Source) -> FrameWriter:
+    def writer(self, source: Source) -> FrameWriter:
+        """What writes the frames of a source on this link."""
         writer = self.writers.get(source)
         if writer is None:
             writer = self.writers[source] = FrameWriter(*source)
@@ -73,10 +74,10 @@ class LinkState:
         pieces: list[bytes] = []
         for one in outgoing:
             if isinstance(one, int):
-                pieces.append(self._streams.frames(one, instant))
+                pieces.append(self.frames.frames(one, instant))
             else:
                 source, message = one
-                pieces.append((writers.get(source) or self._writer(source)).frame(message, sign))
+                pieces.append((writers.get(source) or self.writer(source)).frame(message, sign))
         whole = b"".join(pieces)
         return [whole] if 0 < len(whole) <= DATAGRAM_BYTES else _packed(split(whole))
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.geometry.entry import entry_of
+from autopilot.geometry.entry import entry_of, native_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.packed import Row, packed, unpack
@@ -77,6 +77,7 @@ _WRITTEN = (
 )
 BITS = {key: 1 << i for i, key in enumerate(_WRITTEN)}
 _MOST_FRAMES = len(BITS) + len(DEBUG_VECTORS) + len(NAMED_VALUES)
+STREAMS_ROOM = _MOST_FRAMES * FRAME_ROOM  # bytes in which all of them go
 
 
 def _name(name: bytes) -> tuple[int, ...]:
@@ -200,24 +201,30 @@ def put_streams(
     return at, own_sequence & 0xFF, origin.sequence & 0xFF
 
 
+def address_of_streams(instant: Row) -> int:
+    """The address of `put_streams` for such an instant, compiled or loaded where need be."""
+    scratch = np.zeros(1, np.uint8)
+    return native_address_of(put_streams, 0, instant, instant, 0, 0, 0, 0, 0, scratch, scratch)
+
+
 class StreamFrames:
     """Makes the frames of these streams on one link, in the sequences of its two components."""
 
     def __init__(self, autopilot: FrameWriter, dialect: FrameWriter, home: Home) -> None:
-        self._autopilot = autopilot
-        self._dialect = dialect
-        self._home = packed(home)
-        self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
-        self._buffer = np.zeros(_MOST_FRAMES * FRAME_ROOM, np.uint8)
+        self.autopilot = autopilot
+        self.dialect = dialect
+        self.home = packed(home)
+        self.payload = np.zeros(PAYLOAD_ROOM, np.uint8)
+        self._buffer = np.zeros(STREAMS_ROOM, np.uint8)
         self._written = self._buffer.data
         self._put: Callable[..., tuple[int, int, int]] | None = None  # machine code, once it was asked for
 
     def frames(self, streams: int, instant: Row) -> bytes:
         """The frames of a set of streams (`BITS`), one behind the other."""
-        autopilot, dialect = self._autopilot, self._dialect
+        autopilot, dialect = self.autopilot, self.dialect
         arguments = (
-            *(streams, instant, self._home, autopilot.system, autopilot.component, autopilot.sequence),
-            *(dialect.component, dialect.sequence, self._payload, self._buffer),
+            *(streams, instant, self.home, autopilot.system, autopilot.component, autopilot.sequence),
+            *(dialect.component, dialect.sequence, self.payload, self._buffer),
         )
         if self._put is None:
             self._put = entry_of(put_streams, *arguments)

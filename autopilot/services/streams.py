@@ -10,6 +10,9 @@ from collections.abc import Mapping
 from heapq import heapify, heapreplace
 from itertools import chain
 
+import numpy as np
+from numpy.typing import NDArray
+
 OFF = -1  # MAV_CMD_SET_MESSAGE_INTERVAL: never
 DEFAULT = 0  # and: the default interval
 NEVER_US = 2**63 - 1
@@ -35,6 +38,7 @@ class Streams:
             groups.setdefault((due_us[key], self._interval[key]), []).append(key)
         self._groups = [(due, interval, tuple(keys)) for (due, interval), keys in groups.items()]
         heapify(self._groups)
+        self._written: tuple[NDArray[np.int64], set[int]] | None = None
         self._met: dict[tuple[tuple[int, ...], ...], tuple[int, ...]] = {}  # groups that were due together
         self.next_us = self._groups[0][0] if self._groups else NEVER_US
 
@@ -49,6 +53,22 @@ class Streams:
         due_us = self._due_us()
         due_us[key] = _at_or_after(interval, now_us)
         self._regroup(due_us)
+
+    def written_by(self, bits: Mapping[int, int]) -> tuple[NDArray[np.int64], int]:
+        """The groups all of whose streams have a bit, (n, 2): interval in us, and the sum of their bits; and
+        when the first of the other streams is due. None of the former may be due now: from then on such a
+        group is due at each tick to or over which a multiple of its interval is passed."""
+        if self._written is None:
+            rows = [(each, sum(map(bits.__getitem__, keys))) for each, keys in self._by(bits, True)]
+            others = {key for _, keys in self._by(bits, False) for key in keys}
+            self._written = np.array(rows, np.int64).reshape(-1, 2), others
+        table, others = self._written
+        return table, min((due for due, _, keys in self._groups if keys[0] in others), default=NEVER_US)
+
+    def _by(self, bits: Mapping[int, int], written: bool) -> list[tuple[int, tuple[int, ...]]]:
+        """Intervals and streams of the groups that are sent, and are written by bits all together or not."""
+        sent = [(interval, keys) for _, interval, keys in self._groups if interval > 0]
+        return [(interval, keys) for interval, keys in sent if all(key in bits for key in keys) is written]
 
     def take_due(self, now_us: int) -> tuple[int, ...]:
         """What is due at this tick; each of them is due again at its next multiple."""

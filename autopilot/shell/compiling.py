@@ -37,9 +37,9 @@ class Part:
         mark_ready(self.source, (self.mark,))
 
 
-_ONBOARD = ROOT / "autopilot" / "onboard" / "onboard.py"
+_ONBOARD = ROOT / "autopilot" / "shell" / "tick_loop.py"
 _AUTOPILOT = ROOT / "autopilot" / "core" / "warmup.py"
-SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "hil.py", "world", 18.0)
+SIMULATOR = Part("the simulator", "sitl.warmup", (), ROOT / "sitl" / "shell" / "tick_loop.py", "world", 18.0)
 
 
 OWN = "own"  # stands for any law that somebody has brought: they are compiled for once

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from autopilot.onboard.onboard import GROUND_WINDOW_US, Onboard
+from autopilot.onboard.running import Questions
 from autopilot.services.endpoint import PATIENCE
 from autopilot.services.records import Event, Link, TimesyncAnswered
 from autopilot.shell.options import Address, StopRequest, datagram_socket, reason, receive, set_timeout, shown
@@ -193,12 +194,8 @@ class GroundInStep:
             return
         self._say(ask)
         self._close_window()
-        silent_us = self._silent_until_us - onboard.now_us
-        if len(self._windows) >= _TOGETHER or silent_us <= _TOGETHER * GROUND_WINDOW_US:
-            for datagram in self._windows:
-                self._send(datagram)
-            self._windows.clear()
-        if silent_us > 0:
+        self._send_together(onboard.now_us)
+        if self._silent_until_us > onboard.now_us:
             return
         stamp = onboard.now_us * 1000
         asked = time.monotonic()
@@ -224,6 +221,22 @@ class GroundInStep:
                         self._silent_until_us = onboard.now_us + promised_us
                     return
 
+    @property
+    def questions(self) -> Questions:
+        """What may be asked without `exchange`, as nobody waits for an answer."""
+        alone_us = self._silent_until_us - _TOGETHER * GROUND_WINDOW_US
+        return Questions(self._silent_until_us, alone_us, _TOGETHER - len(self._windows))
+
+    def say(self, said: list[bytes], now_us: int) -> None:
+        """What was said without `exchange`: windows that ended with a question, and one that is open."""
+        for window in said[:-1]:
+            self._say(window)
+            self._close_window()
+        if len(said) > 1:
+            self._send_together(now_us)
+        if said[-1]:
+            self._say(said[-1])
+
     def _wait(self, seconds: float) -> None:
         """How long a receive waits."""
         if seconds != self._waits_s:
@@ -240,6 +253,14 @@ class GroundInStep:
         self._windows.append(b"".join(self._said))
         self._said.clear()
         self._size = 0
+
+    def _send_together(self, now_us: int) -> None:
+        """Send the windows that are over, once there are enough of them, or the ground will soon be waited
+        for."""
+        if len(self._windows) >= _TOGETHER or now_us >= self.questions.alone_us:
+            for datagram in self._windows:
+                self._send(datagram)
+            self._windows.clear()
 
     def _send(self, datagram: bytes) -> None:
         with suppress(OSError):

@@ -57,6 +57,7 @@ from autopilot.shell.steady_clock import SteadyClock
 from autopilot.shell.storage import Storage, StorageError
 from autopilot.shell.storing import Storing
 from autopilot.shell.tick_cost import TickCost
+from autopilot.shell.tick_loop import NOTHING, Met, TickLoop, rehearse
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
@@ -142,12 +143,22 @@ class Program:
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         receive_from_simulator = self._socket.recv
+        ticks = TickLoop(self._socket)
         while True:
             stop.check()
             self._aside.attend(self.onboard)
             self._storing.attend()
+            met = NOTHING if silent or lost else self._run_on(ticks)
+            if met.ran:
+                heard = time.monotonic()
+            if met.more:
+                continue
+            if met.decide is not None:
+                self._answer(self.onboard.complete(met.decide), stop, True)
+                continue
+            stop.check()
             try:
-                datagram = receive_from_simulator(LARGEST_DATAGRAM)
+                datagram = met.datagram or receive_from_simulator(LARGEST_DATAGRAM)
             except OSError:  # nothing within the timeout, or nobody listens where we sent to
                 now = time.monotonic()
                 if not silent and now - heard > _SILENCE_S:
@@ -195,6 +206,19 @@ class Program:
                 self.take_areas(areas)
                 self._ground.join(self.onboard)
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
+
+    def _run_on(self, ticks: TickLoop) -> Met:
+        """Fly ticks without Python, if the next are such and the ground station shares our clock."""
+        ground = self._ground
+        if not isinstance(ground, GroundInStep):
+            return NOTHING
+        met = ticks.run(self.onboard, ground.questions)
+        if met.ran:
+            self.cost.pause()
+            ground.say(self.onboard.said, self.onboard.now_us)
+            if self.onboard.logged:
+                self._keep_log(_LOG_BYTES)
+        return met
 
     def _answer(self, answer: bytes, stop: StopRequest, new: bool) -> None:
         """Exchange with the ground before the answer where the ground shares our clock, else after it."""
@@ -474,6 +498,7 @@ def main(
         program.take_areas(areas)
         program.tell(troubles + unread)
         program.onboard.rehearse()
+        rehearse(program.onboard)
         if not compiled:
             for part in parts:
                 part.done()

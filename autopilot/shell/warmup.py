@@ -18,6 +18,7 @@ def main(part: str, law: str) -> None:
     from autopilot.own.law import law_number, own_law
     from autopilot.own.rehearsal import REFERENCE
     from autopilot.services.identity import identity_of
+    from autopilot.shell.tick_loop import rehearse
     from autopilot.vehicle.file import load_vehicle
     from autopilot.wire.convert import Home
 
@@ -27,7 +28,9 @@ def main(part: str, law: str) -> None:
     table.set("CTL_LAW", law_number(named))
     table.freeze()
     if part == "messages":
-        Onboard(table, identity_of(table), Options(Home(), 0, own=own), None).rehearse_messages()
+        onboard = Onboard(table, identity_of(table), Options(Home(), 0, own=own), None)
+        onboard.rehearse_messages()
+        rehearse(onboard)
     else:
         PARTS[part](build_setup(table, 1, own))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import select
+import socket
 import time
 from collections.abc import Callable
 
@@ -12,7 +13,7 @@ from sitl.hil import HilSimulator
 
 _TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another may take its place
 _MOST_NAMED = 8  # of the autopilots that are turned away
-_TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
+TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
 
 
 class Link:
@@ -33,10 +34,10 @@ class Link:
             raise ValueError(
                 f"cannot send truth to {shown(truth)}: {reason(error)}; choose another with --truth"
             ) from None
-        self._truth = truth
+        self.truth = truth  # where it goes
         self.address = listen
         self._gathered: list[bytes] = []  # truth of this window
-        self._window_ends_us = 0
+        self.window_ends_us = 0
         self._timeout_s = 0.0
         self._say = say
         self._heard = 0.0  # when the peer last answered, monotonic clock
@@ -78,20 +79,37 @@ class Link:
         """The truth of the present tick, if there is any."""
         truth = _truth_of(simulator)
         if truth:
-            send(self._truth_socket, truth, self._truth)
+            send(self._truth_socket, truth, self.truth)
 
     def gather_truth(self, simulator: HilSimulator) -> None:
         """The truth of the present tick, if there is any; sent at the end of the window with all of it."""
         truth, now_us = _truth_of(simulator), simulator.core.now_us
         if truth:
             self._gathered.append(truth)
-        if not self._window_ends_us - _TRUTH_WINDOW_US < now_us < self._window_ends_us:
-            self._window_ends_us = now_us - now_us % _TRUTH_WINDOW_US + _TRUTH_WINDOW_US
+        if not self.window_ends_us - TRUTH_WINDOW_US < now_us < self.window_ends_us:
+            self.window_ends_us = now_us - now_us % TRUTH_WINDOW_US + TRUTH_WINDOW_US
             self._tell_gathered()
+
+    def take_gathered(self) -> bytes:
+        """The truth of this window so far, for who gathers on."""
+        gathered = b"".join(self._gathered)
+        self._gathered.clear()
+        return gathered
+
+    def gather(self, truth: bytes, window_ends_us: int) -> None:
+        """Take back what `take_gathered` gave, with what has come to it, and when that window ends."""
+        self.window_ends_us = window_ends_us
+        if truth:
+            self._gathered.append(truth)
+
+    @property
+    def sockets(self) -> tuple[socket.socket, socket.socket]:
+        """That which autopilots speak to, and that which truth leaves by."""
+        return self._socket, self._truth_socket
 
     def _tell_gathered(self) -> None:
         if self._gathered:
-            send(self._truth_socket, b"".join(self._gathered), self._truth)
+            send(self._truth_socket, b"".join(self._gathered), self.truth)
             self._gathered.clear()
 
     def serves(self, sender: Address) -> bool:

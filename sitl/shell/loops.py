@@ -11,6 +11,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing
 from sitl.shell.link import Link
+from sitl.shell.tick_loop import TickLoop
 
 _RESEND_FIRST_S = 0.05
 _RESEND_LAST_S = 1.0
@@ -66,6 +67,7 @@ def run_lockstep(
     """Tick for ever, each tick as soon as the one before is answered, but no faster than `pacing` says."""
     watch = Watch(say)
     clock = None if pacing is None else Clock(pacing, simulator, say)
+    ticks = TickLoop(link, simulator) if pacing is None else None
     link.timeout(_RESEND_FIRST_S)
     while True:
         stop.check()
@@ -73,7 +75,12 @@ def run_lockstep(
             clock.wait()
         link.gather_truth(simulator)
         link.send(simulator.sensor_datagram())
-        arrived = link.receive()
+        if ticks is None:
+            arrived = link.receive()
+        else:
+            moved, arrived = ticks.run()
+            if moved:
+                continue
         greeted = arrived is not None and link.take(*arrived, simulator)
         if not simulator.answered:
             waited_s = _insist(link, simulator, stop, watch, arrived is None or greeted)

@@ -121,6 +121,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
         "autopilot.geometry",
         "autopilot.wire",
         "autopilot.shell.compiling",
+        "autopilot.shell.machine_sockets",
         "autopilot.shell.options",
         "autopilot.shell.setting_names",
         "autopilot.vehicle.battery",

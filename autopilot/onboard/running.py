@@ -1,0 +1,287 @@
+"""Ticks that machine code can fly by itself: what it needs for that, and what comes of it.
+
+Most ticks are alike: readings come, nothing is to be decided, an answer goes out, and perhaps streams that
+machine code can write. `Onboard` says until when that is all there is (`running`), a loop in machine code
+does it (`autopilot.shell.tick_loop`), `Onboard.ran` takes over what has come of it. All else is left to it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from autopilot.core.sensor_inbox import address_of_read
+from autopilot.core.tick import CoreRows, any_law
+from autopilot.estimation.records import Array
+from autopilot.geometry.addresses import kernel_giving
+from autopilot.geometry.packed import Row, width
+from autopilot.onboard.flight_log import LogRunning
+from autopilot.onboard.log_records import SampleRecords
+from autopilot.onboard.log_topics import FAST
+from autopilot.onboard.snapshot import UNARMED, Moments, Standing, address_of_instant
+from autopilot.onboard.tick_answer import address_of_answer
+from autopilot.services.endpoint import Written
+from autopilot.services.instant import Instant
+from autopilot.services.stream_frames import STREAMS_ROOM, StreamFrames, address_of_streams
+from autopilot.services.streams import NEVER_US
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM, Bytes, wire_record
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.ulog import UlogWriter
+
+Ints = NDArray[np.int64]
+
+# what `Running.numbers` are: of the clock
+NOW_US, TICK, PERIOD_US, UNTIL_US, RAN = range(5)
+# of the present tick's readings, if it was not flown to its end: `Tick`; and whether any tick had a HIL_GPS
+READINGS, FIELDS, FIXED, EVER_FIXED = range(5, 9)
+# of the answer: its writer, what it says, how many bytes it has, whether the inertial sample was sane
+SEQUENCE, SYSTEM, COMPONENT, ARMED, LOCKSTEP, RELEASED, LENGTH, SENSED = range(9, 17)
+# of the streams: their writers, and how many bytes were written
+OWN_SYSTEM, OWN_COMPONENT, OWN_SEQUENCE, DIALECT_COMPONENT, DIALECT_SEQUENCE, SAID = range(17, 23)
+# of what is flown, as `put_instant` is told
+TRACKS, FIRST_US, MODE, SINCE_US, PHASE, SEQ, CARRYING, CARRIES, ROTORS = range(23, 32)
+# of the questions: when the next is due, and how long a window is; `Questions`; how many were asked, and when
+# the last was; who asks
+QUESTION_US, WINDOW_US, ASKED_UNTIL_US, ALONE_US, MOST_ASKED = range(32, 37)
+ASKED, ASKED_US, ASIDE_COMPONENT, ASIDE_SEQUENCE = range(37, 41)
+# of the flight log: when it is due, how often, bytes that were written, which bytes are the inertial sample's
+LOG_US, LOG_PERIOD_US, LOGGED, SENSED_BEGIN, SENSED_END = range(41, 46)
+NUMBERS = 46
+_MOST_SAID = 8 * STREAMS_ROOM  # bytes of streams without Python
+_MOST_LOGGED = 65_536
+_MOST_WINDOWS = 16
+# what `Running.limits` are
+DURATION_S, ROTOR_MIN, ROTOR_MAX = range(3)
+
+TIMESYNC = wire_record(mavlink.MAVLink_timesync_message, __name__)
+
+ask_reading: Any = kernel_giving(types.int64, types.int64, types.int64, types.boolean)
+ask_answer: Any = kernel_giving(types.int64, types.boolean)
+ask_streams: Any = kernel_giving(types.int64, types.int64, types.int64)
+
+
+class Code(NamedTuple):
+    """Addresses of kernels."""
+
+    read: int
+    fly_tick: int
+    answer_tick: int
+    put_instant: int
+    put_streams: int
+    put_sample: int
+
+
+class Questions(NamedTuple):
+    """What the shell lets machine code ask the ground station."""
+
+    until_us: int  # those before are not waited for
+    alone_us: int  # from then on Python is to send what was said with each
+    most: int  # before, so many are sent together
+
+
+NO_QUESTIONS = Questions(0, 0, 0)
+
+
+class Log(NamedTuple):
+    """What the flight log's records are made from, as `put_sample` takes it, and where they go."""
+
+    home: Row
+    row: Row
+    copies: Ints
+    wide: Bytes
+    records: Bytes
+    logged: Bytes
+
+
+class Readings(NamedTuple):
+    """Where readings are put, as `SensorInbox` has it."""
+
+    home: Row
+    imu: Row
+    slow: Row
+    fix: Row
+    payload: Bytes
+
+
+class Streams(NamedTuple):
+    """What streams are written from, and where to."""
+
+    due: Ints  # (n, 2): interval in us, set of streams
+    instant: Row
+    home: Row
+    payload: Bytes
+    said: Bytes
+
+
+class Running(NamedTuple):
+    """What the ticks to come work with, until `numbers[UNTIL_US]`: that one is not such a tick any more."""
+
+    numbers: Ints
+    limits: Row
+    rows: CoreRows
+    law: Any
+    readings: Readings
+    health: Row
+    battery: Row
+    forces: Row
+    frame: Bytes
+    payload: Bytes
+    flown: tuple[Row, Row, Row, Row]  # as `put_instant` takes them
+    targets: Array
+    asked: Array
+    streams: Streams
+    windows: Ints  # how far what is said goes in each window that is over
+    log: Log
+    code: Code
+
+
+class Runner:
+    """Puts `Running` together, and takes apart what has become of it."""
+
+    def __init__(self, moments: Moments, battery: Row, writer: FrameWriter, lockstep: bool) -> None:
+        """`battery` is the row of the battery's constants, `writer` that of the answers."""
+        self._moments, self._battery = moments, battery
+        self._writer, self._lockstep = writer, lockstep
+        self._numbers, self._limits = np.zeros(NUMBERS, np.int64), np.zeros(3)
+        self._instant = np.zeros(width(Instant))
+        self._said = np.zeros(_MOST_SAID, np.uint8)
+        self._windows = np.zeros(_MOST_WINDOWS, np.int64)
+        self._logged = np.zeros(_MOST_LOGGED, np.uint8)
+        self._frame, self._payload = np.zeros(FRAME_ROOM, np.uint8), np.zeros(PAYLOAD_ROOM, np.uint8)
+        # of no log, as long as there is none
+        self._records = SampleRecords(UlogWriter(topic for topic, _ in FAST), moments.options.home)
+        self._code: Code | None = None  # once it was asked for
+        self._written: Written | None = None
+
+    @property
+    def written(self) -> Written:
+        """The streams that were written last."""
+        assert self._written is not None
+        return self._written
+
+    @property
+    def said(self) -> list[bytes]:
+        """The frames of these streams: each window that is over, and what belongs to the one that is open."""
+        said = self._said[: self._numbers[SAID]].tobytes()
+        ends = self._windows[: self._numbers[ASKED]].tolist()
+        return [said[begin:end] for begin, end in zip((0, *ends), (*ends, len(said)), strict=True)]
+
+    @property
+    def logged(self) -> bytes:
+        """The records of the flight log."""
+        return self._logged[: self._numbers[LOGGED]].tobytes()
+
+    @property
+    def next_log_us(self) -> int:
+        """When the next records are due."""
+        return int(self._numbers[LOG_US])
+
+    @property
+    def next_question_us(self) -> int:
+        """When the next question is."""
+        return int(self._numbers[QUESTION_US])
+
+    def running(
+        self,
+        times: tuple[int, int, int, int],
+        known: Standing,
+        seq: int,
+        written: Written,
+        log: LogRunning | None,
+        asked: tuple[int, int, Questions],
+    ) -> Running | None:
+        """What the next ticks work with; `times`: the time now (us), the number of this tick, how long one
+        lasts (us), when the first comes that is left to Python (us). `seq`: the mission item under way;
+        `asked`: when the next question is due, how long a window is (us), and what may be asked. None where
+        nothing is compiled."""
+        moments = self._moments
+        core, frames, writer = moments.core, written.frames, self._writer
+        if log is not None:
+            self._records = log.records
+        code = self._code = self._code or self._addresses(known)
+        if code is None:
+            return None
+        flight, laid, own, dialect = core.flight, core.laid, frames.autopilot, frames.dialect
+        carrying, carries, rotor_min, rotor_max, rotors = known.facts
+        first_us = 0 if laid is None else laid.first_us
+        self._written = written
+        self._numbers[:] = (
+            *(*times, 0),
+            *(0, 0, 0, 0),
+            *(writer.sequence, writer.system, writer.component),
+            *(flight.phase not in UNARMED, self._lockstep, flight.cable.released, 0, 0),
+            *(own.system, own.component, own.sequence, dialect.component, dialect.sequence, 0),
+            *(known.tracks, first_us, known.control_mode, known.since_us, known.phase, seq),
+            *(carrying, carries, rotors),
+            *(*asked[:2], asked[2].until_us, asked[2].alone_us, min(asked[2].most, _MOST_WINDOWS), 0, 0),
+            *(written.aside.component, written.aside.sequence),
+            *((NEVER_US, 1) if log is None else (log.due_us, log.period_us)),
+            *(0, *self._records.sensed),
+        )
+        self._limits[:] = known.duration_s, rotor_min, rotor_max
+        return self._together(core.law, known, written, code)
+
+    def rehearsed(self) -> Running:
+        """What `running` gives, to compile for; it cannot be flown."""
+        moments = self._moments
+        frames = StreamFrames(FrameWriter(1, 1), FrameWriter(1, 2), moments.options.home)
+        written = Written("", 0, np.zeros((0, 2), np.int64), frames, frames.autopilot)
+        known = moments.standing(moments.core.flight)
+        return self._together(any_law(moments.core.law_rows), known, written, Code(0, 0, 0, 0, 0, 0))
+
+    def _together(self, law: Any, known: Standing, written: Written, code: Code) -> Running:
+        moments, frames = self._moments, written.frames
+        core, readings, records = moments.core, moments.readings, self._records
+        return Running(
+            self._numbers,
+            self._limits,
+            core.rows,
+            law,
+            Readings(readings.home, readings.imu, readings.slow, readings.fix, readings.payload),
+            moments.health,
+            self._battery,
+            core.force_row,
+            self._frame,
+            self._payload,
+            known.rows,
+            known.targets,
+            known.asked,
+            Streams(written.due, self._instant, frames.home, frames.payload, self._said),
+            self._windows,
+            Log(records.home, records.row, records.copies, records.wide, records.records, self._logged),
+            code,
+        )
+
+    def ran(self) -> tuple[int, int, bool, bytes] | None:
+        """Of the last tick flown so: its time (us), its number, whether its inertial sample is sane, and the
+        answer to it; None: there was none. Writers and what is known of fixes are brought up to date."""
+        numbers = self._numbers
+        if numbers[RAN] == 0:
+            return None
+        frames = self.written.frames
+        self._writer.sequence = int(numbers[SEQUENCE])
+        frames.autopilot.sequence = int(numbers[OWN_SEQUENCE])
+        frames.dialect.sequence = int(numbers[DIALECT_SEQUENCE])
+        self.written.aside.sequence = int(numbers[ASIDE_SEQUENCE])
+        if numbers[EVER_FIXED]:
+            self._moments.fixed = True
+        answer = self._frame[: numbers[LENGTH]].tobytes()
+        return int(numbers[NOW_US]), int(numbers[TICK]), bool(numbers[SENSED]), answer
+
+    def _addresses(self, known: Standing) -> Code | None:
+        moments = self._moments
+        fly_tick = moments.core.address
+        if fly_tick == 0:
+            return None
+        return Code(
+            address_of_read(moments.readings),
+            fly_tick,
+            address_of_answer(),
+            address_of_instant(known, self._instant),
+            address_of_streams(self._instant),
+            self._records.address(self._instant, moments.readings.imu),
+        )

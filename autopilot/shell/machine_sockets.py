@@ -1,0 +1,82 @@
+"""Datagrams received and sent by machine code: for loops that exchange several without Python between them.
+
+A socket is given by its file descriptor, bytes by their address, an address of the network as the system
+has it (`system_address`). A receive waits as long as the socket's SO_RCVTIMEO says; a signal ends it, for
+Python to look after. All of it works in kernels alone, and where `usable` says so.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import sys
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+SUPPORTED = sys.platform == "linux"  # as far as it is tried
+SYSTEM_ADDRESS_BYTES = 16  # of an IPv4 address with its port
+
+_INT, _WIDE = ir.IntType(32), ir.IntType(64)
+_POINTER = cgutils.voidptr_t
+
+
+def usable(sock: socket.socket) -> bool:
+    """Whether machine code can exchange datagrams by this socket: IPv4, on Linux."""
+    return SUPPORTED and sock.family == socket.AF_INET
+
+
+def system_address(address: tuple[str, int]) -> bytes | None:
+    """`struct sockaddr_in` of an address that is given by numbers; None of any other."""
+    try:
+        host = socket.inet_pton(socket.AF_INET, address[0])
+    except OSError:
+        return None
+    return struct.pack("=H", socket.AF_INET) + struct.pack("!H", address[1]) + host + bytes(8)
+
+
+def address_of_system(address: bytes) -> tuple[str, int]:
+    """The address that `system_address` gives so."""
+    return socket.inet_ntop(socket.AF_INET, address[4:8]), struct.unpack("!H", address[2:4])[0]
+
+
+def _called(name: str, kinds: list[Any]) -> Any:
+    """A function of the system's library: of a file descriptor, an address, a size, no flags, and more."""
+
+    def lower(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kind = ir.FunctionType(_WIDE, [_INT, _POINTER, _WIDE, _INT, *kinds])
+        function = cgutils.get_or_insert_function(builder.module, kind, name)
+        more = [
+            builder.inttoptr(value, _POINTER) if kind is _POINTER else builder.trunc(value, _INT)
+            for kind, value in zip(kinds, given[3:], strict=True)
+        ]
+        first = (builder.trunc(given[0], _INT), builder.inttoptr(given[1], _POINTER), given[2])
+        return builder.call(function, [*first, ir.Constant(_INT, 0), *more])
+
+    return lower
+
+
+def _receive(_: Any, fd: Any, address: Any, size: Any) -> Any:
+    return types.int64(types.int64, types.int64, types.int64), _called("recv", [])
+
+
+def _send(_: Any, fd: Any, address: Any, size: Any) -> Any:
+    return types.int64(types.int64, types.int64, types.int64), _called("send", [])
+
+
+def _receive_from(_: Any, fd: Any, address: Any, size: Any, sender: Any, sender_size: Any) -> Any:
+    return types.int64(*[types.int64] * 5), _called("recvfrom", [_POINTER, _POINTER])
+
+
+def _send_to(_: Any, fd: Any, address: Any, size: Any, receiver: Any, receiver_size: Any) -> Any:
+    return types.int64(*[types.int64] * 5), _called("sendto", [_POINTER, _INT])
+
+
+# how many bytes came or went; less than 0: none
+receive_at: Any = intrinsic(_receive)  # fd, address, size
+send_at: Any = intrinsic(_send)  # fd, address, size
+receive_from_at: Any = intrinsic(_receive_from)  # ..., where the sender is put, where its size stands
+send_to_at: Any = intrinsic(_send_to)  # ..., the receiver, its size
