@@ -31,7 +31,8 @@ S is what the rotors are asked for against a torque: once it has moved the vehic
 
 What is wanted is delta. The ratios of the bandwidths are given; all three are as high as two conditions
 allow: the tolerance is kept, and three standard deviations of each rotor's command, for the noise that the
-estimate is believed to have, fit between hover and the nearest limit of a rotor.
+estimate is believed to have, fit between hover and the nearest limit of a rotor, and 1.5 of them into the
+share of the range that paths leave to control: what noise takes of it, gusts do not have.
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ Array = NDArray[np.float64]
 
 # what an estimator over motion capture leaves, white from tick to tick, of e_i, x_L, v_L, q, q', theta, Omega
 NOISE = (0.0, 0.0005, 0.003, 0.0007, 0.008, 0.002, 0.005)
-SIGMAS = 3.0
+SIGMAS, SIGMAS_RESERVED = 3.0, 1.5
+RESERVED = 0.15  # of a rotor's range, that paths leave to control as delivered: MIS_ROTOR_MARG
 # of omega_R, rad/s, within which the greatest is looked for
 _SLOWEST, _FASTEST = 0.5, 200.0
 _LEAST_LAG = 1e-4  # s; rotors without lag are taken for so fast ones
@@ -213,6 +215,8 @@ def design(wanted: Wanted, timing: Timing, vehicle: Vehicle) -> Design:
     """The fastest gains that keep what is wanted; the slowest looked at where none does."""
     hover = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / vehicle.lift
     room = min(vehicle.rotor_max - hover, hover - vehicle.rotor_min)
+    reserved = RESERVED * (vehicle.rotor_max - vehicle.rotor_min)
+    greatest = min(room / SIGMAS, reserved / SIGMAS_RESERVED)
 
     def bandwidths(omega_R: float) -> tuple[float, float, float, float]:
         omega_q = omega_R / wanted.attitude_ratio
@@ -226,7 +230,7 @@ def design(wanted: Wanted, timing: Timing, vehicle: Vehicle) -> Design:
     for _ in range(20):
         middle = 0.5 * (low + high)
         tolerance, deviation = found(math.exp(middle))
-        if tolerance >= wanted.tolerance and SIGMAS * deviation <= room:
+        if tolerance >= wanted.tolerance and deviation <= greatest:
             low = middle
         else:
             high = middle

@@ -19,8 +19,10 @@ from numba.extending import overload
 from autopilot.control.actuators.disturbance_observer import (
     Observed,
     ObserverConstants,
+    blown,
     nominal,
     observe,
+    pulled,
     rested,
 )
 from autopilot.control.actuators.mixer import EXPECTED, FORCE, MISSED, TOLD, MixerResult, spread
@@ -50,12 +52,13 @@ from autopilot.estimation.records import (
     History,
     ImuReading,
 )
+from autopilot.estimation.vibration import accel_shown
 from autopilot.geometry.addresses import call_at, call_kernel_at, numbers_at
 from autopilot.geometry.compiler import INSIDE
 from autopilot.geometry.entry import native_address_of
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above, rows_in, taken
-from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, dot, neg, norm, scale, sub
+from autopilot.geometry.linear import E3, IDENTITY, ZERO, Vec3, add, axpy, column, neg, norm, scale, sub
 from autopilot.geometry.packed import Each, Row, pack, unpack, with_field
 from autopilot.geometry.so3 import tilt_angle
 from autopilot.guidance.legs import LOAD_ATTITUDE, LOAD_POSITION, QUAD_POSITION
@@ -187,7 +190,7 @@ def felt_pull(pilot: Pilot, state: State, constants: CoreConstants) -> float:
     felt = (a[0], a[1], a[2] + vehicle.gravity)
     known = axpy(pilot.thrust, column(state.R, 2), air_force(state.v_quad, constants.drag))
     known = add(known, pilot.observed.push)
-    return dot(sub(scale(vehicle.quad_mass, felt), known), state.q_cable)
+    return pulled(sub(scale(vehicle.quad_mass, felt), known), state.q_cable, column(state.R, 2))
 
 
 @kernel
@@ -348,14 +351,13 @@ def control_tick(rows: CoreRows, law_rows: Any, now_us: int) -> None:
         1.0 if seen.taut else 0.0,
         pilot.thrust,
         pilot.moment,
-        rested(constants.observer, estimator.vibration.accel_var),
+        rested(constants.observer, pilot.observed, accel_shown(estimator.vibration)),
         constants.drag,
         with_length(vehicle, cable.length),
     )
     air = estimator.air
     gust = axpy(air.load_drag, state.v_load, (air.load[0], air.load[1], 0.0))
-    observed = with_field(observed, "load_air", (gust[0], gust[1], 0.0))
-    observed = with_field(observed, "load_drag", air.load_drag)
+    observed = blown(observed, (gust[0], gust[1], 0.0), air.load_drag, constants.observer)
     actuation = Actuation(rows.commands, pilot.thrust, pilot.moment)
     if stretch.mode == RESTING:
         command = NO_COMMAND

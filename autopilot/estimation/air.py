@@ -16,6 +16,9 @@ from autopilot.geometry.linear import Vec3, dot
 
 DRAG_TIME_S = 0.15  # for which a change of drag goes on
 LEARNING_S = 4.0
+# 1/sqrt(s): gusts are a fifth of the wind and last for 2 s, and the drag, c u^2, changes by 2 c u times
+# theirs, that is by 2 * 0.2 * sqrt(2 / 2 s) of what the wind does to the load
+GUSTY = 0.4
 # drag is learned by motion faster than this, m/s, and is at most so much, 1/s
 SLOW, GREATEST_DRAG = 0.2, 2.0
 
@@ -24,13 +27,14 @@ SLOW, GREATEST_DRAG = 0.2, 2.0
 def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: EstimatorTuning) -> float:
     """How fast what the air does to the load may change, m/s^2 per square root of a second.
 
-    As in gusts, and as drag does, c u^2, when the speed changes: by 2 c u times the acceleration, of a wind
-    that c u^2 tells of.
+    As it is told; as in gusts, which are the greater the stronger the wind is; and as drag does, c u^2, when
+    the speed changes: by 2 c u times the acceleration, of a wind that c u^2 tells of.
     """
     still, c = tuning.air_walk, tuning.load_drag
-    wind = sqrt(air.load[0] * air.load[0] + air.load[1] * air.load[1])
-    speed2 = c * c * dot(load.v_load, load.v_load) + c * wind
-    return sqrt(still * still + 4.0 * speed2 * dot(accel_quad, accel_quad) * DRAG_TIME_S)
+    wind2 = air.load[0] * air.load[0] + air.load[1] * air.load[1]
+    speed2 = c * c * dot(load.v_load, load.v_load) + c * sqrt(wind2)
+    gusts = GUSTY * GUSTY * wind2
+    return sqrt(still * still + gusts + 4.0 * speed2 * dot(accel_quad, accel_quad) * DRAG_TIME_S)
 
 
 @kernel

@@ -158,7 +158,7 @@ def estimate(
                 used = imu
     load = state.load
     state = predict(state, history, used, tuning, dt, thrust, moment)
-    state = correct_tautened(state, history, load, tuning)
+    state = correct_tautened(state, history, load, tuning, dt)
     state = correct_pull(state, history, tuning, thrust)
     for i in range(count):
         if inbox[i, KIND] == POSE:

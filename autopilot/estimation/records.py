@@ -225,9 +225,11 @@ class Vibration(NamedTuple):
     """The noise of the inertial unit as its samples show it."""
 
     accel_var: float  # (m/s^2)^2, of one sample and axis
+    accel_band_var: float  # (m/s^2)^2, of white noise as strong below the rotors' speeds
     gyro_var: float  # (rad/s)^2
     turning: float  # rad^2/s, by which the gyroscope's noise lets the attitude wander
     step: ImuReading  # from the last sample but one to the last
+    low: tuple[Vec3, Vec3, Vec3, Vec3]  # m/s^2, the accelerometer through one to four low-passes
 
 
 class Doubt(NamedTuple):
@@ -312,7 +314,7 @@ def blank_state() -> EstimatorState:
         air=AirEstimate((0.0, 0.0), (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0),
         doubt=Doubt(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         last_imu=ImuReading(ZERO, (0.0, 0.0, 9.81)),
-        vibration=Vibration(0.0, 0.0, 0.0, ImuReading(ZERO, ZERO)),
+        vibration=Vibration(0.0, 0.0, 0.0, 0.0, ImuReading(ZERO, ZERO), (ZERO, ZERO, ZERO, ZERO)),
         unfelt=0.0,
         resets=0.0,
         memory_s=0.0,

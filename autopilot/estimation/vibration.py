@@ -4,16 +4,26 @@ What moves a vehicle bends little from sample to sample; noise does. The second 
 variance s^2 has the variance 6 s^2, so the mean square of the second differences tells s whatever the motion,
 and whatever is believed of the unit: a vibration that nobody told of is found in half a second. An impact
 shows in it as well, and makes the samples about it worth little.
+
+The shaking of rotors is a line at their speed, and far less than white noise of the same size once it is
+integrated to a velocity. So the accelerometer's noise is looked for once more below the rotors' speeds and
+above the vehicle's motion, in the band
+
+    H(s) = (s tau)^2 / (1 + s tau)^4,    1 / tau = 2 pi 20 Hz,
+
+which is three of four low-passes in a row, y_2 - 2 y_3 + y_4. White noise of variance s^2 leaves of it
+`_passed` s^2. What is told of less by the two is the noise that counts.
 """
 
 from __future__ import annotations
 
 from autopilot.estimation.records import EstimatorTuning, ImuReading, Vibration
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import dot, sub
+from autopilot.geometry.linear import Vec3, axpy, dot, sub
 
 LEARNING_S = 0.5
 _SECOND_DIFFERENCE = 6.0  # its variance over that of the samples
+_BAND_S = 0.008  # tau
 
 
 @kernel
@@ -25,7 +35,28 @@ def gyro_noise(vibration: Vibration, tuning: EstimatorTuning) -> float:
 @kernel
 def accel_noise(vibration: Vibration, tuning: EstimatorTuning) -> float:
     """Variance of a sample of the accelerometer, (m/s^2)^2: as told, or as it shows."""
-    return max(tuning.accel_std * tuning.accel_std, vibration.accel_var)
+    return max(tuning.accel_std * tuning.accel_std, accel_shown(vibration))
+
+
+@kernel
+def accel_shown(vibration: Vibration) -> float:
+    """Variance of a sample of the accelerometer as it shows, (m/s^2)^2, lines of the rotors aside."""
+    return min(vibration.accel_var, vibration.accel_band_var)
+
+
+@kernel
+def _passed(share: float) -> float:
+    """Variance that white noise of variance 1 leaves in the band, over the low-passes' share of a sample.
+
+    It is the sum of the squares of the band's response to an impulse.
+    """
+    p = 1.0 - share
+    return 2.0 * p * p * p * p * (3.0 * p * p - 4.0 * p + 3.0) / (1.0 + p) ** 7
+
+
+@kernel
+def _low_passed(to: Vec3, last: Vec3, share: float) -> Vec3:
+    return axpy(share, sub(to, last), last)
 
 
 @kernel
@@ -36,10 +67,20 @@ def shaken(
     step = ImuReading(sub(imu.gyro, last.gyro), sub(imu.accel, last.accel))
     gyro, accel = sub(step.gyro, vibration.step.gyro), sub(step.accel, vibration.step.accel)
     share = dt / (LEARNING_S + dt)
+    smooth = dt / (_BAND_S + dt)
+    y1 = _low_passed(imu.accel, vibration.low[0], smooth)
+    y2 = _low_passed(y1, vibration.low[1], smooth)
+    y3 = _low_passed(y2, vibration.low[2], smooth)
+    y4 = _low_passed(y3, vibration.low[3], smooth)
+    band = sub(sub(y2, y3), sub(y3, y4))
+    # share / smooth as one quotient, for the first sample, after no time
+    passed = 3.0 * _passed(smooth) * (LEARNING_S + dt) / (_BAND_S + dt)
     each = 1.0 / (3.0 * _SECOND_DIFFERENCE)
     return Vibration(
         vibration.accel_var + share * (each * dot(accel, accel) - vibration.accel_var),
+        vibration.accel_band_var * (1.0 - share) + dot(band, band) / passed,
         vibration.gyro_var + share * (each * dot(gyro, gyro) - vibration.gyro_var),
         gyro_noise(vibration, tuning) * dt,
         step,
+        (y1, y2, y3, y4),
     )

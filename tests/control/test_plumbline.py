@@ -100,6 +100,9 @@ def compiled() -> SimpleNamespace:
         standing=observer.standing,
         lying=observer.lying,
         observe=observer.observe,
+        rested=observer.rested,
+        blown=observer.blown,
+        pulled=observer.pulled,
     )
 
 
@@ -713,8 +716,38 @@ def drag_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle
         agree(found, true, 0.03 * max(true) + 1e-3)
         agree(observed.push, push, 0.005)
         agree(observed.steady, wind, 0.02)
+    # what drags along the rotors' axis passes for the cable's, and tells nothing
+    climbing, _ = learned(
+        BEBOP_DRAG, thrice, lambda k: [1.5 * math.sin(0.1 * k), math.cos(0.1 * k), 2.0 * math.sin(0.23 * k)]
+    )
+    agree(climbing.drag.linear + BEBOP_DRAG.linear, thrice.linear, 0.03 * thrice.linear)
     slow, _ = learned(BEBOP_DRAG, thrice, lambda k: [0.2 if k % 2 else -0.2, 0.0, 0.0])
     agree(slow.drag, BEBOP_DRAG, 0.05 * BEBOP_DRAG.linear)
+
+
+def gusts_outweigh_noise(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
+    """The push is learned the slower, the noisier the accelerometer is, and less so in wind."""
+    constants = law.observer_constants(0.3, 0.1, 0.2, 0.1, 2.0, TICK, BEBOP_DRAG, vehicle)
+    still = law.aloft(vehicle)
+    breeze = 0.03 * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity
+    for push in (0.0, breeze, 0.9 * breeze, breeze + 0.5):
+        observed = still._replace(steady=(0.6 * push, -0.8 * push, 0.0))
+        quiet = 0.06 + 0.4 * 0.1 / (math.sqrt(TICK) * vehicle.quad_mass) * max(0.0, push - breeze)
+        for noise in (0.05, 0.12, 1.0):
+            slower = max(1.0, noise / quiet)
+            rested = law.rested(constants, observed, noise * noise)
+            agree(rested.push, constants.push / slower, 1e-9 * constants.push)
+            assert rested._replace(push=constants.push) == constants
+    # what the wind does to the load is believed in 0.15 s
+    blown = law.blown(still._replace(load_air=(0.3, -0.2, 0.1)), (0.1, 0.5, 0.4), 0.02, constants)
+    share = TICK / 0.15
+    agree(blown.load_air, (0.3 - 0.2 * share, -0.2 + 0.7 * share, 0.1 + 0.3 * share), 1e-12)
+    assert blown.load_drag == 0.02
+    # of a pull, what is felt along the rotors' axis; one that slants more than 60 deg is taken for that
+    lean = 0.4
+    axis = (math.sin(lean), 0.0, math.cos(lean))
+    agree(law.pulled((-2.0 * axis[2], 1.0, 2.0 * axis[0] - 3.0), (0.0, 0.0, -1.0), axis), 3.0, 1e-12)
+    agree(law.pulled((0.0, 0.0, -3.0), (math.sin(1.3), 0.0, -math.cos(1.3)), (0.0, 0.0, 1.0)), 6.0, 1e-12)
 
 
 def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
@@ -764,7 +797,7 @@ def torque_is_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehic
 
 
 def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicle: Vehicle) -> None:
-    """Of a load half as heavy again that swings, under a wind across its cable and drag as believed."""
+    """Of a load half as heavy again that swings, under wind across the rotors' axis and drag as believed."""
     heavy = vehicle._replace(load_mass=1.5 * vehicle.load_mass)
     constants = law.observer_constants(0.3, 0.1, 0.0, 0.0, 2.0, TICK, BEBOP_DRAG, vehicle)
     rng = np.random.default_rng(37)
@@ -777,7 +810,8 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
         w = np.cross(q, rng.normal(size=3))
         R, f = model.rodrigues(0.2 * rng.normal(size=3)), 5.0 + 0.5 * rng.normal()
         state = model.state_of(model.pack(ZERO, rng.normal(size=3), q, w, R, ZERO), vehicle)
-        push = wind - (wind @ q) * q
+        axis = np.array(R)[:, 2]
+        push = wind - (wind @ axis) * axis
         air = np.array(law.air_force(state.v_quad, BEBOP_DRAG))
         motion = law.load_motion(state, f, 0.0, model.vec(push + air), heavy)
         a = np.array(motion.a_load) - vehicle.cable_length * np.array(motion.q_ddot)
@@ -785,7 +819,7 @@ def mass_and_wind_are_found(law: SimpleNamespace, model: SimpleNamespace, vehicl
         observed = law.observe(observed, state, 1.0, f, ZERO, constants, BEBOP_DRAG, vehicle)
     # eight times the memory's length: exp(-8) of the error is left
     assert observed.load_mass == pytest.approx(heavy.load_mass, rel=1e-3)
-    # the cable leans each way by turns: along it nothing is seen of the wind
+    # the vehicle leans each way by turns: along the rotors' axis nothing is seen of the wind
     agree(observed.push[:2], wind[:2], 0.06)
     assert observed.support == 0.0
     # nothing is learned of a load on the ground, and little is believed of a vehicle that stands
@@ -853,6 +887,7 @@ PROOFS: tuple[Callable[..., None], ...] = (
     what_is_predicted_comes,
     mass_and_wind_are_found,
     drag_is_found,
+    gusts_outweigh_noise,
     torque_is_found,
     it_comes_back,
 )

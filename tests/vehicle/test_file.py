@@ -262,7 +262,7 @@ def test_unknown_names_and_files_that_cannot_be_read(tmp_path):
         "unknown vehicle 'bepop'; did you mean bebop? shipped: bebop, bebop-real, heavy, heavy-real, "
         "hexarotor, iris, octorotor, thesis; or the path of a file"
     )
-    with pytest.raises(VehicleFileError, match="cannot be read: Is a directory"):
+    with pytest.raises(VehicleFileError, match="is a folder; must be a file"):
         load_vehicle(tmp_path)
 
 
@@ -360,7 +360,7 @@ WRONG_BELIEFS = [
         'believed = "bebop-real"',
         "believed: autopilot/vehicle/vehicles/bebop-real.toml has a `believed` of its own",
     ),
-    ('believed = "mine.toml"', "mine.toml: cannot be read"),
+    ('believed = "mine.toml"', "mine.toml: no such file"),
     ("believed = 3", "believed = 3; must be a text in quotes"),
 ]
 

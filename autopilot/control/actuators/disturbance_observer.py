@@ -7,21 +7,24 @@
 | D | air | I | N | drag of the vehicle, by belief |
 | r | rest | I | N | m_Q (x_Q'' + g e_3) - f R e_3 - D |
 | w | pull | | m/s^2 | L q'.q' - q . (x_Q'' + g e_3) |
-| m_L | load_mass | | kg | (r . q) / w |
+| b | axis | I | | R e_3, axis of the rotors |
+| T | tension | | N | (r . b) / (q . b) |
+| m_L | load_mass | | kg | T / w |
 | P | push | I | N | p + k s |
-| p | steady | I | N | r - k s, across the cable |
+| p | steady | I | N | r - T q - k s |
 | s | shaped | I | N | drag as `shape` has it |
 | k | factor | | | of that, beyond the believed drag |
 
 r is all that acts on the vehicle besides weight, rotors and drag in still air: the pull T q of the cable
-and the wind's push. Across the cable it is the push alone. Along it the push is taken for none, so that r .
-q = T; and the load, on a cable that turns as a pendulum whose pivot moves with x_Q'', has x_L'' + g e_3 =
--w q whatever its mass, hence T = m_L w. The mass is the least-squares fit of T to w with exponential
-forgetting. It is learned while the load hangs free: cable taut, load higher than where it lay while the
-cable was slack. The push is learned while the vehicle is off the ground. What of it follows the speed
-while the load hangs free is drag: k is the least-squares fit of the push to drag of the believed shape, of
-both what differs from their means of some seconds, and is known without the delay in which the rest is
-learned.
+and the wind's push. Wind drags at rotors and frame across the rotors' axis b, and along b the push is taken
+for none, so that r . b = T q . b. (Across the cable it is not: leaning into a wind whose push is a third of
+the weight, the vehicle would be thought to carry half its load.) The load, on a cable that turns as a
+pendulum whose pivot moves with x_Q'', has x_L'' + g e_3 = -w q whatever its mass, hence T = m_L w. The mass
+is the least-squares fit of T to w with exponential forgetting. It is learned while the load hangs free:
+cable taut, load higher than where it lay while the cable was slack. The push is learned while the vehicle
+is off the ground. What of it follows the speed while the load hangs free is drag: k is the least-squares
+fit of the push to drag of the believed shape, of both what differs from their means of some seconds, and is
+known without the delay in which the rest is learned.
 
 What turns the vehicle besides is `torque_observer`'s.
 """
@@ -44,19 +47,27 @@ from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale, sub
 from autopilot.geometry.packed import with_field
-from autopilot.geometry.s2 import tangent
 
 # m: so much higher than where it stood or lay is in the air
 _OFF_GROUND = 0.03
 # share of the vehicle's weight that the ground carries while the vehicle counts as standing
 _STANDING = 0.2
 _CONTACT_TIME = 0.02  # s, in which the ground's force is believed
+# s, in which the estimator's word of the wind on the load is believed: the direction of the cable that is
+# asked for leaps with it, and a reading corrects more of it than the wind has changed
+_AIR_TIME = 0.15
 # drag is learned by motion faster than this, m/s, and is at most so many times its shape
 _DRAG_SPEED, _GREATEST_FACTOR = 0.2, 50.0
 # 1/s, by the mass: linear drag, the shape where none is believed
 _ASSUMED_SHAPE = 0.05
-# m/s^2, deviation of a sample of the accelerometer up to which the push is learned as fast as told
+# m/s^2, deviation of a sample of the accelerometer up to which the push is learned as told, in still air
 _QUIET = 0.06
+# 1/sqrt(s), change of a wind's push in gusts, of a fifth of the wind and 2 s, over the push
+_GUSTY = 0.4
+# of the weight, a push that may as well be what noise makes of none
+_BREEZE = 0.03
+# of a pull, along the rotors' axis: a cable that slants more is taken for this slant
+_LEAST_ALONG = 0.5
 # of the nominal mass of the load
 _LEAST_MASS = 0.25
 _GREATEST_MASS = 4.0
@@ -69,6 +80,9 @@ class ObserverConstants(NamedTuple):
     push: float
     drag: float
     contact: float
+    air: float
+    gusty: float  # m/s^2 / N, of noise that the gusts of a wind of this push outweigh
+    breeze: float  # N, of push
     greatest_push: float  # N
     shape: Drag
     least_factor: float
@@ -121,6 +135,9 @@ def observer_constants(
         share(push_time),
         share(drag_time),
         share(_CONTACT_TIME),
+        share(_AIR_TIME),
+        _GUSTY * push_time / (sqrt(period) * vehicle.quad_mass),
+        _BREEZE * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity,
         greatest_push,
         drag if believed else Drag(_ASSUMED_SHAPE * vehicle.quad_mass, 0.0),
         -1.0 if believed else 0.0,
@@ -129,9 +146,21 @@ def observer_constants(
 
 
 @kernel
-def rested(constants: ObserverConstants, accel_var: float) -> ObserverConstants:
-    """The push learned the slower, the noisier the accelerometer is; `accel_var` (m/s^2)^2 of a sample."""
-    return with_field(constants, "push", constants.push / max(1.0, sqrt(accel_var) / _QUIET))
+def rested(constants: ObserverConstants, observed: Observed, accel_var: float) -> ObserverConstants:
+    """The push learned the slower, the noisier the accelerometer is against the gusts of the wind.
+
+    `accel_var`, (m/s^2)^2, is that of a sample. A filter of a push that wanders by w sqrt(t), seen in noise
+    of the deviation s every T seconds, has the time constant s sqrt(T) / w.
+    """
+    quiet = _QUIET + constants.gusty * max(0.0, norm(observed.steady) - constants.breeze)
+    return with_field(constants, "push", constants.push / max(1.0, sqrt(accel_var) / quiet))
+
+
+@kernel
+def blown(observed: Observed, gust: Vec3, drag: float, constants: ObserverConstants) -> Observed:
+    """After a word of the estimator: `gust` (m/s^2) moves the load beside its drag, `drag` is in 1/s."""
+    slowly = axpy(constants.air, sub(gust, observed.load_air), observed.load_air)
+    return with_field(with_field(observed, "load_air", slowly), "load_drag", drag)
 
 
 @kernel
@@ -181,6 +210,12 @@ def loaded(vehicle: Vehicle, load_mass: float) -> Vehicle:
 
 
 @kernel
+def pulled(force: Vec3, q: Vec3, axis: Vec3) -> float:
+    """What of a force on the vehicle is the cable's, N along q; the rest acts across the rotors' axis."""
+    return dot(force, axis) / min(dot(q, axis), -_LEAST_ALONG)
+
+
+@kernel
 def observe(
     observed: Observed,
     state: State,
@@ -209,10 +244,11 @@ def observe(
     shaped = air_force(state.v_quad, shape)
     support += constants.contact * ((0.0 if taut > 0.0 else rest[2]) - support)
     if taut > 0.0:
-        tension = dot(rest, q)
+        axis = column(state.R, 2)
+        tension = pulled(rest, q, axis)
         pull = vehicle.cable_length * dot(state.q_cable_dot, state.q_cable_dot) - dot(q, felt)
         rest = axpy(-tension, q, rest)
-        shaped = tangent(q, shaped)
+        shaped = axpy(-pulled(shaped, q, axis), q, shaped)
         if not lying(observed, state) and pull > 0.0:
             correlation += constants.mass * (tension * pull - correlation)
             square += constants.mass * (pull * pull - square)

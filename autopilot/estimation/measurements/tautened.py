@@ -24,6 +24,7 @@ from autopilot.geometry.linear import Vec3
 
 LYING_STD = 0.02  # m, of the height of a load that a snap may lift by millimetres
 RESTING_STD = 0.05  # m/s, of its climb
+RESTING_S = 0.3  # in which a lying load's climb is told anew: the samples of its pull are not independent
 
 
 @kernel
@@ -46,9 +47,9 @@ def _owing(a: AidEstimate, debt: Vec3) -> AidEstimate:
 
 @kernel
 def correct_tautened(
-    state: EstimatorState, history: History, before: LoadEstimate, tuning: EstimatorTuning
+    state: EstimatorState, history: History, before: LoadEstimate, tuning: EstimatorTuning, dt: float
 ) -> EstimatorState:
-    """The state after a prediction; `before` is the load as it was.
+    """The state after a prediction over dt seconds; `before` is the load as it was.
 
     The cable that comes taut tells height and climb; climb is told on while it pulls and the load still lies.
     The laws are told at once: they are about to lift the load off this ground.
@@ -64,6 +65,7 @@ def correct_tautened(
     past = look_back(state, history, tuning, 0.0)
     begin(history)
     count = 0
+    climb_var = RESTING_STD * RESTING_STD * (1.0 if tied else max(1.0, RESTING_S / dt))
     if tied:
         scalar(history, 0, before.x_load[2] - load.x_load[2], LYING_STD * LYING_STD)
         enter_load_position(history, 0, past, load.length, 2)
@@ -72,7 +74,7 @@ def correct_tautened(
             return state
         count = 1
     climb = past.v_quad[2] + load.length * past.q_cable_dot[2]
-    scalar(history, count, -climb, RESTING_STD * RESTING_STD)
+    scalar(history, count, -climb, climb_var)
     enter_load_velocity(history, count, past, load.length, 2)
     gather(history, count, count + 1, n)
     absorb(history, count + 1, n)
