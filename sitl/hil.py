@@ -18,7 +18,7 @@ from autopilot.geometry.packed import Row, packed, unpack
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.vehicle.battery import open_voltage
 from autopilot.vehicle.file import load_vehicle
-from autopilot.vehicle.layout import MOST, PLUS, Layout
+from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
@@ -43,24 +43,7 @@ from sitl.messages import (
 from sitl.parameter_server import ParameterServer
 from sitl.plant.attachment import effective_mass
 from sitl.plant.records import Truth
-from sitl.running import (
-    ARMED,
-    DIALECT_SEQUENCE,
-    GRIPPER_OPEN,
-    LENGTH,
-    NOW_US,
-    RAN,
-    SEQUENCE,
-    TICK_US,
-    TICKS,
-    TRUTH_EVERY,
-    TRUTH_SEQUENCE,
-    UNTIL_US,
-    Code,
-    Running,
-    code_of,
-    new_numbers,
-)
+from sitl.running import Room, Runner, Running, Writers
 from sitl.sensors.barometer import BarometerReading
 from sitl.sensors.chosen import with_chosen
 from sitl.sensors.files import load_profile
@@ -133,13 +116,11 @@ class HilSimulator:
         self._put_sensors: Callable[..., tuple[int, int]] | None = None
         self._put_truth: Callable[..., int] | None = None
         self._answer_in: Callable[..., Answer] | None = None
-        self._code: Code | None = None
         self._payload = np.zeros(PAYLOAD_ROOM, np.uint8)
-        self._numbers = new_numbers()  # of `Running`
-        self._run_command = np.zeros(MOST + 1)
         self._sensor_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._truth_writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
         self._dialect_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
+        self._runner = Runner(Writers(self._sensor_writer, self._truth_writer, self._dialect_writer))
         # a count of its own: it is not recorded, and the frames that are must be numbered without a gap
         self._run_writer = FrameWriter(VEHICLE_SYSTEM, DIALECT_COMPONENT)
         self._begin()
@@ -371,43 +352,31 @@ class HilSimulator:
         """With what, and until when, machine code can move the world on by itself, from this tick, whose
         sensors and truth are told; None: not from this one, which somebody has answered or has more to say.
         """
-        core, numbers = self.core, self._numbers
+        core = self.core
         now_us, tick_us = core.now_us, core.settings.tick_us
         if not self._lockstep or self._reboot or self._introduced or self.answered or self.parameters.speaks:
             return None
         until_us = min(now_us - now_us % STATUS_PERIOD_US + STATUS_PERIOD_US, core.pulse_changes_us)
         if until_us <= now_us + tick_us:
             return None
-        room = (self._newest, self._statement, self._buffer, self._payload)
-        if self._code is None:
-            self._code = code_of(core.rows, core.chain, *room)
-            if self._code is None:
-                return None
-        writer, truth, dialect = self._sensor_writer, self._truth_writer, self._dialect_writer
-        numbers[NOW_US], numbers[TICKS], numbers[TICK_US] = now_us, core.tick_count, tick_us
-        numbers[UNTIL_US], numbers[TRUTH_EVERY], numbers[RAN] = until_us, self._truth_every, 0
-        numbers[SEQUENCE], numbers[TRUTH_SEQUENCE] = writer.sequence, truth.sequence
-        numbers[DIALECT_SEQUENCE] = dialect.sequence
-        return Running(numbers, self._run_command, core.rows, core.chain, *room, self._code)
+        times = (now_us, core.tick_count, tick_us, until_us, self._truth_every)
+        room = Room(self._newest, self._statement, self._buffer, self._payload)
+        return self._runner.running(times, core.rows, core.chain, room)
 
     def ran(self, framed: bool) -> None:
         """Take over what machine code has made of `running`; `framed`: the sensors of the tick at which the
         world stands now are in the buffer and its truth is told, else both are still to be made."""
-        numbers = self._numbers
-        if numbers[RAN] == 0:
+        ran = self._runner.ran()
+        if ran is None:
             return
-        self._command_us = int(numbers[NOW_US]) - self.core.settings.tick_us
-        self.core.came_to(int(numbers[NOW_US]), int(numbers[TICKS]))
-        self._sensor_writer.sequence = int(numbers[SEQUENCE])
-        self._truth_writer.sequence = int(numbers[TRUTH_SEQUENCE])
-        self._dialect_writer.sequence = int(numbers[DIALECT_SEQUENCE])
-        forces, armed = self._run_command.tolist(), bool(numbers[ARMED])
-        self._command = tuple(forces[: len(self._layout)]) if armed else self._stopped
-        self._rotors = mavlink.PLUMBLINE_ROTORS_OBEYING if armed else mavlink.PLUMBLINE_ROTORS_DISARMED
-        self._gripper_open, self._reel_rate = bool(numbers[GRIPPER_OPEN]), forces[MOST]
+        self._command_us = ran.now_us - self.core.settings.tick_us
+        self.core.came_to(ran.now_us, ran.ticks)
+        self._command = tuple(ran.forces[: len(self._layout)]) if ran.armed else self._stopped
+        self._rotors = mavlink.PLUMBLINE_ROTORS_OBEYING if ran.armed else mavlink.PLUMBLINE_ROTORS_DISARMED
+        self._gripper_open, self._reel_rate = ran.gripper_open, ran.reel_rate
         self.answered = False
         if framed:
-            self._sensors = self._written[: numbers[LENGTH]].tobytes()
+            self._sensors = self._written[: ran.framed].tobytes()
             self._truth, self._truth_made = None, True  # it has been told
         else:
             self._sensors = self._sensor_frames()

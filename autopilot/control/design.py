@@ -48,13 +48,13 @@ from scipy.linalg import LinAlgWarning, expm, solve_discrete_lyapunov
 
 from autopilot.control.plumbline_cascade import PlumblineGains
 from autopilot.control.records import Vehicle
+from autopilot.vehicle.rotors import ROTOR_MARGIN
 
 Array = NDArray[np.float64]
 
 # what an estimator over motion capture leaves, white from tick to tick, of e_i, x_L, v_L, q, q', theta, Omega
 NOISE = (0.0, 0.0005, 0.003, 0.0007, 0.008, 0.002, 0.005)
 SIGMAS, SIGMAS_RESERVED = 3.0, 1.5
-RESERVED = 0.15  # of a rotor's range, that paths leave to control as delivered: MIS_ROTOR_MARG
 # of omega_R, rad/s, within which the greatest is looked for
 _SLOWEST, _FASTEST = 0.5, 200.0
 _LEAST_LAG = 1e-4  # s; rotors without lag are taken for so fast ones
@@ -215,7 +215,7 @@ def design(wanted: Wanted, timing: Timing, vehicle: Vehicle) -> Design:
     """The fastest gains that keep what is wanted; the slowest looked at where none does."""
     hover = (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity / vehicle.lift
     room = min(vehicle.rotor_max - hover, hover - vehicle.rotor_min)
-    reserved = RESERVED * (vehicle.rotor_max - vehicle.rotor_min)
+    reserved = ROTOR_MARGIN * (vehicle.rotor_max - vehicle.rotor_min)
     greatest = min(room / SIGMAS, reserved / SIGMAS_RESERVED)
 
     def bandwidths(omega_R: float) -> tuple[float, float, float, float]:

@@ -123,7 +123,6 @@ class FlightCore:
         self._seat: Seat | None = None
         self._fly: Callable[..., int] | None = None  # the tick's machine code, once it was run
         self._law: Any = None  # `law`, once it was asked for
-        self._address: int | None = None  # the same of `address`
         self.laid: LaidOut | None = None  # what `rows.targets` are the setpoints of
         pilot = Pilot(NO_COMMAND, STOPPED, 1.0, 0.0, ZERO, nominal(setup.vehicle), RESTING, 0, False)
         self.rows = CoreRows(
@@ -289,14 +288,11 @@ class FlightCore:
         """Whether the next tick needs nothing of Python unless the supervisor is to decide."""
         return self._host is None and self._seat is None and not self._dirty and not self.reels
 
-    @property
-    def address(self) -> int:
-        """Where the machine code of `fly_tick` is; 0 where nothing is compiled."""
-        if self._address is None:
-            arguments = (self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
-            compiled = hasattr(fly_tick, "overloads")
-            self._address = native_address_of(fly_tick, *arguments) if compiled else 0
-        return self._address
+    def address_of_tick(self) -> int:
+        """The address of `fly_tick`, compiled or loaded where need be; 0 where nothing is compiled."""
+        if not hasattr(fly_tick, "overloads"):
+            return 0
+        return native_address_of(fly_tick, self.rows, any_law(self.law_rows), 0, 0, 0, 0.0, False)
 
     def raise_interruption(self) -> None:
         """Raise what has interrupted law or estimator amid the tick and is not its fault, as Ctrl-C."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from autopilot.control.drag import GUSTY
 from autopilot.estimation.covariance import kept
 from autopilot.estimation.records import AirEstimate, EstimatorTuning, LoadEstimate
 from autopilot.geometry.kernel import kernel
@@ -16,9 +17,6 @@ from autopilot.geometry.linear import Vec3, dot
 
 DRAG_TIME_S = 0.15  # for which a change of drag goes on
 LEARNING_S = 4.0
-# 1/sqrt(s): gusts are a fifth of the wind and last for 2 s, and the drag, c u^2, changes by 2 c u times
-# theirs, that is by 2 * 0.2 * sqrt(2 / 2 s) of what the wind does to the load
-GUSTY = 0.4
 # drag is learned by motion faster than this, m/s, and is at most so much, 1/s
 SLOW, GREATEST_DRAG = 0.2, 2.0
 

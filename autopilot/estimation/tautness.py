@@ -25,8 +25,8 @@ from autopilot.estimation.records import (
     VehicleEstimate,
 )
 from autopilot.geometry.kernel import kernel
-from autopilot.geometry.linear import Vec3, axpy, column, cross, dot, norm, sub
-from autopilot.geometry.s2 import normalise, tangent
+from autopilot.geometry.linear import Vec3, axpy, column, cross, norm, sub
+from autopilot.geometry.s2 import normalise, pull_of, tangent
 from autopilot.geometry.so3 import rotation_from_quat
 
 TAUT_ABOVE = 0.985  # share of the cable length at which a tracked load's slack cable counts as taut
@@ -37,7 +37,6 @@ SPEED_KNOWN, KNOWN_S = 0.2, 1.0
 PULL_TAUT, PULL_SLACK = 0.8, 0.2  # share of the load's weight that must be felt, and that is too little
 PULL_TAUT_S, PULL_SLACK_S = 0.2, 0.15  # for how long
 PULL_DISTANCE = 0.75  # share of the cable length below which no pull is believed
-LEAST_ALONG = 0.5  # of the pull, along the rotors' axis: a cable that slants more is taken for this slant
 PULL_TIME_S = 0.04  # in which the felt pull is smoothed
 # For so long after the cable came taut a load that pulls less than this share of a hanging one's is taken as
 # lying: pendulum and length then mean little.
@@ -74,7 +73,7 @@ def felt_pull(
     across that the air drags at rotors and frame, with as much as the load weighs."""
     axis = column(rotation_from_quat(vehicle.quat_wxyz), 2)
     left = mass * (imu.accel[2] - vehicle.accel_bias[2]) - thrust
-    return left / min(dot(load.q_cable, axis), -LEAST_ALONG)
+    return pull_of(left, load.q_cable, axis)
 
 
 @kernel

@@ -7,6 +7,8 @@ from math import sqrt
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, add, axpy, cross, dot, norm, scale, sub
 
+_LEAST_ALONG = 0.5  # of a pull, along the axis: a cable that slants more is taken for this slant
+
 
 @kernel
 def normalise(v: Vec3) -> Vec3:
@@ -18,6 +20,12 @@ def normalise(v: Vec3) -> Vec3:
 def tangent(q_cable: Vec3, v: Vec3) -> Vec3:
     """The part of v that is orthogonal to q_cable: projection on the tangent plane (2-10)."""
     return axpy(-dot(q_cable, v), q_cable, v)
+
+
+@kernel
+def pull_of(felt: float, q_cable: Vec3, axis: Vec3) -> float:
+    """The force along q_cable of which so much is felt along an axis that points away from the cable."""
+    return felt / min(dot(q_cable, axis), -_LEAST_ALONG)
 
 
 @kernel

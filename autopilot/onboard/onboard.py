@@ -327,10 +327,7 @@ class Onboard:
         """One tick of the flight software; the answer to it."""
         now_us = tick.now_us
         period_us = now_us - self.now_us if self.tick >= 0 else 0
-        self.tick += 1
-        self.now_us = now_us
-        if tick.fixed:
-            self._moments.fixed = True
+        self._begin_tick(tick)
         for message in tick.aside:
             self._hear_simulator(message)
         if not self._world_told and self._world.settled(tick.now_us):
@@ -357,13 +354,18 @@ class Onboard:
     def complete(self, tick: Tick) -> bytes:
         """The answer to a tick that machine code has begun, and that is to be decided upon."""
         dt = (tick.now_us - self.now_us) * 1e-6
-        self.tick += 1
-        self.now_us, self.out_of_time = tick.now_us, 0
-        if tick.fixed:
-            self._moments.fixed = True
+        self._begin_tick(tick)
+        self.out_of_time = 0
         report = self.core.complete(tick.readings, tick.now_us, self.tick, dt)
         self._answer = self._end_tick(tick, dt, report)
         return self._answer
+
+    def _begin_tick(self, tick: Tick) -> None:
+        """It is this tick from now on."""
+        self.tick += 1
+        self.now_us = tick.now_us
+        if tick.fixed:
+            self._moments.fixed = True
 
     def _end_tick(self, tick: Tick, dt: float, report: Report) -> bytes:
         """What comes behind a tick of the flight software; the answer to it."""

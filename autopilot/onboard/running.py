@@ -274,7 +274,7 @@ class Runner:
 
     def _addresses(self, known: Standing) -> Code | None:
         moments = self._moments
-        fly_tick = moments.core.address
+        fly_tick = moments.core.address_of_tick()
         if fly_tick == 0:
             return None
         return Code(

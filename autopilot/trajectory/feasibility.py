@@ -35,13 +35,12 @@ from autopilot.trajectory.signals import evaluate, joints, signal_table
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import Passage, passage_jets
 from autopilot.vehicle.model import Vehicle
-from autopilot.vehicle.rotors import columns
+from autopilot.vehicle.rotors import ROTOR_MARGIN, columns
 from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint, Winch
 
 __all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
 
-ROTOR_MARGIN = 0.15  # MIS_ROTOR_MARG, MIS_TENSION and MIS_SHAPE_ERR as delivered
-LEAST_TENSION = 0.3
+LEAST_TENSION = 0.3  # MIS_TENSION and MIS_SHAPE_ERR as delivered
 SHAPING_M = 0.05
 LEAST_HEIGHT_M = 0.3  # above home, at which a load is carried
 _REPORT_SAMPLES = 4001

@@ -14,6 +14,7 @@ from autopilot.vehicle.layout import Layout
 # columns of a mixer's table, one row a rotor: what each does by (2-13), and the columns of the inverse;
 # its last row: what the columns for thrust, roll and pitch do to yaw
 STRENGTH, ROLL, PITCH, YAW, LIFT_BY, ROLL_BY, PITCH_BY, YAW_BY = range(8)
+ROTOR_MARGIN = 0.15  # of a rotor's range, that paths leave to control: MIS_ROTOR_MARG as delivered
 _LEAST = 1e-9  # a number of the table below this is rounding
 _SHARES = tuple(0.1 * i for i in range(1, 10))  # of the greatest thrust, that are tried
 _LEAST_SHARE = 1e-3  # of a rotor's force: less authority is none

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from autopilot.shell.options import WholeNumber
-from gcs.commands.options import OUTPUT_FILE, OUTPUT_FOLDER, json_option, print_json
+from gcs.commands.options import OUTPUT_FILE, OUTPUT_FOLDER, fresh_option, json_option, print_json
 from gcs.shell.display import say
 
 
@@ -24,13 +24,7 @@ def experiments_command() -> None:
     show_default=True,
     help="Where flights, tables and figures go.",
 )
-@click.option(
-    "--fresh",
-    "--overwrite",
-    "fresh",
-    is_flag=True,
-    help="Fly everything anew, also what has been flown already: what --out holds is lost.",
-)
+@fresh_option
 @click.option(
     "--jobs",
     type=WholeNumber(min=1),

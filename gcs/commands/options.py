@@ -273,6 +273,12 @@ def require_options(function: F) -> F:
     return require(junit(function))
 
 
+def fresh_option(function: F) -> F:
+    """--fresh of what goes on where it was stopped; --overwrite as of the others."""
+    text = "Fly everything anew, also what has been flown already: what --out holds is lost."
+    return click.option("--fresh", "--overwrite", "fresh", is_flag=True, help=text)(function)
+
+
 def json_option(function: F) -> F:
     """--json of every command with a result."""
     return click.option("--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else.")(

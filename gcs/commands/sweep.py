@@ -15,6 +15,7 @@ from gcs.commands.options import (
     OUTPUT_FOLDER,
     LawType,
     SettingType,
+    fresh_option,
     json_option,
     law_help,
     own_options,
@@ -81,13 +82,7 @@ from gcs.shell.display import say
     help="Fly the flights that stand out again, each with a report: of each law the worst, the median and "
     "the first that was lost.",
 )
-@click.option(
-    "--fresh",
-    "--overwrite",
-    "fresh",
-    is_flag=True,
-    help="Fly everything anew, also what has been flown already: what --out holds is lost.",
-)
+@fresh_option
 @require_options
 @json_option
 @click.option("--quiet", is_flag=True, help="No progress.")

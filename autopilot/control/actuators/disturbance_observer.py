@@ -42,11 +42,12 @@ from autopilot.control.actuators.torque_observer import (
     torque_constants,
     unheeded,
 )
-from autopilot.control.drag import Drag, air_force
+from autopilot.control.drag import GUSTY, Drag, air_force
 from autopilot.control.records import State, Vehicle
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3, axpy, column, dot, norm, scale, sub
 from autopilot.geometry.packed import with_field
+from autopilot.geometry.s2 import pull_of
 
 # m: so much higher than where it stood or lay is in the air
 _OFF_GROUND = 0.03
@@ -62,12 +63,8 @@ _DRAG_SPEED, _GREATEST_FACTOR = 0.2, 50.0
 _ASSUMED_SHAPE = 0.05
 # m/s^2, deviation of a sample of the accelerometer up to which the push is learned as told, in still air
 _QUIET = 0.06
-# 1/sqrt(s), change of a wind's push in gusts, of a fifth of the wind and 2 s, over the push
-_GUSTY = 0.4
 # of the weight, a push that may as well be what noise makes of none
 _BREEZE = 0.03
-# of a pull, along the rotors' axis: a cable that slants more is taken for this slant
-_LEAST_ALONG = 0.5
 # of the nominal mass of the load
 _LEAST_MASS = 0.25
 _GREATEST_MASS = 4.0
@@ -136,7 +133,7 @@ def observer_constants(
         share(drag_time),
         share(_CONTACT_TIME),
         share(_AIR_TIME),
-        _GUSTY * push_time / (sqrt(period) * vehicle.quad_mass),
+        GUSTY * push_time / (sqrt(period) * vehicle.quad_mass),
         _BREEZE * (vehicle.quad_mass + vehicle.load_mass) * vehicle.gravity,
         greatest_push,
         drag if believed else Drag(_ASSUMED_SHAPE * vehicle.quad_mass, 0.0),
@@ -212,7 +209,7 @@ def loaded(vehicle: Vehicle, load_mass: float) -> Vehicle:
 @kernel
 def pulled(force: Vec3, q: Vec3, axis: Vec3) -> float:
     """What of a force on the vehicle is the cable's, N along q; the rest acts across the rotors' axis."""
-    return dot(force, axis) / min(dot(q, axis), -_LEAST_ALONG)
+    return pull_of(dot(force, axis), q, axis)
 
 
 @kernel
