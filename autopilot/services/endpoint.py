@@ -95,8 +95,8 @@ from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.signing import Signing
 
 LINK_SILENCE_US = 30_000_000  # after this a link that was not configured is forgotten
-REACHED_AGAIN = 4  # times that the end of a mission is said again
-REACHED_US = 300_000  # between two of them
+REACHED_AGAIN = 10  # times that the end of a mission is said again, as PX4 does
+REACHED_US = 1_000_000  # between two of them
 PATIENCE = 64  # bytes of a datagram that may be part of no message, before the rest of it is passed over
 MAX_LINKS = 16  # links that were not configured; the one silent longest makes room
 MAKING_ROOM_US = 20_000  # for another not more often: a new link costs as much as ten messages
@@ -310,7 +310,8 @@ class VehicleEndpoint:
     def item_reached(self, seq: int, last: bool = False) -> None:
         """The mission came to the end of an item.
 
-        Of the last one this is said a few times: some clients learn by nothing else that a mission is over.
+        Of the last one this is said for ten seconds: MAVSDK learns by nothing else that a mission is over,
+        and forgets it where it hears no heartbeat for three.
         """
         self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(seq))], [])
         self._reached, self._reached_us = seq, None
@@ -369,7 +370,7 @@ class VehicleEndpoint:
                     outputs = self._faults.told(type(service).__name__, service_us)
                 self._do(outputs, self._events)
             self._follow_up(self._events)
-            self._say_reached_again(now_us)
+            self._say_reached_again(make_snapshot, now_us)
             self._work, self._stirred = False, True
         due: list[tuple[Link, LinkState, tuple[int, ...]]] = []
         streams, next_us = False, self._timer_us
@@ -458,12 +459,15 @@ class VehicleEndpoint:
         self._timer_us = self._next_timer()
         self._next_us = min(self._timer_us, self._next_stream())
 
-    def _say_reached_again(self, now_us: int) -> None:
+    def _say_reached_again(self, make_snapshot: SnapshotFactory, now_us: int) -> None:
         if not self._reached_left:
             return
         if self._reached_us is None:
             self._reached_us = now_us + REACHED_US
         elif now_us >= self._reached_us:
+            if self._look(make_snapshot).mission_state != mavlink.MISSION_STATE_COMPLETE:
+                self._reached_left = 0  # begun again, or another one
+                return
             self._do([Send(None, mavlink.MAVLink_mission_item_reached_message(self._reached))], [])
             self._reached_left, self._reached_us = self._reached_left - 1, now_us + REACHED_US
 

@@ -406,11 +406,25 @@ def test_mission_current_goes_out_when_it_changes(rig):
         assert got == [seq]
 
 
+def _told_as_reached(rig, duration_us):
+    return [r.message.seq for r in rig.run(duration_us) if r.message.get_type() == "MISSION_ITEM_REACHED"]
+
+
 def test_the_end_of_a_mission_is_said_again(rig):
     rig.endpoint.item_reached(3)
     rig.endpoint.item_reached(4, last=True)
-    told = [r.message.seq for r in rig.run(20 * REACHED_US) if r.message.get_type() == "MISSION_ITEM_REACHED"]
-    assert told == [3, 4] + [4] * REACHED_AGAIN
+    rig.changes = {"mission_state": m.MISSION_STATE_COMPLETE}
+    assert _told_as_reached(rig, 20 * REACHED_US) == [3, 4] + [4] * REACHED_AGAIN
+
+
+def test_the_end_of_a_mission_is_not_said_of_the_next_one(rig):
+    rig.endpoint.item_reached(4, last=True)
+    rig.changes = {"mission_state": m.MISSION_STATE_COMPLETE}
+    assert _told_as_reached(rig, 2 * REACHED_US) == [4, 4]
+    rig.changes = {"mission_state": m.MISSION_STATE_ACTIVE}
+    assert _told_as_reached(rig, 2 * REACHED_US) == []
+    rig.changes = {"mission_state": m.MISSION_STATE_COMPLETE}
+    assert _told_as_reached(rig, 2 * REACHED_US) == []
 
 
 def test_reached_items_are_told_to_all(rig):
