@@ -7,6 +7,7 @@ heads and constants are there already.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from math import isfinite, isinf, nan
 from typing import Any, get_type_hints
 
@@ -30,9 +31,18 @@ _SENSED = next(i for i, (topic, _) in enumerate(FAST) if topic.name == "sensor_c
 _FLOAT, _DOUBLE = -4, -8  # kinds of numbers; integers: their bytes
 
 
+@cache
+def _places(record: Any) -> dict[str, range]:
+    """Which numbers of a packed record each field is."""
+    hints, places, begin = get_type_hints(record), {}, 0
+    for name in record._fields:
+        places[name] = range(begin, begin + width(hints[name]))
+        begin = places[name].stop
+    return places
+
+
 def _place(record: Any, name: str) -> int:
-    hints = get_type_hints(record)
-    return sum(width(hints[one]) for one in record._fields[: record._fields.index(name)])
+    return _places(record)[name].start
 
 
 # the row that is copied from: an `Instant`, a `Derived`, the time
@@ -114,8 +124,9 @@ def put_sample(
 def _sources(column: Column) -> list[tuple[int, int]]:
     """(place in the row, sign) of each number of a column."""
     record, first = (Instant, 0) if column.name in Instant._fields else (Derived, _DERIVED)
-    first += _place(record, column.name)
-    places = range(1, 1 + width(get_type_hints(record)[column.name]))
+    place = _places(record)[column.name]
+    first += place.start
+    places = range(1, 1 + len(place))
     # what the axes do to three numbers shows which goes where, and with which sign
     turned = column.axes(tuple(map(float, places))) if column.axes else places
     return [(first + abs(int(one)) - 1, 1 if one > 0 else -1) for one in turned] * column.times
