@@ -174,17 +174,18 @@ class Follow:
     def jet(self, t: float) -> Jet:
         """Position and derivatives 1 ... 6, ENU, `t` seconds into the leg."""
         t = max(t, 0.0)
-        fade = exp(-self.rate * t)
-        powers = [t**k / _FACTORIAL[k] for k in range(ORDER)]
+        w, fade = self.rate, exp(-self.rate * t)
+        p0, p1, p2, p3, p4, p5, p6 = [t**k / _FACTORIAL[k] for k in range(ORDER)]
         steady = self._steady(t)
         columns = []
         for axis in range(3):
-            c = list(self._weights[axis])
+            c0, c1, c2, c3, c4, c5, c6 = self._weights[axis]
             column = []
             for n in range(ORDER):
-                gone = fade * sum(a * b for a, b in zip(c, powers, strict=True))
-                column.append(gone + (steady[n][axis] if n < 3 else 0.0))
-                c = [(c[k + 1] if k + 1 < ORDER else 0.0) - self.rate * c[k] for k in range(ORDER)]
+                left = 0.0 + c0 * p0 + c1 * p1 + c2 * p2 + c3 * p3 + c4 * p4 + c5 * p5 + c6 * p6
+                column.append(fade * left + (steady[n][axis] if n < 3 else 0.0))
+                c0, c1, c2, c3 = c1 - w * c0, c2 - w * c1, c3 - w * c2, c4 - w * c3
+                c4, c5, c6 = c5 - w * c4, c6 - w * c5, 0.0 - w * c6
             columns.append(column)
         x, y, z = columns
         rows = [(x[n], y[n], z[n]) for n in range(ORDER)]
