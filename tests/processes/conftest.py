@@ -12,6 +12,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner, Result
+
+from gcs.cli import gcs as command_line
 
 END_S = 10.0
 
@@ -71,8 +74,21 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
 
 
 @pytest.fixture
+def command() -> Callable[..., Result]:
+    """Give a command to a vehicle that runs, in this process: command("arm", "--connect", "14550").
+
+    What `gcs` loads for that is then loaded once for all of them.
+    """
+
+    def run(*arguments: str) -> Result:
+        return CliRunner().invoke(command_line, arguments, prog_name="gcs", env={"COLUMNS": "200"})
+
+    return run
+
+
+@pytest.fixture
 def gcs(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run a gcs command to its end: gcs("fly", "hover")."""
+    """Run a gcs command to its end, in a process of its own: gcs("fly", "hover")."""
 
     def run(*arguments: str, file_bytes: int = resource.RLIM_INFINITY) -> subprocess.CompletedProcess[str]:
         """`file_bytes`: no file may grow larger, as on a disk that is full."""

@@ -18,11 +18,12 @@ from gcs.shell.session import Session
 from gcs.workflows.status import status_record
 
 if TYPE_CHECKING:
+    from click.testing import Result
     from conftest import Program
 
 pytestmark = pytest.mark.processes
 Start = Callable[..., "Program"]
-Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
+Command = Callable[..., "Result"]
 TRIES = 60  # to arm on a busy machine
 LONG_S = 240.0
 TOLD = (
@@ -39,8 +40,8 @@ QUICK = ("--speed", "4")
 class Flight:
     """A vehicle that is flown as a user flies it; its programs can be stopped and started again."""
 
-    def __init__(self, start: Start, gcs: Gcs, storage: Path, *options: str) -> None:
-        self._start, self._gcs, self._storage, self._options = start, gcs, storage, options
+    def __init__(self, start: Start, command: Command, storage: Path, *options: str) -> None:
+        self._start, self._command, self._storage, self._options = start, command, storage, options
         self._sim, self._truth, self.ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
         self.sitl = self.begin_sitl()
         self.autopilot = self.begin_autopilot()
@@ -55,8 +56,8 @@ class Flight:
         return program
 
     def do(self, *command: str) -> str:
-        done = self._gcs(*command, "--connect", self.ground)
-        assert done.returncode == 0, f"{command}: {done.stderr}"
+        done = self._command(*command, "--connect", self.ground)
+        assert done.exit_code == 0, f"{command}: {done.stderr} {done.exception!r}"
         return done.stdout
 
     def status(self) -> Any:
@@ -78,7 +79,7 @@ class Flight:
         """In real time a machine that is busy at this moment refuses to arm."""
         self.do("takeoff", "2")
         for _ in range(TRIES):
-            if self._gcs("arm", "--connect", self.ground).returncode == 0:
+            if self._command("arm", "--connect", self.ground).exit_code == 0:
                 break
         self.until(lambda status: status["load_up_m"] > 0.5)
 
@@ -89,8 +90,8 @@ class Flight:
 
 
 @pytest.fixture
-def fly(start: Start, gcs: Gcs, tmp_path: Path) -> Callable[..., Flight]:
-    return lambda *options: Flight(start, gcs, tmp_path / "storage", *options)
+def fly(start: Start, command: Command, tmp_path: Path) -> Callable[..., Flight]:
+    return lambda *options: Flight(start, command, tmp_path / "storage", *options)
 
 
 @pytest.mark.parametrize("options", [QUICK, ("--lockstep", *QUICK)])
@@ -160,19 +161,19 @@ def test_an_autopilot_that_stood_still_in_real_time_gives_the_flight_up(fly: Cal
 
 
 def test_a_vehicle_whose_simulator_is_silent_refuses_what_is_to_be_flown(
-    fly: Callable[..., Flight], gcs: Gcs
+    fly: Callable[..., Flight], command: Command
 ) -> None:
     flight = fly(*QUICK)
     flight.sitl.process.send_signal(signal.SIGSTOP)
     flight.autopilot.says(b"no word from the simulator")
-    for command in ("arm", "land", "start"):
-        refused = gcs(command, "--connect", flight.ground)
-        assert refused.returncode == 1, command
+    for asked in ("arm", "land", "start"):
+        refused = command(asked, "--connect", flight.ground)
+        assert refused.exit_code == 1, asked
         assert "simulator is silent" in refused.stderr
-    told = gcs("status", "--connect", flight.ground).stdout
+    told = command("status", "--connect", flight.ground).stdout
     assert re.search(r"state +critical", told)
     assert "Simulator silent: time stands still" in told
-    assert "Simulator silent: time stands still" in gcs("texts", "--connect", flight.ground).stdout
+    assert "Simulator silent: time stands still" in command("texts", "--connect", flight.ground).stdout
     flight.sitl.process.send_signal(signal.SIGCONT)
     flight.autopilot.says(b"flying with the simulator at .*\n(.*\n)*.*flying with the simulator at ")
     flight.take_off()

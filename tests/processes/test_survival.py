@@ -17,14 +17,17 @@ import pytest
 from gcs.shell.link import LOOPBACK, free_port
 
 if TYPE_CHECKING:
+    from click.testing import Result
     from conftest import Program
 
 pytestmark = pytest.mark.processes
 Start = Callable[..., "Program"]
-Gcs = Callable[..., "subprocess.CompletedProcess[str]"]
+Command = Callable[..., "Result"]
 
 
-def test_mission_and_parameters_outlive_a_killed_autopilot(start: Start, gcs: Gcs, tmp_path: Path) -> None:
+def test_mission_and_parameters_outlive_a_killed_autopilot(
+    start: Start, command: Command, tmp_path: Path
+) -> None:
     """As by kill -9 in the middle of a mission."""
     sim, truth, ground = (f"{LOOPBACK}:{free_port()}" for _ in range(3))
     storage = str(tmp_path / "storage")
@@ -37,25 +40,25 @@ def test_mission_and_parameters_outlive_a_killed_autopilot(start: Start, gcs: Gc
     start("sitl", "--listen", sim, "--truth", truth, "--sensors", "ideal")
     first = autopilot()
     connect = ("--connect", ground)
-    for command in (
+    for asked in (
         ("upload", "square"),
         ("param", "set", "NGC_KX", "6.5"),
         ("start",),
         ("arm",),
     ):
-        done = gcs(*command, *connect)
-        assert done.returncode == 0, f"{command}: {done.stderr}"
-    uploaded = gcs("download", "--json", *connect).stdout
-    status = json.loads(gcs("status", "--json", *connect).stdout)
+        done = command(*asked, *connect)
+        assert done.exit_code == 0, f"{asked}: {done.stderr} {done.exception!r}"
+    uploaded = command("download", "--json", *connect).stdout
+    status = json.loads(command("status", "--json", *connect).stdout)
     assert status["armed"] is True
     first.kill()
 
     autopilot()
-    value = gcs("param", "get", "NGC_KX", *connect)
-    assert value.returncode == 0, value.stderr
+    value = command("param", "get", "NGC_KX", *connect)
+    assert value.exit_code == 0, value.stderr
     assert "6.5" in value.stdout
-    downloaded = gcs("download", "--json", *connect)
-    assert downloaded.returncode == 0, downloaded.stderr
+    downloaded = command("download", "--json", *connect)
+    assert downloaded.exit_code == 0, downloaded.stderr
     assert json.loads(downloaded.stdout) == json.loads(uploaded)
 
 
