@@ -130,13 +130,14 @@ def _take_squares_of_lanes(array: Array, of: Array, count: int, n: int) -> None:
 def _put_square(array: Array, i: int, j: int, square: Any) -> None:
     """Write what is at [i, j] and to the right, below and beside it; and mirror it."""
     p, q, r, s = square
+    # on the diagonal what is above it comes last, and stays
+    put_wide(array, i + 1, j, r)
+    put_wide(array, j, i + 1, r)
     put_wide(array, i, j, p)
     put_wide(array, i, j + 1, q)
-    put_wide(array, i + 1, j, r)
     put_wide(array, i + 1, j + 1, s)
     put_wide(array, j, i, p)
     put_wide(array, j + 1, i, q)
-    put_wide(array, j, i + 1, r)
     put_wide(array, j + 1, i + 1, s)
 
 

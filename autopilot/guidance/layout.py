@@ -20,7 +20,7 @@ from autopilot.trajectory.waypoint_path import evaluate_path
 
 Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives
-_KEPT, _WORTH = 8, 500  # evaluated signals that are kept, of at least so many times: what a sweep lays out
+_KEPT, _WORTH = 3, 500  # evaluated signals that are kept, of at least so many times: what a sweep lays out
 
 
 @kernel
@@ -66,7 +66,9 @@ _evaluated: deque[_Evaluated] = deque(maxlen=_KEPT)  # the last ones
 
 
 def _signals(path: Shaped, times_s: Floats, asked: bool) -> Floats:
-    """(n, 21) the signals of a path at n times. Flights of a sweep fly the same ones, from other places."""
+    """(n, 21) the signals of a path at n times. A sweep wants them as flown and as asked: where these are the
+    same they are evaluated once."""
+    asked = asked or not len(path.pieces)
     for one in _evaluated:
         if one.path is path and one.asked == asked and np.array_equal(one.times_s, times_s):
             return one.found
@@ -93,13 +95,14 @@ def _passes(
 def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
     """(n, 21) `leg.jet` (or `asked_jet`) at each of the n times (s into the leg): in machine code for the
     kinds that last."""
-    found = np.zeros((len(times_s), COLUMNS))
     # by the very type: a leg of another type may mean something else
+    if type(leg) is Run:
+        found = _signals(leg.path, times_s, asked).copy()
+        found[:, :3] += leg.anchor
+        return found
+    found = np.zeros((len(times_s), COLUMNS))
     if type(leg) is Transfer:
         _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
-    elif type(leg) is Run:
-        found[:] = _signals(leg.path, times_s, asked)
-        found[:, :3] = leg.anchor + found[:, :3]
     elif type(leg) is Pass:
         _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
     elif type(leg) is Hold:

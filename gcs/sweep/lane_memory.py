@@ -195,19 +195,21 @@ def _copy_in(
     ring: Floats,
     rows: Indices,
 ) -> None:
-    """Copy flights into lanes: of the ring these rows."""
-    for lane in range(LANES):
-        block = own[members[lane]]
-        for i in range(at.covariance):
-            lanes[i, lane] = block[i]
-        for i in range(at.behind, at.end):
-            lanes[i, lane] = block[i]
-        for i in range(ROOM):
-            for j in range(ROOM):
-                covariance[i, j, lane] = block[at.covariance + ROOM * i + j]
-        for k in range(rows.shape[0]):
-            for j in range(RING_COLUMNS):
-                ring[rows[k], j, lane] = block[at.ring + RING_COLUMNS * rows[k] + j]
+    """Copy flights into lanes, number by number: of the ring these rows."""
+    for i in range(at.covariance):
+        for lane in range(LANES):
+            lanes[i, lane] = own[members[lane], i]
+    for i in range(at.behind, at.end):
+        for lane in range(LANES):
+            lanes[i, lane] = own[members[lane], i]
+    for i in range(ROOM):
+        for j in range(ROOM):
+            for lane in range(LANES):
+                covariance[i, j, lane] = own[members[lane], at.covariance + ROOM * i + j]
+    for row in rows:
+        for j in range(RING_COLUMNS):
+            for lane in range(LANES):
+                ring[row, j, lane] = own[members[lane], at.ring + RING_COLUMNS * row + j]
 
 
 @kernel
@@ -222,18 +224,21 @@ def _copy_out(
     rows: Indices,
 ) -> None:
     """Copy these lanes back into the blocks of the flights that lie there."""
-    for k in range(members.shape[0]):
-        block, lane = own[members[k]], taken_from[k]
-        for i in range(at.covariance):
-            block[i] = lanes[i, lane]
-        for i in range(at.behind, at.end):
-            block[i] = lanes[i, lane]
-        for i in range(ROOM):
-            for j in range(ROOM):
-                block[at.covariance + ROOM * i + j] = covariance[i, j, lane]
-        for row in rows:
-            for j in range(RING_COLUMNS):
-                block[at.ring + RING_COLUMNS * row + j] = ring[row, j, lane]
+    count = members.shape[0]
+    for i in range(at.covariance):
+        for k in range(count):
+            own[members[k], i] = lanes[i, taken_from[k]]
+    for i in range(at.behind, at.end):
+        for k in range(count):
+            own[members[k], i] = lanes[i, taken_from[k]]
+    for i in range(ROOM):
+        for j in range(ROOM):
+            for k in range(count):
+                own[members[k], at.covariance + ROOM * i + j] = covariance[i, j, taken_from[k]]
+    for row in rows:
+        for j in range(RING_COLUMNS):
+            for k in range(count):
+                own[members[k], at.ring + RING_COLUMNS * row + j] = ring[row, j, taken_from[k]]
 
 
 def _view(block: Floats, array: NDArray[Any]) -> NDArray[Any]:
