@@ -36,7 +36,16 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Mat3, Vec3, apply_transposed, cross, dot, scale
-from autopilot.geometry.wide import columns_at_once, mirror_block, put_wide, transpose_blocks, wide_at
+from autopilot.geometry.wide import columns_at_once, put_wide, turned, wide_at
+from autopilot.geometry.wide_rows import (
+    combine,
+    symmetrise,
+    take_row,
+    take_rows,
+    take_squares,
+    transpose,
+    weigh,
+)
 
 
 class Transit(NamedTuple):
@@ -169,16 +178,14 @@ def kept(std: float, walk: float, dt: float) -> float:
 @kernel
 def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n: int) -> None:
     """The covariance dt seconds on, in place, with the noise of one sample."""
-    P = history.covariance
-    step = columns_at_once(P)
+    before = history.covariance
     forget = dt / tuning.gnss_time
     keep = 1.0 - forget * to.reversion
     first, second = _cable_drive(to, dt, 0), _cable_drive(to, dt, 1)
-    _move_rows(P, to, first, second, dt, n, 0)
-    _forget_slow(P, keep, tuning, dt, n)
-    for i in range(0, n, step):
-        for j in range(i, n, step):
-            transpose_blocks(P, i, j)
+    _move_rows(before, to, first, second, dt, n, 0)
+    _forget_slow(before, keep, tuning, dt, n)
+    transpose(before, n)
+    P = turned(before)
     # what lies below the diagonal is written over in the end
     _move_rows(P, to, first, second, dt, n, DIRECTION)
     _forget_slow(P, keep, tuning, dt, n)
@@ -214,15 +221,6 @@ def transit(history: History, to: Transit, tuning: EstimatorTuning, dt: float, n
         P[GNSS + 1, GNSS + 1] += 2.0 * forget * level * level
         P[GNSS + 2, GNSS + 2] += 2.0 * forget * climb * climb
     symmetrise(P, n)
-
-
-@kernel
-def symmetrise(P: Array, n: int) -> None:
-    """Write what lies above the diagonal to below it."""
-    step = columns_at_once(P)
-    for i in range(0, n, step):
-        for j in range(i, n, step):
-            mirror_block(P, i, j)
 
 
 @kernel
@@ -266,16 +264,8 @@ def enter(history: History, k: int, column: int, share: float) -> None:
 @kernel
 def gather(history: History, first: int, last: int, n: int) -> None:
     """The rows of H P of the scalars from `first` to before `last`."""
-    P, gain, columns, shares = history.covariance, history.gain, history.columns, history.shares
-    step = columns_at_once(P)
     for k in range(first, last):
-        share, row = shares[k, 1], columns[k, 1]
-        for j in range(0, n, step):
-            put_wide(gain, k, j, share * wide_at(P, row, j))
-        for entry in range(2, columns[k, 0] + 1):
-            share, row = shares[k, entry], columns[k, entry]
-            for j in range(0, n, step):
-                put_wide(gain, k, j, wide_at(gain, k, j) + share * wide_at(P, row, j))
+        combine(history.gain, k, history.covariance, history.columns, history.shares, n)
 
 
 @kernel
@@ -304,38 +294,51 @@ def absorb(history: History, count: int, n: int) -> float:
 
     Returns the sum of their innovations squared over their variances, each given those before it.
     """
-    gain, error, scalars = history.gain, history.error, history.scalars
-    step = columns_at_once(gain)
+    gain, scalars = history.gain, history.scalars
+    lanes = columns_at_once(gain) == 1
+    nis = _alone_in_lanes(history, count, n) if lanes else _alone(history, count, n)
+    weigh(history.error, gain, scalars, count, n)
+    whole = count + -count % 3
+    for k in range(count, whole):
+        _clear(gain, k)
+    take_squares(history.covariance, gain, whole, n)
+    return nis
+
+
+@kernel
+def _alone(history: History, count: int, n: int) -> float:
+    """What is left of each scalar given those before it: its row; in place of innovation and variance, by
+    what its row is multiplied to move the state, and to have the root of what P loses. Returns the sum of
+    their squared innovations over their variances."""
+    gain, scalars = history.gain, history.scalars
     nis = 0.0
     for k in range(count):
-        # what is left of scalar k: its row and its innovation given the scalars before it
         s = 1.0 / (shared(history, k, k) + scalars[k, VARIANCE])
         off = scalars[k, INNOVATION]
         for m in range(k + 1, count):
             share = shared(history, m, k) * s
             scalars[m, INNOVATION] -= share * off
-            for j in range(0, n, step):
-                put_wide(gain, m, j, wide_at(gain, m, j) - share * wide_at(gain, k, j))
+            take_row(gain, m, share, k, n)
         nis += off * off * s
-        root, left = sqrt(s), off * s
-        for j in range(0, n, step):
-            row = wide_at(gain, k, j)
-            put_wide(error, 0, j, wide_at(error, 0, j) + left * row)
-            put_wide(gain, k, j, root * row)
-    for first in range(0, count, 3):
-        for k in range(count, first + 3):
-            _clear(gain, k)
-        _narrow(history.covariance, gain, first, n)
-    symmetrise(history.covariance, n)
+        scalars[k, INNOVATION], scalars[k, VARIANCE] = off * s, sqrt(s)
     return nis
 
 
 @kernel
-def _narrow(P: Array, gain: Array, first: int, n: int) -> None:
-    """P without the squares of three rows, from the diagonal on: a product has no order."""
-    step = columns_at_once(P)
-    for i in range(n):
-        a, b, c = gain[first, i], gain[first + 1, i], gain[first + 2, i]
-        for j in range(i - i % step, n, step):
-            left = wide_at(P, i, j) - a * wide_at(gain, first, j) - b * wide_at(gain, first + 1, j)
-            put_wide(P, i, j, left - c * wide_at(gain, first + 2, j))
+def _alone_in_lanes(history: History, count: int, n: int) -> float:
+    """The same, row by row: what a row loses to those before it is taken at once."""
+    gain, shares, scalars = history.gain, history.shares, history.scalars
+    nis = 0.0
+    for m in range(count):
+        for k in range(m):
+            share = shared(history, m, k) * scalars[k, VARIANCE]
+            scalars[m, INNOVATION] -= share * scalars[k, INNOVATION]
+            shares[k, 0] = share
+        take_rows(gain, m, shares, n)
+        s = 1.0 / (shared(history, m, m) + scalars[m, VARIANCE])
+        nis += scalars[m, INNOVATION] * scalars[m, INNOVATION] * s
+        scalars[m, VARIANCE] = s
+    for k in range(count):
+        s = scalars[k, VARIANCE]
+        scalars[k, INNOVATION], scalars[k, VARIANCE] = scalars[k, INNOVATION] * s, sqrt(s)
+    return nis

@@ -94,7 +94,7 @@ def _agreed(builder: Any, answers: Any) -> Any:
 Made = Callable[[Any, Any, Any, Any], Any]  # (context, builder, signature, values) -> value
 
 
-def _define(function: Any, made: Made, *signatures: Any) -> None:
+def define(function: Any, made: Made, *signatures: Any) -> None:
     """Let kernels call `function` with these types."""
     template = type(f"Lanes_{function.__name__}", (ConcreteTemplate,), {"key": function, "cases": signatures})
     infer_global(function)(template)
@@ -164,9 +164,9 @@ def _rest_of(context: Any, builder: Any, signature: Any, given: Any) -> Any:
     return builder.sub(given[0], builder.mul(whole, given[1]))
 
 
-_define(operator.floordiv, _floor_divided, _TWOWHOLES)
-_define(operator.mod, _rest_of, _TWOWHOLES)
-_define(operator.neg, _by("fneg"), signature(WIDE, WIDE))
+define(operator.floordiv, _floor_divided, _TWOWHOLES)
+define(operator.mod, _rest_of, _TWOWHOLES)
+define(operator.neg, _by("fneg"), signature(WIDE, WIDE))
 
 
 def _vector_intrinsic(name: str) -> Made:
@@ -178,9 +178,9 @@ def _vector_intrinsic(name: str) -> Made:
 
 
 _ONE = signature(WIDE, WIDE)
-_define(abs, _vector_intrinsic("fabs"), _ONE)
-_define(math.sqrt, _vector_intrinsic("sqrt"), _ONE)
-_define(np.rint, _vector_intrinsic("rint"), _ONE)
+define(abs, _vector_intrinsic("fabs"), _ONE)
+define(math.sqrt, _vector_intrinsic("sqrt"), _ONE)
+define(np.rint, _vector_intrinsic("rint"), _ONE)
 
 
 def _lane_by_lane(function: Any) -> Made:
@@ -200,8 +200,8 @@ def _lane_by_lane(function: Any) -> Made:
 
 
 for known in (math.sin, math.cos, math.acos, math.asin, math.log, math.exp):
-    _define(known, _lane_by_lane(known), _ONE)
-_define(math.atan2, _lane_by_lane(math.atan2), _WIDES)
+    define(known, _lane_by_lane(known), _ONE)
+define(math.atan2, _lane_by_lane(math.atan2), _WIDES)
 
 
 def _answered(test: Callable[[Any, Any], Any]) -> Made:
@@ -225,9 +225,9 @@ def _splat_constant(value: float) -> Any:
 
 
 _PREDICATE = signature(types.boolean, WIDE)
-_define(math.isnan, _answered(lambda builder, value: builder.fcmp_unordered("uno", value, value)), _PREDICATE)
-_define(math.isfinite, _answered(_is_finite), _PREDICATE)
-_define(math.isinf, _answered(_is_inf), _PREDICATE)
+define(math.isnan, _answered(lambda builder, value: builder.fcmp_unordered("uno", value, value)), _PREDICATE)
+define(math.isfinite, _answered(_is_finite), _PREDICATE)
+define(math.isinf, _answered(_is_inf), _PREDICATE)
 
 
 def _common(builder: Any, wholes: Any) -> Any:
@@ -242,8 +242,8 @@ def _to_int(context: Any, builder: Any, sig: Any, given: Any) -> Any:
     return _common(builder, wholes)
 
 
-_define(int, _to_int, signature(types.int64, WIDE), signature(types.int64, WHOLE))
-_define(float, lambda context, builder, sig, given: given[0], signature(WIDE, WIDE))
+define(int, _to_int, signature(types.int64, WIDE), signature(types.int64, WHOLE))
+define(float, lambda context, builder, sig, given: given[0], signature(WIDE, WIDE))
 
 
 def _to_ceil(context: Any, builder: Any, sig: Any, given: Any) -> Any:
@@ -251,7 +251,7 @@ def _to_ceil(context: Any, builder: Any, sig: Any, given: Any) -> Any:
     return _common(builder, builder.fptosi(up, WHOLES))
 
 
-_define(math.ceil, _to_ceil, signature(types.int64, WIDE))
+define(math.ceil, _to_ceil, signature(types.int64, WIDE))
 
 
 def _extreme(sign: str) -> Made:

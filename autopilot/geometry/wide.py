@@ -11,17 +11,20 @@ in kernels generally, nothing is checked.
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
 from autopilot.geometry.compiler import INLINED
-from autopilot.geometry.lane_numbers import VECTOR, WIDE
+from autopilot.geometry.lane_numbers import VECTOR, WIDE, define
 
 WIDTH = 8
 Array = NDArray[np.float64]
@@ -60,6 +63,22 @@ def columns_at_once(array: Array) -> int:
     return WIDTH
 
 
+def eight_at(array: Array, i: int, j: int) -> Wide:
+    """The numbers array[i, j] ... array[i, j + 7]; of an array in lanes, eight neighbours too."""
+    return wide_at(array, i, j)
+
+
+def put_eight(array: Array, i: int, j: int, eight: Wide) -> None:
+    """Write them to array[i, j] ... array[i, j + 7]."""
+    put_wide(array, i, j, eight)
+
+
+def turned(array: Array) -> Array:
+    """What `transpose_blocks` has transposed: the array; one in lanes, of which that moves nothing, looked at
+    the other way round."""
+    return array
+
+
 def transpose_blocks(array: Array, i: int, j: int) -> None:
     """Exchange the blocks of 8 x 8 numbers that begin at [i, j] and [j, i], each transposed."""
     upper = array[i : i + WIDTH, j : j + WIDTH].T.copy()
@@ -83,8 +102,9 @@ _LANE = ir.IntType(32)
 def _pointer(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) -> Any:
     """Pointer to the eight numbers from array[i, j] on; of an array in lanes, to the one of eight lanes."""
     held = context.make_array(kind)(context, builder, array)
-    columns = cgutils.unpack_tuple(builder, held.shape)[1]
-    place = builder.gep(held.data, [builder.add(builder.mul(i, columns), j)])
+    rows, columns = cgutils.unpack_tuple(builder, held.shape)
+    at = (builder.mul(i, columns), j) if kind.layout == "C" else (builder.mul(j, rows), i)
+    place = builder.gep(held.data, [builder.add(*at)])
     return builder.bitcast(place, VECTOR.as_pointer())
 
 
@@ -123,12 +143,13 @@ def _store(builder: Any, rows: list[Any], places: list[Any]) -> None:
         builder.store(row, place, align=8)
 
 
-def _known(array: Any) -> bool:
-    return isinstance(array, types.Array) and array.ndim == 2 and array.layout == "C"
-
-
 def _of_lanes(array: Any) -> bool:
     return bool(array.dtype == WIDE)
+
+
+def _known(array: Any) -> bool:
+    layouts = "CF" if _of_lanes(array) else "C"
+    return isinstance(array, types.Array) and array.ndim == 2 and array.layout in layouts
 
 
 @overload(columns_at_once, jit_options=INLINED)
@@ -213,10 +234,8 @@ def _transpose_blocks(array: Any, i: Any, j: Any) -> Any:
     def made(array: Any, i: Any, j: Any) -> Any:
         return _exchanged(array, i, j)
 
-    def of_lanes(array: Any, i: Any, j: Any) -> Any:
-        upper = wide_at(array, i, j)
-        put_wide(array, i, j, wide_at(array, j, i))
-        put_wide(array, j, i, upper)
+    def of_lanes(array: Any, i: Any, j: Any) -> None:
+        pass
 
     if not _known(array):
         return None
@@ -230,6 +249,132 @@ def _mirror_block(array: Any, i: Any, j: Any) -> Any:
 
     def of_lanes(array: Any, i: Any, j: Any) -> Any:
         _given(array, j, i, _taken(array, i, j))
+
+    if not _known(array):
+        return None
+    return of_lanes if _of_lanes(array) else made
+
+
+# ---- an array in lanes, looked at the other way round
+
+
+@infer_global(turned)
+class _Turned(AbstractTemplate):
+    key = turned
+
+    def generic(self, args: Any, kws: Any) -> Any:
+        """The type of the view."""
+        (array,) = args
+        if not _known(array):
+            return None
+        return signature(array.copy(layout="F") if _of_lanes(array) else array, array)
+
+
+def _lower_turned(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+    if sig.return_type == sig.args[0]:
+        return given[0]
+    held = context.make_array(sig.args[0])(context, builder, given[0])
+    found = context.make_array(sig.return_type)(context, builder)
+    populate_array(
+        found,
+        data=held.data,
+        shape=cgutils.unpack_tuple(builder, held.shape)[::-1],
+        strides=cgutils.unpack_tuple(builder, held.strides)[::-1],
+        itemsize=held.itemsize,
+        meminfo=None,
+        parent=None,
+    )
+    return found._getvalue()
+
+
+lower_builtin(turned, types.Array)(_lower_turned)
+
+
+# ---- eight neighbours in an array in lanes
+
+
+class _EightType(types.Type):
+    """Eight neighbours in a row of an array in lanes: a vector each."""
+
+
+EIGHT: Any = _EightType("Eight")
+_VECTORS = ir.ArrayType(VECTOR, WIDTH)
+
+
+@register_model(_EightType)
+class _EightModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _VECTORS)  # type: ignore[no-untyped-call]
+
+
+def _neighbours(context: Any, builder: Any, kind: Any, array: Any, i: Any, j: Any) -> list[Any]:
+    """Pointers to them."""
+    columns = [builder.add(j, ir.Constant(j.type, k)) for k in range(WIDTH)]
+    return [_pointer(context, builder, kind, array, i, column) for column in columns]
+
+
+def _joined(builder: Any, vectors: list[Any]) -> Any:
+    found = ir.Constant(_VECTORS, ir.Undefined)
+    for k, vector in enumerate(vectors):
+        found = builder.insert_value(found, vector, k)
+    return found
+
+
+def _one_by_one(name: str) -> Any:
+    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+        def part(k: int, value: Any, kind: Any) -> Any:
+            return builder.extract_value(value, k) if kind == EIGHT else value
+
+        pairs = list(zip(given, sig.args, strict=True))
+        done = [getattr(builder, name)(*(part(k, *one) for one in pairs)) for k in range(WIDTH)]
+        return _joined(builder, done)
+
+    return made
+
+
+define(operator.add, _one_by_one("fadd"), signature(EIGHT, EIGHT, EIGHT))
+define(operator.sub, _one_by_one("fsub"), signature(EIGHT, EIGHT, EIGHT))
+define(operator.mul, _one_by_one("fmul"), signature(EIGHT, WIDE, EIGHT))
+
+
+@intrinsic
+def _eight_taken(_: Any, array: Any, i: Any, j: Any) -> Any:
+    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+        return _joined(builder, _load(builder, _neighbours(context, builder, sig.args[0], *given)))
+
+    return EIGHT(array, types.intp, types.intp), made
+
+
+@intrinsic
+def _eight_given(_: Any, array: Any, i: Any, j: Any, eight: Any) -> Any:
+    def made(context: Any, builder: Any, sig: Any, given: Any) -> Any:
+        vectors = [builder.extract_value(given[3], k) for k in range(WIDTH)]
+        _store(builder, vectors, _neighbours(context, builder, sig.args[0], *given[:3]))
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp, EIGHT), made
+
+
+@overload(eight_at, jit_options=INLINED)
+def _eight_at(array: Any, i: Any, j: Any) -> Any:
+    def made(array: Any, i: Any, j: Any) -> Any:
+        return _taken(array, i, j)
+
+    def of_lanes(array: Any, i: Any, j: Any) -> Any:
+        return _eight_taken(array, i, j)
+
+    if not _known(array):
+        return None
+    return of_lanes if _of_lanes(array) else made
+
+
+@overload(put_eight, jit_options=INLINED)
+def _put_eight(array: Any, i: Any, j: Any, eight: Any) -> Any:
+    def made(array: Any, i: Any, j: Any, eight: Any) -> Any:
+        return _given(array, i, j, eight)
+
+    def of_lanes(array: Any, i: Any, j: Any, eight: Any) -> Any:
+        return _eight_given(array, i, j, eight)
 
     if not _known(array):
         return None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from numpy.typing import NDArray
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.guidance.legs import Creep, Hold, Leg, Pass, Run, Transfer, asked_jet
-from autopilot.trajectory.shaping import evaluate_asked, evaluate_shaped
+from autopilot.trajectory.shaping import Shaped, evaluate_asked, evaluate_shaped
 from autopilot.trajectory.signals import Jet, SignalTable
 from autopilot.trajectory.splines import PieceTable
 from autopilot.trajectory.transfer import transfer
@@ -18,6 +20,7 @@ from autopilot.trajectory.waypoint_path import evaluate_path
 
 Floats = NDArray[np.float64]
 COLUMNS = 21  # position and six derivatives
+_KEPT, _WORTH = 3, 500  # evaluated signals that are kept, of at least so many times: what a sweep lays out
 
 
 @kernel
@@ -36,7 +39,6 @@ def _transfers(times: Floats, begin: Vec3, end: Vec3, duration: float, out: Floa
 @kernel
 def _runs(
     times: Floats,
-    anchor: Vec3,
     table: SignalTable,
     pieces: PieceTable,
     duration: float,
@@ -49,8 +51,32 @@ def _runs(
             _put(out[k], evaluate_asked(table, duration, times[k] - lead))
         else:
             _put(out[k], evaluate_shaped(table, pieces, duration, times[k] - lead))
-        for j in range(3):
-            out[k, j] = anchor[j] + out[k, j]
+
+
+class _Evaluated(NamedTuple):
+    """Signals of a path at some times, from their own origin."""
+
+    path: Shaped
+    times_s: Floats
+    asked: bool
+    found: Floats
+
+
+_evaluated: deque[_Evaluated] = deque(maxlen=_KEPT)  # the last ones
+
+
+def _signals(path: Shaped, times_s: Floats, asked: bool) -> Floats:
+    """(n, 21) the signals of a path at n times. A sweep wants them as flown and as asked: where these are the
+    same they are evaluated once."""
+    asked = asked or not len(path.pieces)
+    for one in _evaluated:
+        if one.path is path and one.asked == asked and np.array_equal(one.times_s, times_s):
+            return one.found
+    found = np.zeros((len(times_s), COLUMNS))
+    _runs(times_s, path.table, path.pieces, path.duration_s, path.lead_s, asked, found)
+    if len(times_s) >= _WORTH:
+        _evaluated.append(_Evaluated(path, times_s.copy(), asked, found))
+    return found
 
 
 @kernel
@@ -69,13 +95,14 @@ def _passes(
 def jets(leg: Leg, times_s: Floats, asked: bool = False) -> Floats:
     """(n, 21) `leg.jet` (or `asked_jet`) at each of the n times (s into the leg): in machine code for the
     kinds that last."""
-    found = np.zeros((len(times_s), COLUMNS))
     # by the very type: a leg of another type may mean something else
+    if type(leg) is Run:
+        found = _signals(leg.path, times_s, asked).copy()
+        found[:, :3] += leg.anchor
+        return found
+    found = np.zeros((len(times_s), COLUMNS))
     if type(leg) is Transfer:
         _transfers(times_s, leg.begin, leg.end, leg.duration_s, found)
-    elif type(leg) is Run:
-        path = leg.path
-        _runs(times_s, leg.anchor, path.table, path.pieces, path.duration_s, path.lead_s, asked, found)
     elif type(leg) is Pass:
         _passes(times_s, leg.path.table, leg.path.begin_s, leg.offset, leg.fade_s, found)
     elif type(leg) is Hold:
@@ -95,20 +122,18 @@ def jets_ahead(legs: Sequence[Leg], times_s: Floats) -> Floats:
 
     Only legs that control the same as the first one follow it for this.
     """
-    found = np.zeros((len(times_s), COLUMNS))
     chain = [legs[0]]
     for after in legs[1:]:
         if after.control_mode != chain[0].control_mode:
             break
         chain.append(after)
-    begin, t = 0, times_s
-    for i, leg in enumerate(chain):
-        end = len(times_s)
-        if i + 1 < len(chain):
-            end = begin + int(np.searchsorted(t, leg.duration_s, side="left"))
-            found[begin:end] = jets(leg, t[: end - begin])
-            t = t[end - begin :] - leg.duration_s
-            begin = end
-        else:
-            found[begin:end] = jets(leg, t)
-    return found
+    parts, t = [], times_s
+    for leg in chain[:-1]:
+        own = int(np.searchsorted(t, leg.duration_s, side="left"))
+        parts.append(jets(leg, t[:own]))
+        t = t[own:] - leg.duration_s
+        if not len(t):
+            break
+    else:
+        parts.append(jets(chain[-1], t))
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)

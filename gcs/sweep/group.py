@@ -127,7 +127,8 @@ class Group:
         if faithful:
             self._take_back(faithful, flown + 1 if astray else flown)
         if astray:
-            if flown > 0:
+            # a few are flown again as fast alone
+            if flown > 0 and len(astray) >= FEWEST:
                 self._fly_lanes(astray, flown)
                 self._take_back(astray, flown)
             for i in astray:

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.core.tick import CoreRows, Pilot
 from autopilot.estimation.inbox import COLUMNS as READING_COLUMNS
-from autopilot.estimation.records import RING_LENGTH, EstimatorState
+from autopilot.estimation.records import RING_COLUMNS, RING_LENGTH, ROOM, EstimatorState
+from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lane_numbers import LANES
 from autopilot.geometry.packed import place_of
 from autopilot.supervisor.quiescence import Stretch
@@ -30,10 +31,16 @@ _HISTORY = ("covariance", "consistency")
 _SCRATCH = ("error", "shares", "gain", "scalars")
 _SHARED = ("clock", "command_ring")  # of the world: whole numbers, the same for all
 _SPARE_ROWS = 3  # of the ring, beyond the age of the oldest reading
+# of the covariance in lanes: with 32, rows of 2 KiB, what lies in one column would share few places of the
+# processor's cache
+_COLUMNS = ROOM + 8
 _ALIGNED = 64  # bytes
 _MEMORY, _HEAD, _RESETS = (place_of(EstimatorState, name) for name in ("memory_s", "head", "resets"))
 _STOP_US, _MODE = place_of(Stretch, "stop_us"), place_of(Stretch, "mode")
 _CONTROL_MODE = place_of(Pilot, "control_mode")
+
+
+Indices = NDArray[np.intp]
 
 
 def _aligned(rows: int) -> Floats:
@@ -76,16 +83,21 @@ class LaneMemory:
         for block, flight in zip(own, flights, strict=True):
             _move(flight, {name: _view(block[place], arrays[name]) for name, place in places.items()})
         inbox, shared = places["core.inbox"], places["shared.clock"]
-        self._copied = slice(0, inbox.start + READING_COLUMNS)
+        covariance, past = places["history.covariance"], places["history.ring"]
+        end = inbox.start + READING_COLUMNS
+        self._places = _Places(covariance.start, covariance.stop, end, past.start)
         self._shared = slice(shared.start, places["shared.command_ring"].stop)
         lanes = self._lanes = _aligned(shared.start)
         ring = _aligned(arrays["history.ring"].size)
+        square = self._square = _aligned(ROOM * _COLUMNS).reshape(ROOM, _COLUMNS, LANES)
         common = self._common = np.zeros(self._shared.stop - self._shared.start)
 
         def in_lanes(name: str, array: NDArray[Any]) -> NDArray[Any]:
             place = places[name]
             if name.startswith("shared."):
                 return _view(common[place.start - shared.start : place.stop - shared.start], array)
+            if name == "history.covariance":
+                return square
             block = ring if name == "history.ring" else lanes[place]
             return block.view(array.dtype).reshape(*array.shape, LANES)
 
@@ -93,7 +105,6 @@ class LaneMemory:
         self._own_estimator = own[:, places["core.estimator"]]
         self._own_stretch, self._own_pilot = own[:, places["core.stretch"]], own[:, places["core.pilot"]]
         self._lane_ring = ring.reshape(*arrays["history.ring"].shape, LANES)
-        self._own_ring = own[:, places["history.ring"]].reshape(len(flights), *arrays["history.ring"].shape)
         made = {name: in_lanes(name, array) for name, array in arrays.items()}
         history = first.core.rows.history
         scratch = {
@@ -108,15 +119,16 @@ class LaneMemory:
         self.law_rows = first.core.law_rows._replace(memory=made["law"])
         self.figures = made["figures"]
         self.asked: tuple[Floats, ...] = ()
-        self.lanes: NDArray[np.intp] = np.zeros(LANES, np.intp)  # which flight lies in each
+        self.lanes: Indices = np.zeros(LANES, np.intp)  # which flight lies in each
 
     def take(self, members: Sequence[int]) -> None:
         """Copy these flights into lanes; where they are fewer than eight the last one lies there again."""
         self.lanes[:] = [*members, *[members[-1]] * (LANES - len(members))]
-        self._lanes[self._copied] = self._own[self.lanes, self._copied].T
         self._common[:] = self._own[members[0], self._shared]
-        rows = self._recent()
-        self._lane_ring[rows] = np.moveaxis(self._own_ring[self.lanes[:, None], rows], 0, -1)
+        # the estimator's own first: they say what of the ring is recent
+        self._estimator[:] = self._own_estimator[self.lanes].T
+        there = self._lanes, self._square, self._lane_ring
+        _copy_in(self._own, self.lanes, self._places, *there, self._recent())
         flights = [self.flights[member] for member in self.lanes.tolist()]
         theirs: dict[str, Any] = {
             name: tuple(getattr(flight.core.rows, name) for flight in flights)
@@ -130,12 +142,10 @@ class LaneMemory:
     def give(self, members: Sequence[int], ticks: int) -> None:
         """Copy some of those that were taken back after so many ticks."""
         lanes = [self.lanes.tolist().index(member) for member in members]
-        rows = self._recent(ticks)
-        self._own[members, self._copied] = self._lanes[self._copied][:, lanes].T
+        there = self._lanes, self._square, self._lane_ring
+        which = np.asarray(members, np.intp), np.asarray(lanes, np.intp)
+        _copy_out(self._own, *which, self._places, *there, self._recent(ticks))
         self._own[members, self._shared] = self._common
-        self._own_ring[np.asarray(members)[:, None], rows] = np.moveaxis(
-            self._lane_ring[rows][..., lanes], -1, 0
-        )
 
     def remembers(self) -> bool:
         """Whether the ring goes back as far as when the flights were taken, and nobody began anew."""
@@ -159,11 +169,76 @@ class LaneMemory:
         """When a flight is to be decided upon, at the latest."""
         return int(self._own_stretch[member, _STOP_US])
 
-    def _recent(self, ticks: int = 0) -> NDArray[np.intp]:
+    def _recent(self, ticks: int = 0) -> Indices:
         """Rows of the ring that may be asked for, and those of the last ticks."""
         memory_s, head = self._estimator[_MEMORY, 0], int(self._estimator[_HEAD, 0])
         back = ceil(memory_s / (self.flights[0].tick_us * 1e-6)) + _SPARE_ROWS + ticks
         return np.arange(head - min(back, RING_LENGTH - 1), head + 1) % RING_LENGTH
+
+
+class _Places(NamedTuple):
+    """Where the parts of a flight's block begin and end."""
+
+    covariance: int
+    behind: int  # the covariance
+    end: int  # of what is copied number by number
+    ring: int
+
+
+@kernel
+def _copy_in(
+    own: Floats,
+    members: Indices,
+    at: _Places,
+    lanes: Floats,
+    covariance: Floats,
+    ring: Floats,
+    rows: Indices,
+) -> None:
+    """Copy flights into lanes, number by number: of the ring these rows."""
+    for i in range(at.covariance):
+        for lane in range(LANES):
+            lanes[i, lane] = own[members[lane], i]
+    for i in range(at.behind, at.end):
+        for lane in range(LANES):
+            lanes[i, lane] = own[members[lane], i]
+    for i in range(ROOM):
+        for j in range(ROOM):
+            for lane in range(LANES):
+                covariance[i, j, lane] = own[members[lane], at.covariance + ROOM * i + j]
+    for row in rows:
+        for j in range(RING_COLUMNS):
+            for lane in range(LANES):
+                ring[row, j, lane] = own[members[lane], at.ring + RING_COLUMNS * row + j]
+
+
+@kernel
+def _copy_out(
+    own: Floats,
+    members: Indices,
+    taken_from: Indices,
+    at: _Places,
+    lanes: Floats,
+    covariance: Floats,
+    ring: Floats,
+    rows: Indices,
+) -> None:
+    """Copy these lanes back into the blocks of the flights that lie there."""
+    count = members.shape[0]
+    for i in range(at.covariance):
+        for k in range(count):
+            own[members[k], i] = lanes[i, taken_from[k]]
+    for i in range(at.behind, at.end):
+        for k in range(count):
+            own[members[k], i] = lanes[i, taken_from[k]]
+    for i in range(ROOM):
+        for j in range(ROOM):
+            for k in range(count):
+                own[members[k], at.covariance + ROOM * i + j] = covariance[i, j, taken_from[k]]
+    for row in rows:
+        for j in range(RING_COLUMNS):
+            for k in range(count):
+                own[members[k], at.ring + RING_COLUMNS * row + j] = ring[row, j, taken_from[k]]
 
 
 def _view(block: Floats, array: NDArray[Any]) -> NDArray[Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,16 @@ def test_paths_of_a_plan_laid_out_are_the_paths() -> None:
     for leg in (Pass(passage, (0.1, -0.2, 0.05), 1.5), Run((0.1, 0.2, 0.3), shaped)):
         expected = [np.ravel(leg.jet(t)) for t in times.tolist()]
         assert np.array_equal(jets(leg, times), np.array(expected))
+
+
+def test_signals_are_those_of_the_path_and_the_times_whatever_was_laid_out_before() -> None:
+    paths = [unshaped(SIGNALS), unshaped(replace(SIGNALS, duration_s=SIGNALS.duration_s + 1.0))]
+    times = np.arange(600) * 0.004
+    for anchor in ((0.0, 0.0, 1.0), (1.0, 2.0, 3.0)):
+        for path in paths:
+            for at in (times, times + 0.5):
+                expected = [np.ravel(Run(anchor, path).jet(t)) for t in at.tolist()]
+                assert np.array_equal(jets(Run(anchor, path), at), np.array(expected))
 
 
 def test_the_path_ahead_goes_on_into_what_follows() -> None:

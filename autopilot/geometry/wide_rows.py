@@ -1,0 +1,190 @@
+"""Rows of numbers, eight at a time: their sums, and what a covariance does.
+
+Each number goes through the same operations, in the same order, for one flight, in lanes and in Python; how
+many of them are done before the next row is looked at differs.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from autopilot.geometry.kernel import kernel
+from autopilot.geometry.wide import (
+    WIDTH,
+    Array,
+    columns_at_once,
+    eight_at,
+    mirror_block,
+    put_eight,
+    put_wide,
+    transpose_blocks,
+    wide_at,
+)
+
+
+@kernel
+def combine(into: Array, k: int, array: Array, rows: Any, shares: Array, n: int) -> None:
+    """Row k of `into` becomes a sum of rows of `array`, of n numbers each: of row rows[k, e] the share
+    shares[k, e], for e from 1 to rows[k, 0]."""
+    if columns_at_once(into) == 1:
+        for j in range(0, n, WIDTH):
+            total = shares[k, 1] * eight_at(array, rows[k, 1], j)
+            for entry in range(2, rows[k, 0] + 1):
+                total = total + shares[k, entry] * eight_at(array, rows[k, entry], j)
+            put_eight(into, k, j, total)
+        return
+    share, row = shares[k, 1], rows[k, 1]
+    for j in range(0, n, WIDTH):
+        put_wide(into, k, j, share * wide_at(array, row, j))
+    for entry in range(2, rows[k, 0] + 1):
+        share, row = shares[k, entry], rows[k, entry]
+        for j in range(0, n, WIDTH):
+            put_wide(into, k, j, wide_at(into, k, j) + share * wide_at(array, row, j))
+
+
+@kernel
+def take_row(array: Array, k: int, share: float, other: int, n: int) -> None:
+    """Take from row k, of n numbers, a share of another one."""
+    for j in range(0, n, WIDTH):
+        put_eight(array, k, j, eight_at(array, k, j) - share * eight_at(array, other, j))
+
+
+@kernel
+def take_rows(array: Array, k: int, shares: Array, n: int) -> None:
+    """Take from row k, of n numbers, the share shares[i, 0] of each row i before it."""
+    for j in range(0, n, WIDTH):
+        left = eight_at(array, k, j)
+        for i in range(k):
+            left = left - shares[i, 0] * eight_at(array, i, j)
+        put_eight(array, k, j, left)
+
+
+@kernel
+def weigh(into: Array, array: Array, factors: Array, count: int, n: int) -> None:
+    """Add to the only row of `into` the first rows of `array`, of n numbers, times factors[k, 0]; and
+    multiply each by factors[k, 1]."""
+    for j in range(0, n, WIDTH):
+        total = eight_at(into, 0, j)
+        for k in range(count):
+            row = eight_at(array, k, j)
+            total = total + factors[k, 0] * row
+            put_eight(array, k, j, factors[k, 1] * row)
+        put_eight(into, 0, j, total)
+
+
+@kernel
+def transpose(array: Array, n: int) -> None:
+    """Transpose the first n x n numbers, n made a whole number of eights. What is done with them then wants
+    `turned`."""
+    for i in range(0, n, WIDTH):
+        for j in range(i, n, WIDTH):
+            transpose_blocks(array, i, j)
+
+
+@kernel
+def symmetrise(array: Array, n: int) -> None:
+    """Write what lies above the diagonal of the first n x n numbers to below it."""
+    step = columns_at_once(array)
+    for i in range(0, n, step):
+        for j in range(i, n, step):
+            mirror_block(array, i, j)
+
+
+@kernel
+def take_squares(array: Array, of: Array, count: int, n: int) -> None:
+    """Take the squares of `count` rows, a multiple of three, from the first n x n numbers of `array`:
+    array[i, j] -= of[k, i] of[k, j], from the diagonal on, for a product has no order. The rest is its
+    mirror."""
+    if columns_at_once(array) == 1:
+        _take_squares_of_lanes(array, of, count, n)
+        return
+    for first in range(0, count, 3):
+        for i in range(n):
+            a, b, c = of[first, i], of[first + 1, i], of[first + 2, i]
+            for j in range(i - i % WIDTH, n, WIDTH):
+                left = wide_at(array, i, j) - a * wide_at(of, first, j) - b * wide_at(of, first + 1, j)
+                put_wide(array, i, j, left - c * wide_at(of, first + 2, j))
+    symmetrise(array, n)
+
+
+# ---- in lanes: two rows by two columns at a time, so that what is read is used twice
+
+
+@kernel
+def _take_squares_of_lanes(array: Array, of: Array, count: int, n: int) -> None:
+    for i in range(0, n - 1, 2):
+        first = 0
+        while first < count:
+            if count - first >= 6:
+                _take_six(array, of, first, i, n)
+                first += 6
+            else:
+                _take_three(array, of, first, i, n)
+                first += 3
+    if n % 2 != 0:
+        for i in range(n):
+            _take_one(array, of, count, i, n - 1)
+
+
+@kernel
+def _put_square(array: Array, i: int, j: int, square: Any) -> None:
+    """Write what is at [i, j] and to the right, below and beside it; and mirror it."""
+    p, q, r, s = square
+    # on the diagonal what is above it comes last, and stays
+    put_wide(array, i + 1, j, r)
+    put_wide(array, j, i + 1, r)
+    put_wide(array, i, j, p)
+    put_wide(array, i, j + 1, q)
+    put_wide(array, i + 1, j + 1, s)
+    put_wide(array, j, i, p)
+    put_wide(array, j + 1, i, q)
+    put_wide(array, j + 1, i + 1, s)
+
+
+@kernel
+def _take_one(array: Array, of: Array, count: int, i: int, j: int) -> None:
+    left = wide_at(array, i, j)
+    for k in range(count):
+        own: Any = wide_at(of, k, i)
+        left = left - own * wide_at(of, k, j)
+    put_wide(array, i, j, left)
+    put_wide(array, j, i, left)
+
+
+@kernel
+def _three_from(square: Any, of: Array, first: int, j: int, a: Any, b: Any) -> Any:
+    """A square of two by two without what three rows have in common: `a` and `b` are theirs of its rows."""
+    p, q, r, s = square
+    c, d = wide_at(of, first, j), wide_at(of, first, j + 1)
+    p, q, r, s = p - a[0] * c, q - a[0] * d, r - b[0] * c, s - b[0] * d
+    c, d = wide_at(of, first + 1, j), wide_at(of, first + 1, j + 1)
+    p, q, r, s = p - a[1] * c, q - a[1] * d, r - b[1] * c, s - b[1] * d
+    c, d = wide_at(of, first + 2, j), wide_at(of, first + 2, j + 1)
+    return p - a[2] * c, q - a[2] * d, r - b[2] * c, s - b[2] * d
+
+
+@kernel
+def _three_at(of: Array, first: int, i: int) -> Any:
+    return wide_at(of, first, i), wide_at(of, first + 1, i), wide_at(of, first + 2, i)
+
+
+@kernel
+def _square_at(array: Array, i: int, j: int) -> Any:
+    first, second = wide_at(array, i, j), wide_at(array, i, j + 1)
+    return first, second, wide_at(array, i + 1, j), wide_at(array, i + 1, j + 1)
+
+
+@kernel
+def _take_three(array: Array, of: Array, first: int, i: int, n: int) -> None:
+    a, b = _three_at(of, first, i), _three_at(of, first, i + 1)
+    for j in range(i, n - 1, 2):
+        _put_square(array, i, j, _three_from(_square_at(array, i, j), of, first, j, a, b))
+
+
+@kernel
+def _take_six(array: Array, of: Array, first: int, i: int, n: int) -> None:
+    a, b = _three_at(of, first, i), _three_at(of, first, i + 1)
+    c, d = _three_at(of, first + 3, i), _three_at(of, first + 3, i + 1)
+    for j in range(i, n - 1, 2):
+        square = _three_from(_square_at(array, i, j), of, first, j, a, b)
+        _put_square(array, i, j, _three_from(square, of, first + 3, j, c, d))
