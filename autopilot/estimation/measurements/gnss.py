@@ -31,9 +31,11 @@ from autopilot.estimation.records import (
     FIX,
     GNSS,
     NOBODY,
+    PLAIN,
     POSITION,
     QUAT,
     RECEIVER,
+    RTK_FLOAT,
     SIZE,
     TRACKER,
     V_QUAD,
@@ -55,6 +57,7 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
 
 FIXES_BEFORE_RESET = 8.0
+LEAST_PERIOD_S = 0.02  # between two fixes
 CLIMB_WORSE = 1.7  # deviation of the climb over that of the level speed
 STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
@@ -266,16 +269,21 @@ def correct_gnss(
         return state
     state = heard(state, fix.age_s, SIZE)
     n = state.size
-    share = tuning.rtk_white if fix.rtk > 0.0 else tuning.gnss_white
+    share = tuning.rtk_white if fix.rtk > PLAIN else tuning.gnss_white
+    starting = state.vehicle.source == NOBODY
+    # what a fix floats by is no error of the fixes before, and the same until the carrier is fixed again: all
+    # readings of EST_GPS_TAU together count as one
+    floats = fix.rtk == RTK_FLOAT and not starting
+    since = max(LEAST_PERIOD_S, state.vehicle.age_s - fix.age_s)
+    same = max(1.0, 2.0 * tuning.gnss_time / since) if floats else 1.0
     slow = sqrt(1.0 - share * share)
     aids = with_slow(
         state.aids,
-        slow * fix.horizontal_std,
-        slow * fix.vertical_std,
-        1.0 if fix.rtk > 0.0 else PLAIN_REVERSION,
+        state.aids.horizontal_slow if floats else slow * fix.horizontal_std,
+        state.aids.vertical_slow if floats else slow * fix.vertical_std,
+        1.0 if fix.rtk > PLAIN else PLAIN_REVERSION,
     )
     state = with_aids(state, aids)
-    starting = state.vehicle.source == NOBODY
     if starting:
         if not (aids.magnetic_age <= MAGNETIC_FRESH_S and tells_attitude(state.last_imu.accel, aids.field)):
             return state
@@ -284,7 +292,9 @@ def correct_gnss(
     innovation = sub(fix.position, add(past.x_quad, state.aids.gnss))
     difference = sub(fix.velocity, past.v_quad)
     level, climb = share * fix.horizontal_std, share * fix.vertical_std
-    speed = tuning.rtk_speed_std if fix.rtk > 0.0 else tuning.gnss_speed_std
+    if floats:
+        level, climb = sqrt(same) * fix.horizontal_std, sqrt(same) * fix.vertical_std
+    speed = tuning.rtk_speed_std if fix.rtk > PLAIN else tuning.gnss_speed_std
     worse = CLIMB_WORSE * speed
     position_var = (level * level, level * level, climb * climb)
     velocity_var = (speed * speed, speed * speed, worse * worse)
