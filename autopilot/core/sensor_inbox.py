@@ -25,6 +25,9 @@ from autopilot.estimation.inbox import (
     new_inbox,
 )
 from autopilot.estimation.records import (
+    PLAIN,
+    RTK_FIXED,
+    RTK_FLOAT,
     Array,
     DirectionReading,
     GnssReading,
@@ -150,7 +153,9 @@ def _put_speeds(inbox: Array, at: int, m: Any) -> int:
 
 @kernel
 def _put_fix(inbox: Array, at: int, gps: HilGps) -> int:
-    rtk = 1.0 if gps.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT else 0.0
+    rtk = PLAIN
+    if gps.fix_type >= mavlink.GPS_FIX_TYPE_RTK_FLOAT:
+        rtk = RTK_FLOAT if gps.fix_type == mavlink.GPS_FIX_TYPE_RTK_FLOAT else RTK_FIXED
     fix = GnssReading(0.0, gps.position, gps.velocity, gps.horizontal_std, gps.vertical_std, rtk)
     return _put(inbox, at, FIX, gps.time_us, fix)
 

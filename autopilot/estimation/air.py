@@ -11,11 +11,13 @@ from math import sqrt
 
 from autopilot.control.drag import GUSTY
 from autopilot.estimation.covariance import kept
-from autopilot.estimation.records import AirEstimate, EstimatorTuning, LoadEstimate
+from autopilot.estimation.records import TRACKER, AirEstimate, EstimatorTuning, LoadEstimate
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import Vec3, dot
 
 DRAG_TIME_S = 0.15  # for which a change of drag goes on
+# m/s^2, of wind that a camera cannot tell from its own mounting and from the slow error of a receiver
+HIDDEN = 0.17
 LEARNING_S = 4.0
 # drag is learned by motion faster than this, m/s, and is at most so much, 1/s
 SLOW, GREATEST_DRAG = 0.2, 2.0
@@ -25,13 +27,14 @@ SLOW, GREATEST_DRAG = 0.2, 2.0
 def air_walk(load: LoadEstimate, air: AirEstimate, accel_quad: Vec3, tuning: EstimatorTuning) -> float:
     """How fast what the air does to the load may change, m/s^2 per square root of a second.
 
-    As it is told; as in gusts, which are the greater the stronger the wind is; and as drag does, c u^2, when
-    the speed changes: by 2 c u times the acceleration, of a wind that c u^2 tells of.
+    As it is told; as in gusts, which are the greater the stronger the wind is, or may be where no tracker
+    tells of the load; and as drag does, c u^2, when the speed changes: by 2 c u times the acceleration, of a
+    wind that c u^2 tells of.
     """
     still, c = tuning.air_walk, tuning.load_drag
     wind2 = air.load[0] * air.load[0] + air.load[1] * air.load[1]
     speed2 = c * c * dot(load.v_load, load.v_load) + c * sqrt(wind2)
-    gusts = GUSTY * GUSTY * wind2
+    gusts = GUSTY * GUSTY * (wind2 if load.source == TRACKER else wind2 + HIDDEN * HIDDEN)
     return sqrt(still * still + gusts + 4.0 * speed2 * dot(accel_quad, accel_quad) * DRAG_TIME_S)
 
 

@@ -56,12 +56,14 @@ from autopilot.geometry.packed import unpack, with_field
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.wire.parameter_table import ParameterTable
 
-POSITION_STD_TO_FLY = 0.05  # m, with trackers, and beyond what a receiver promises
+POSITION_STD_TO_FLY = 0.05  # m, with trackers
+FIX_STD_TO_FLY = 0.15  # m, beyond what a receiver promises: so far it may coast, or float
 ATTITUDE_STD_TO_FLY = 0.05  # rad
 HEADING_STD_TO_FLY = 0.15  # rad, by a magnetometer
 LOAD_STD_TO_FLY = 0.1  # m from the vehicle, of a load that a camera sees
 PROMISE = 1.2  # times the deviation that the receiver states
 COASTING_S = 2.0  # that the IMU bridges between fixes
+SWINGING_S = 1.0  # that the pendulum bridges between sights of the load
 TILT_STD_TO_LAND = 0.2  # rad
 POSITION_STD_TO_LAND = 10.0  # m
 UNSEEN_S = 0.5  # after which a load of which no tracker has told is taken for one that none will tell of
@@ -252,7 +254,7 @@ def vehicle_complaint(state: EstimatorState, oldest_s: float) -> int:
     """What is wrong with the estimate of the vehicle; 0 if nothing is. Each is written so that NaN tells."""
     vehicle, doubt = state.vehicle, state.doubt
     if vehicle.source == RECEIVER:
-        level = POSITION_STD_TO_FLY + PROMISE * state.aids.horizontal_slow
+        level = FIX_STD_TO_FLY + PROMISE * state.aids.horizontal_slow
         if not vehicle.age_s <= max(oldest_s, COASTING_S):
             return NO_FIX
         if not (doubt.horizontal <= level and doubt.relative <= level):
@@ -278,7 +280,7 @@ def load_complaint(state: EstimatorState, oldest_s: float) -> int:
             return 0
         if unseen(load):
             return 0 if load.held_s < TELLING_S or doubt.load <= LOAD_STD_TO_FLY else LOAD_VAGUE
-        if not load.age_s <= oldest_s:
+        if not load.age_s <= max(oldest_s, SWINGING_S):
             return NO_SIGHT
         return 0 if doubt.load <= LOAD_STD_TO_FLY else LOAD_VAGUE
     if not load.age_s <= oldest_s:

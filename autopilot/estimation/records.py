@@ -42,6 +42,7 @@ POSE, LOAD, FIX, PRESSURE, MAGNETIC, SIGHT, REST, PULL = 0, 1, 2, 3, 4, 5, 6, 7
 SENSORS = 8
 
 NOBODY, TRACKER, RECEIVER = 0.0, 1.0, 2.0  # what tells the vehicle where it is
+PLAIN, RTK_FLOAT, RTK_FIXED = 0.0, 1.0, 2.0  # GnssReading.rtk: what is known of the carrier's whole waves
 # what tells where the load is, beside NOBODY and TRACKER: a camera, or what the load does to the vehicle
 CAMERA = 2.0
 
@@ -94,7 +95,8 @@ class LoadReading(NamedTuple):
 
 
 class GnssReading(NamedTuple):
-    """A satellite navigation receiver's fix, ENU from home; `rtk` is 1.0 where its carrier phase is fixed."""
+    """A satellite navigation receiver's fix, ENU from home; `rtk` is PLAIN, RTK_FLOAT or RTK_FIXED: whether
+    it knows the whole numbers of waves of the carrier."""
 
     age_s: float
     position: Vec3

@@ -13,7 +13,16 @@ import numpy as np
 
 from autopilot.control.actuators.mixer import FORCE
 from autopilot.estimation import inbox as box
-from autopilot.estimation.records import Array, DirectionReading, GnssReading, LoadReading, PoseReading
+from autopilot.estimation.records import (
+    PLAIN,
+    RTK_FIXED,
+    RTK_FLOAT,
+    Array,
+    DirectionReading,
+    GnssReading,
+    LoadReading,
+    PoseReading,
+)
 from autopilot.geometry.frames import quat_enu_flu_from_ned_frd, quat_ned_frd_from_enu_flu
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above, single
@@ -42,7 +51,7 @@ class Wire(NamedTuple):
     fix_horizontal_std: float
     fix_vertical_std: float
     fix_float_std: float
-    rtk: float  # 1.0: fixes with carrier phase
+    rtk: float  # GnssReading.rtk of a fix that does not float
     home: Vec3  # degrees north and east, m
     metres_per_degree: float
     east_metres_per_degree: float
@@ -112,7 +121,8 @@ def _fix(row: Row, wire: Wire) -> GnssReading:
     quality = row[READING + 6]
     horizontal = if_above(quality, FIXED, wire.fix_float_std, wire.fix_horizontal_std)
     vertical = if_above(quality, FIXED, wire.fix_float_std, wire.fix_vertical_std)
-    return GnssReading(0.0, position, velocity, horizontal, vertical, wire.rtk)
+    rtk = if_above(quality, FIXED, RTK_FLOAT, wire.rtk)
+    return GnssReading(0.0, position, velocity, horizontal, vertical, rtk)
 
 
 @kernel
@@ -217,7 +227,7 @@ def wire_of(profile: Profile, noise_scale: float, home: Home) -> Wire:
         saturated(stated.gnss_horizontal * 100.0, 0, 0xFFFE) * 0.01,
         saturated(stated.gnss_vertical * 100.0, 0, 0xFFFE) * 0.01,
         saturated(stated.gnss_float * 100.0, 0, 0xFFFE) * 0.01,
-        1.0 if profile.gnss is not None and profile.gnss.fix == "rtk" else 0.0,
+        RTK_FIXED if profile.gnss is not None and profile.gnss.fix == "rtk" else PLAIN,
         (home.latitude_deg, home.longitude_deg, home.altitude_m),
         metres,
         metres * cosine,

@@ -13,7 +13,16 @@ from hypothesis import strategies as st
 
 from autopilot.core.sensor_inbox import INERTIAL, SensorInbox
 from autopilot.estimation import inbox as box
-from autopilot.estimation.records import DirectionReading, GnssReading, ImuReading, LoadReading, PoseReading
+from autopilot.estimation.records import (
+    PLAIN,
+    RTK_FIXED,
+    RTK_FLOAT,
+    DirectionReading,
+    GnssReading,
+    ImuReading,
+    LoadReading,
+    PoseReading,
+)
 from autopilot.geometry.packed import unpack
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import (
@@ -181,7 +190,7 @@ def test_a_load_is_tracked_or_seen() -> None:
 
 @pytest.mark.parametrize(
     ("fix_type", "rtk"),
-    [(0, None), (1, None), (2, None), (3, 0.0), (4, 0.0), (5, 1.0), (6, 1.0)],
+    [(0, None), (1, None), (2, None), (3, PLAIN), (4, PLAIN), (5, RTK_FLOAT), (6, RTK_FIXED)],
 )
 def test_a_fix_is_read_from_three_dimensions_on_and_always_told_to_the_operator(
     fix_type: int, rtk: float | None

@@ -32,6 +32,9 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.so3 import quat_conjugate, quat_log, quat_multiply
 from autopilot.supervisor.state import Phase
+from gcs.closed_loop import Conditions
+from gcs.sweep.flight import boarding, fly
+from missions.fileformat import load_mission
 from missions.model import Takeoff, Waypoint
 from tests.doubles.craft import Craft
 
@@ -120,3 +123,17 @@ def test_innovations_are_as_large_as_the_filter_says(sensors: str, readings: tup
         count, total = consistency[sensor]
         assert count > 30 * len(SEEDS)
         assert 0.8 < total / count / SCALARS[sensor] < 1.2, (sensor, total / count / SCALARS[sensor])
+
+
+def test_all_that_a_fix_floats_by_counts_as_one_reading() -> None:
+    """For 3 s at a time each fix is off by the same 0.15 m. Measured as RMS: 20.9 mm without, 28.2 mm with
+    such fixes; 57 mm if each is believed to have an error of its own."""
+    hover = load_mission("hover")
+
+    def square(floats_per_min: float) -> float:
+        told: dict[str, Any] = {"sensors": "rtk", "settings": {"SIM_GPS_FLT": floats_per_min}}
+        boarded = boarding(hover, Conditions(**told))
+        flights = (fly(hover, Conditions(seed=seed, **told), boarded) for seed in (2, 3, 4))
+        return sum(flown.load_error_rms_m**2 for flown in flights)
+
+    assert square(4.0) < 3.0 * square(0.0)

@@ -23,6 +23,7 @@ from autopilot.estimation.records import (
     DIRECTION,
     MOUNTING,
     NOBODY,
+    POSITION,
     SIGHT,
     SIZE,
     TRACKER,
@@ -65,17 +66,25 @@ def put(load: LoadEstimate, x_load: Vec3, position_var: float, age_s: float) -> 
 
 @kernel
 def see_lying(
-    state: EstimatorState, past: Past, sight: Vec3, reading: DirectionReading, tuning: EstimatorTuning
+    state: EstimatorState,
+    history: History,
+    past: Past,
+    sight: Vec3,
+    reading: DirectionReading,
+    tuning: EstimatorTuning,
 ) -> EstimatorState:
     """The lying load moved towards where the line of sight meets its height."""
-    load = state.load
+    load, P = state.load, history.covariance
     height = past.x_quad[2] - load.x_load[2]
     if not (height > LEAST_HEIGHT and -sight[2] > LEAST_SLOPE):
         return state
     far = height / -sight[2]
     seen = (past.x_quad[0] + far * sight[0], past.x_quad[1] + far * sight[1])
     tilt = state.doubt.tilt
-    slow = far * far * (tilt * tilt + tuning.mounting_std * tuning.mounting_std) / (sight[2] * sight[2])
+    down = sight[2] * sight[2]
+    slow = far * far * (tilt * tilt + tuning.mounting_std * tuning.mounting_std) / down
+    # a height that is wrong shows aside
+    slow += P[POSITION + 2, POSITION + 2] * (1.0 - down) / down
     own = far * reading.direction_std / sight[2]
     variance = own * own + slow
     var = load.covariance[0]
@@ -87,7 +96,7 @@ def see_lying(
         var = 1.0
     k = var / (var + variance)
     x_load = (load.x_load[0] + k * off[0], load.x_load[1] + k * off[1], load.x_load[2])
-    # what tilt and mounting do to all sights alike is not averaged away
+    # what is slow is alike in all sights, and not averaged away
     return with_load(state, put(load, x_load, max((1.0 - k) * var, slow), reading.age_s), state.resets)
 
 
@@ -109,7 +118,7 @@ def correct_direction(
     c = state.aids.mounting
     sight = apply(R, apply(exp((-c[0], -c[1], 0.0)), reading.direction_body))
     if load.taut == 0.0:
-        return see_lying(state, past, sight, reading, tuning)
+        return see_lying(state, history, past, sight, reading, tuning)
     q = past.q_cable
     off = sub(sight, q)
     # the stated deviation counts the mounting in

@@ -20,7 +20,7 @@ from autopilot.estimation.correction import (
     with_load,
     with_vehicle,
 )
-from autopilot.estimation.covariance import absorb, begin, enter, farness, gather, scalar
+from autopilot.estimation.covariance import absorb, begin, enter, farness, forget, gather, scalar
 from autopilot.estimation.history import renew
 from autopilot.estimation.measurements.magnetic import correct_magnetic, magnetic_north
 from autopilot.estimation.measurements.pose import spread_out
@@ -31,9 +31,12 @@ from autopilot.estimation.records import (
     FIX,
     GNSS,
     NOBODY,
+    PLAIN,
     POSITION,
     QUAT,
     RECEIVER,
+    RTK_FIXED,
+    RTK_FLOAT,
     SIZE,
     TRACKER,
     V_QUAD,
@@ -55,6 +58,8 @@ from autopilot.geometry.s2 import normalise, tangent
 from autopilot.geometry.so3 import quat_from_rotation, rotation_from_quat
 
 FIXES_BEFORE_RESET = 8.0
+LEAST_PERIOD_S = 0.02  # between two fixes
+SETTLED = 2.0  # times the deviation of a slow error that is another one
 CLIMB_WORSE = 1.7  # deviation of the climb over that of the level speed
 STANDING_STD = 0.02  # m, of the height of a standing vehicle
 STARTING_SPEED_STD = 0.2  # m/s
@@ -213,9 +218,7 @@ def start_by_fix(
         about_x, about_y = -R[1][j] * bias_var / g, R[0][j] * bias_var / g
         P[ATTITUDE, ACCEL_BIAS + j], P[ACCEL_BIAS + j, ATTITUDE] = about_x, about_x
         P[ATTITUDE + 1, ACCEL_BIAS + j], P[ACCEL_BIAS + j, ATTITUDE + 1] = about_y, about_y
-    for i in range(3):
-        slow = state.aids.horizontal_slow if i < 2 else state.aids.vertical_slow
-        P[GNSS + i, GNSS + i] = slow * slow
+    state = settled(state, history)
     x_quad, v_quad = fix.position, fix.velocity
     if not flies:
         x_quad, v_quad = (x_quad[0], x_quad[1], tuning.gear_height), ZERO
@@ -239,6 +242,17 @@ def start_by_fix(
     if state.load.source != TRACKER:
         state = with_load(state, found_load(state, history, tuning, thrust), state.resets)
     return state
+
+
+@kernel
+def settled(state: EstimatorState, history: History) -> EstimatorState:
+    """The receiver's slow error drawn anew, of the deviation that is stated now."""
+    P, aids = history.covariance, state.aids
+    forget(P, GNSS, 3)
+    for i in range(3):
+        slow = aids.horizontal_slow if i < 2 else aids.vertical_slow
+        P[GNSS + i, GNSS + i] = slow * slow
+    return with_aids(state, with_field(aids, "gnss", ZERO))
 
 
 @kernel
@@ -266,16 +280,25 @@ def correct_gnss(
         return state
     state = heard(state, fix.age_s, SIZE)
     n = state.size
-    share = tuning.rtk_white if fix.rtk > 0.0 else tuning.gnss_white
+    share = tuning.rtk_white if fix.rtk > PLAIN else tuning.gnss_white
+    starting = state.vehicle.source == NOBODY
+    # what a fix floats by is no error of the fixes before, and the same until the carrier is fixed again: all
+    # readings of EST_GPS_TAU together count as one
+    floats = fix.rtk == RTK_FLOAT and not starting
+    since = max(LEAST_PERIOD_S, state.vehicle.age_s - fix.age_s)
+    same = max(1.0, 2.0 * tuning.gnss_time / since) if floats else 1.0
     slow = sqrt(1.0 - share * share)
+    before = state.aids.horizontal_slow
     aids = with_slow(
         state.aids,
-        slow * fix.horizontal_std,
-        slow * fix.vertical_std,
-        1.0 if fix.rtk > 0.0 else PLAIN_REVERSION,
+        state.aids.horizontal_slow if floats else slow * fix.horizontal_std,
+        state.aids.vertical_slow if floats else slow * fix.vertical_std,
+        1.0 if fix.rtk > PLAIN else PLAIN_REVERSION,
     )
     state = with_aids(state, aids)
-    starting = state.vehicle.source == NOBODY
+    # once the carrier's waves are counted, what was left of the error before is over
+    if fix.rtk == RTK_FIXED and not starting and before > SETTLED * aids.horizontal_slow:
+        state = settled(state, history)
     if starting:
         if not (aids.magnetic_age <= MAGNETIC_FRESH_S and tells_attitude(state.last_imu.accel, aids.field)):
             return state
@@ -284,7 +307,9 @@ def correct_gnss(
     innovation = sub(fix.position, add(past.x_quad, state.aids.gnss))
     difference = sub(fix.velocity, past.v_quad)
     level, climb = share * fix.horizontal_std, share * fix.vertical_std
-    speed = tuning.rtk_speed_std if fix.rtk > 0.0 else tuning.gnss_speed_std
+    if floats:
+        level, climb = sqrt(same) * fix.horizontal_std, sqrt(same) * fix.vertical_std
+    speed = tuning.rtk_speed_std if fix.rtk > PLAIN else tuning.gnss_speed_std
     worse = CLIMB_WORSE * speed
     position_var = (level * level, level * level, climb * climb)
     velocity_var = (speed * speed, speed * speed, worse * worse)
