@@ -32,6 +32,8 @@ PLAIN = (
     Row("B lab, law thesis", "case-b", {}, settings={"CTL_LAW": 0.0}),
 )
 REAL_LAB, REAL_FIELD = ("lab-real", "bebop-real"), ("field", "bebop-real")
+HEAVY_FIELD = ("field", "heavy-real")
+WINDY = {"SIM_ACT_DELAY_MS": 0.0, "SIM_WIND_E": 5.0, "SIM_GUST_STD": 1.0}
 LATE = {"SIM_ACT_DELAY_MS": 12.0}
 STEP = {"rise_time_90_s": 0.0, "overshoot_pct": 0.0, "settling_time_5pct_s": 0.0}
 ROOM = {"MIS_ROTOR_MARG": 35.0}  # a battery that sags has not all the thrust that it is thought to have
@@ -52,6 +54,8 @@ REAL = (
     _real("C lab load +50 %", "case-c", {}, REAL_LAB, SIM_LOAD_MASS=0.15),
     _real("B rtk", "case-b", {}, REAL_FIELD),
     _real("C rtk", "case-c", {}, REAL_FIELD),
+    _real("B field heavy", "case-b", {}, HEAVY_FIELD, **WINDY),
+    _real("C field heavy", "case-c", {}, HEAVY_FIELD, **WINDY, **ROOM, MIS_INFEASIBLE=1.0),
     _real("gust lab", "hover", {}, REAL_LAB, SIM_GUST_E=5.0, SIM_GUST_AT_S=18.0, SIM_GUST_FOR_S=2.0),
     _real("A lab", "case-a", STEP, REAL_LAB, **ROOM),
 )

@@ -50,6 +50,7 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
         return
     total = len(waiting)
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     if not quiet:
         expected = in_words(expected_s([part.cost_s for part in waiting], cores))
         count = f"{total} parts" if total > 1 else waiting[0].title
@@ -68,7 +69,7 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
             if not remain:
                 return "that was the last part"
             begun = [(part.cost_s, now_s - begun_s) for part, _, begun_s in running.values()]
-            more = in_words(remaining_s(done, begun, [part.cost_s for part in waiting], cores))
+            more = in_words(remaining_s(done, begun, [part.cost_s for part in waiting], cores, busy))
             return f"{remain} of {total} parts remain after {now_s - all_begun_s:.0f} s, {more} more"
 
         while waiting or running:

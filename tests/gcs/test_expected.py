@@ -21,8 +21,17 @@ def test_what_remains_is_told_at_the_pace_of_what_is_done():
     # what took 10 s on an idle machine took 30 s
     assert remaining_s([(10.0, 30.0)], [(26.0, 30.0)], [8.0], 2) == pytest.approx(48.0)
     # nothing is done yet, but both have taken three times as long as they should
-    assert remaining_s([], [(26.0, 78.0), (10.0, 30.0)], [8.0], 2) == pytest.approx(24.0)
-    assert remaining_s([(10.0, 10.0)], [(26.0, 30.0)], [], 2) == pytest.approx(0.0)
+    assert remaining_s([], [(26.0, 78.0), (10.0, 30.0)], [8.0], 2) == pytest.approx(7.5 + 24.0)
+
+
+def test_what_should_be_done_takes_a_while_yet():
+    assert remaining_s([(10.0, 10.0)], [(26.0, 32.0)], [], 2) == pytest.approx(8.0)
+
+
+def test_a_core_is_shared_with_what_else_runs_until_the_pace_is_known():
+    # four want two cores
+    assert remaining_s([], [(26.0, 6.0), (10.0, 6.0)], [], 2, busy=2.0) == pytest.approx(46.0)
+    assert remaining_s([(10.0, 10.0)], [(26.0, 6.0), (10.0, 6.0)], [], 2, busy=2.0) == pytest.approx(20.0)
 
 
 def test_a_fast_machine_is_not_promised_to_stay_fast():
