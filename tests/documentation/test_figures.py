@@ -52,7 +52,7 @@ def figure(row: str, name: str, digits: int) -> str:
 def readme() -> str:
     """What README says of the flights."""
     return f"""In each of {SWEEP["completed"]:,} flights the load kept within {math.ceil(1e3 * SWEEP["error_100"])} mm of its path at 2 m/s, with motion-capture noise, motor lag and
-rotors that saturate ([Case B](docs/missions.md), `sensors lab`).
+rotors that saturate (`gcs fly case-b --sensors lab`).
 The law that does it, `plumbline`, takes the derivatives of its commands from model and mission, predicts over the delay
 it knows of, learns the load's mass and the wind, has gains computed from the vehicle for a delay it must survive, and
 flies paths that were shaped to the rotors beforehand. The law of the thesis that the project starts from errs by
