@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -68,7 +69,22 @@ def test_what_is_compiled_is_not_compiled_again_and_the_longest_part_comes_first
     assert len(marks.read_text().split()) == 2
 
 
-def test_all_parts_run_and_are_marked(tmp_path, capsys):
+def load_of(monkeypatch, others):
+    """So many other processes want a core."""
+    monkeypatch.setattr(os, "getloadavg", lambda: (float(others), 0.0, 0.0), raising=False)
+
+
+def test_more_time_is_told_where_others_want_the_cores(tmp_path, capsys, monkeypatch):
+    load_of(monkeypatch, 1000)
+    warm_up([part("only", "pass")])
+    (more,) = re.search(
+        r" after 0 s, about (\d+) (?:s|min) more$", capsys.readouterr().err.splitlines()[1]
+    ).groups()
+    assert int(more) > 3
+
+
+def test_all_parts_run_and_are_marked(tmp_path, capsys, monkeypatch):
+    load_of(monkeypatch, 0)
     parts = [part(name, f"open({str(tmp_path / name)!r}, 'w')") for name in ("first", "second", "third")]
     warm_up(parts)
     assert all((tmp_path / name).exists() for name in ("first", "second", "third"))
