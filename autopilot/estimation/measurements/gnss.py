@@ -285,9 +285,10 @@ def correct_gnss(
     # what a fix floats by is no error of the fixes before, and the same until the carrier is fixed again: all
     # readings of EST_GPS_TAU together count as one
     floats = fix.rtk == RTK_FLOAT and not starting
-    since = max(LEAST_PERIOD_S, state.vehicle.age_s - fix.age_s)
-    same = max(1.0, 2.0 * tuning.gnss_time / since) if floats else 1.0
-    slow = sqrt(1.0 - share * share)
+    white, slow = share, sqrt(1.0 - share * share)
+    if floats:
+        since = max(LEAST_PERIOD_S, state.vehicle.age_s - fix.age_s)
+        white = sqrt(max(1.0, 2.0 * tuning.gnss_time / since))
     before = state.aids.horizontal_slow
     aids = with_slow(
         state.aids,
@@ -306,9 +307,7 @@ def correct_gnss(
     past = look_back(state, history, tuning, fix.age_s)
     innovation = sub(fix.position, add(past.x_quad, state.aids.gnss))
     difference = sub(fix.velocity, past.v_quad)
-    level, climb = share * fix.horizontal_std, share * fix.vertical_std
-    if floats:
-        level, climb = sqrt(same) * fix.horizontal_std, sqrt(same) * fix.vertical_std
+    level, climb = white * fix.horizontal_std, white * fix.vertical_std
     speed = tuning.rtk_speed_std if fix.rtk > PLAIN else tuning.gnss_speed_std
     worse = CLIMB_WORSE * speed
     position_var = (level * level, level * level, climb * climb)
