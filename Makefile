@@ -18,17 +18,20 @@ install: $(STAMP) ## make .venv, install Plumbline in it and compile the flight 
 	$(BIN)/gcs warmup
 
 $(STAMP): pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Plumbline needs Python 3.11 or newer; try make PYTHON=python3.11")'
-	$(PYTHON) -m venv $(VENV)
-	$(PIP) --editable .
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Plumbline needs Python 3.11 or newer; try make PYTHON=python3.11")'
+	@echo "Installing Plumbline and what it needs in $(VENV): about half a minute, longer on a busy machine or a slow network"
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) --editable .
 	@touch $@
 
 $(DEV_STAMP): $(STAMP)
-	$(PIP) --editable '.[dev,clients]'
+	@echo "Installing what the tests and the checks need"
+	@$(PIP) --editable '.[dev,clients]'
 	@touch $@
 
 $(DOCS_STAMP): $(STAMP)
-	$(PIP) --editable '.[docs]'
+	@echo "Installing what builds the documentation"
+	@$(PIP) --editable '.[docs]'
 	@touch $@
 
 fly: $(STAMP) ## fly Case B through three real processes and show the report

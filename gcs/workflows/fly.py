@@ -20,7 +20,7 @@ from gcs.errors import (
     disk_trouble,
 )
 from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, fresh_folder, keep_others, make_folder
-from gcs.shell.display import say
+from gcs.shell.display import is_live, say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
 from gcs.workflows.before_flight import check_mission, check_options
@@ -80,6 +80,8 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
         if options.connect is None:
             laws = (options.law,) if options.firmware is None else ()
             warm_up(flight_parts(laws), options.quiet)
+            if not options.quiet:
+                say("starting the simulator and the autopilot")
         with (
             StopRequest("stopping; Ctrl-C again abandons the report") as stop,
             _page(mission, options, view, stop) as page,
@@ -99,6 +101,8 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
 
             def tell(record: Record, outcome: Outcome) -> None:
                 told(record, outcome)
+                if not options.quiet and not is_live():  # on a terminal a bar shows it
+                    say("drawing the report")
                 if page is not None:
                     page.tell(outcome=outcome.name, reason=outcome.reason)
 
