@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 from gcs.cli import gcs
@@ -11,6 +12,7 @@ def main() -> None:
     """Run the command line."""
     # small matrices, and processes for what is parallel: threads of BLAS would only wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read as numpy is imported, here and in our children
+    gc.set_threshold(100_000, 20, 20)  # most of what is made is modules and tables, which stay
     gcs(prog_name="gcs")
 
 

@@ -9,8 +9,10 @@ points.
 from __future__ import annotations
 
 import ast
+import gc
 import hashlib
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -91,11 +93,11 @@ def _imports(path: Path, module: str) -> Iterator[str]:
 def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
     """Dotted names that a source in this package imports, and whether it calls `iter_modules`."""
     names: list[str] = []
-    finds_modules = False
-    for node in ast.walk(ast.parse(source)):
+    with _nothing_collected():  # a tree is of many objects, none of which is garbage
+        tree = ast.parse(source)
+        finds_modules = b"iter_modules" in source and any(map(_calls_iter_modules, ast.walk(tree)))
+    for node in _statements(tree):
         match node:
-            case ast.Call(func=ast.Name(id="iter_modules") | ast.Attribute(attr="iter_modules")):
-                finds_modules = True
             case ast.Import():
                 names += [alias.name for alias in node.names]
             case ast.ImportFrom():
@@ -105,3 +107,34 @@ def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
                     base = ".".join([*above[: len(above) - node.level + 1], *([base] if base else [])])
                 names += [base, *(f"{base}.{alias.name}" for alias in node.names)]
     return tuple(names), finds_modules
+
+
+@contextmanager
+def _nothing_collected() -> Iterator[None]:
+    """Without garbage collection, if there was any."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
+
+
+def _calls_iter_modules(node: ast.AST) -> bool:
+    match node:
+        case ast.Call(func=ast.Name(id="iter_modules") | ast.Attribute(attr="iter_modules")):
+            return True
+    return False
+
+
+def _statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """All statements of a module, those inside of others too; expressions hold none, and are most of a tree."""
+    ahead = [tree]
+    while ahead:
+        node = ahead.pop()
+        yield node
+        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+            inside = getattr(node, block, ())
+            if isinstance(inside, list):  # the body of a lambda is an expression
+                ahead += inside

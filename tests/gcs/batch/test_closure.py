@@ -115,7 +115,14 @@ def test_imports_of_every_form_are_followed(tmp_path: Path) -> None:
         "gcs/b/tables/other.toml": "",
         "gcs/b/code/__init__.py": "",
         "gcs/b/code/of_code.toml": "",
-        "gcs/f.py": "import numpy, unknown.module",
+        "gcs/f.py": "import numpy, unknown.module, gcs.inside",
+        "gcs/inside.py": (
+            "f = lambda: 1\n"
+            "try:\n    from gcs import tried\nexcept ImportError:\n    from gcs import failed\n"
+            "else:\n    from gcs import succeeded\nfinally:\n    from gcs import ended\n"
+            "match f():\n    case 1:\n        with f():\n            from gcs import chosen"
+        ),
+        **{f"gcs/{name}.py": "" for name in ("tried", "failed", "succeeded", "ended", "chosen")},
         "gcs/h.py": "from missions import *",
         "gcs/lonely.py": "",
         "gcs/many/__init__.py": "import pkgutil\nNAMES = [m.name for m in pkgutil.iter_modules(__path__)]",
