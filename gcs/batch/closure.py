@@ -129,7 +129,7 @@ def _calls_iter_modules(node: ast.AST) -> bool:
 
 
 def _statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """All statements of a module, those inside of others too; expressions hold none, and are most of a tree."""
+    """All statements of a module, nested ones too; expressions hold none, and are most of a tree."""
     ahead = [tree]
     while ahead:
         node = ahead.pop()
