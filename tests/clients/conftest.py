@@ -165,6 +165,17 @@ class Mavproxy:
             )
         self.text = self.text.partition(text)[2]
 
+    def insist(self, line: str, text: str) -> None:
+        """Type `line` every few seconds until it has said `text`: too early, it knows no parameter yet."""
+        until = time.monotonic() + 60.0
+        while text not in self.text:
+            assert time.monotonic() < until, f"MAVProxy did not say {text!r} but {self.all[-2000:]!r}"
+            self.type(line)
+            again = time.monotonic() + 3.0
+            while text not in self.text and time.monotonic() < again:
+                self._read(again - time.monotonic())
+        self.text = self.text.partition(text)[2]
+
     def _read(self, timeout_s: float) -> bool:
         assert self.process.stdout is not None
         ready = select.select([self.process.stdout], [], [], max(timeout_s, 0.0))[0]

@@ -325,8 +325,7 @@ def _load_a_loop(program: Mavproxy, directory: Path, *first: str) -> None:
 def _ask_for_home_and_the_fence(program: Mavproxy) -> None:
     """That home is told, MAVProxy does not say: see `acknowledged`."""
     program.type("gethome")
-    program.type("param set GF_MAX_HOR_DIST 50")
-    program.expect("fence present")
+    program.insist("param set GF_MAX_HOR_DIST 50", "fence present")
     for command, said in (("disable", "fence disabled"), ("enable", "fence enabled")):
         program.type(f"fence {command}")
         program.expect(said)

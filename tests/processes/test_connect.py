@@ -33,11 +33,14 @@ def test_the_script_of_docs_python_md_flies(start: Callable[..., Any]) -> None:
 
 
 def running(start: Callable[..., Any]) -> tuple[str, Any]:
-    """Start a simulator and an autopilot that nobody else meets; where it is met, and the autopilot."""
+    """Start a simulator and an autopilot that nobody else meets, as far as it flies; where it is met, and the
+    autopilot."""
     simulator, truth, port = (f"127.0.0.1:{free_port()}" for _ in range(3))
     start("sitl", "--listen", simulator, "--truth", truth, "--speed", "20", "--sensors", "ideal")
     words = ("--sim", simulator, "--gcs", port, "--api", "none", "--storage", "storage")
-    return port, start("autopilot", *words)
+    autopilot = start("autopilot", *words)
+    autopilot.says(b"flying with the simulator")
+    return port, autopilot
 
 
 def test_the_truth_of_another_simulator_is_refused(start: Callable[..., Any], tmp_path: Path) -> None:
