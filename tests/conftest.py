@@ -1,10 +1,12 @@
 """For all tests: examples of hypothesis have no deadline, for the first one may compile a kernel; a failed
 assertion in the shared doubles is explained like one of a test; linear algebra keeps to one thread, for on a
-busy machine several of them wait for each other; a path that was shaped is not shaped again.
+busy machine several of them wait for each other; a path that was shaped is not shaped again; what was
+collected is no garbage, and is not looked through for any.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 from functools import cache
@@ -22,6 +24,11 @@ pytest.register_assert_rewrite("tests.doubles")
 
 settings.register_profile("plumbline", deadline=None)
 settings.load_profile("plumbline")
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -24,7 +24,6 @@ class Fails(LoadPid):
         return super().load_position(memory, now)
 """
 FAULTS = {
-    "return memory, now.no_such_field": "no attribute 'no_such_field' (mine.py:8); landing by law plumbline",
     "raise SystemExit(0)": "Law Fails failed: SystemExit: 0 (mine.py:8); landing by law plumbline",
     "time.sleep(600.0)": (
         "Law Fails failed: TooSlow: no answer for seconds (mine.py:8); landing by law plumbline"
