@@ -7,7 +7,6 @@ positions, straight lines for errors, the last value for commands and counters. 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from gcs.analysis.align import as_of, linear
 from gcs.analysis.axes import Floats, cable_angles, roll_pitch_yaw
 from gcs.analysis.samples import PHASE_NAMES, Samples
 from gcs.analysis.tracks import Telemetry, numbers
+from gcs.formats.arrow import array_of, text_array
 
 if TYPE_CHECKING:
     import pyarrow
@@ -100,49 +100,22 @@ def flight_table(telemetry: Telemetry, samples: Samples, about: dict[str, Any]) 
     import pyarrow as pa
 
     columns = flight_columns(telemetry, samples)
-    arrays: dict[str, Any] = {"time_s": _array(columns.pop("time_s"))}
+    arrays: dict[str, Any] = {"time_s": array_of(columns.pop("time_s"))}
     # codes of a dictionary are what pandas calls a categorical
     names = [PHASE_NAMES[value] for value in range(len(PHASE_NAMES))]
     unknown = (samples.phase < 0) | (samples.phase >= len(names))
     codes = np.where(unknown, 0, samples.phase).astype(np.int8)
-    arrays["phase"] = pa.DictionaryArray.from_arrays(_array(codes, unknown), _strings(names))
+    arrays["phase"] = pa.DictionaryArray.from_arrays(array_of(codes, unknown), text_array(names))
     for name, values in columns.items():
         if name in _WHOLE:
             missing = np.isnan(values) if values.dtype.kind == "f" else values < 0
-            arrays[name] = _array(np.where(missing, 0, values).astype(_WHOLE[name]), missing)
+            arrays[name] = array_of(np.where(missing, 0, values).astype(_WHOLE[name]), missing)
         elif values.dtype.kind == "f":
-            arrays[name] = _array(values, np.isnan(values))
+            arrays[name] = array_of(values, np.isnan(values))
         else:
-            arrays[name] = _array(values)
+            arrays[name] = array_of(values)
     table = pa.Table.from_arrays(list(arrays.values()), list(arrays))
     return table.replace_schema_metadata({METADATA_KEY: json.dumps(about).encode()})
-
-
-# `pyarrow.array` and `pyarrow.table` import pandas wherever it is installed, which takes longer than all else
-
-
-def _array(values: Any, missing: Any = None) -> pyarrow.Array:
-    """(n,) numbers or truth values, null where `missing`."""
-    import pyarrow as pa
-
-    valid = None if missing is None or not missing.any() else pa.py_buffer(_bits(~missing))
-    kind = pa.from_numpy_dtype(values.dtype)
-    data = _bits(values) if values.dtype.kind == "b" else np.ascontiguousarray(values)
-    return pa.Array.from_buffers(kind, len(values), [valid, pa.py_buffer(data)])
-
-
-def _bits(values: Any) -> Any:
-    return np.packbits(values, bitorder="little")
-
-
-def _strings(texts: Sequence[str]) -> pyarrow.Array:
-    import pyarrow as pa
-
-    coded = [text.encode() for text in texts]
-    ends = np.cumsum([0, *map(len, coded)], dtype=np.int32)
-    return pa.Array.from_buffers(
-        pa.string(), len(coded), [None, pa.py_buffer(ends), pa.py_buffer(b"".join(coded))]
-    )
 
 
 def write_flight(path: Path, telemetry: Telemetry, samples: Samples, about: dict[str, Any]) -> None:

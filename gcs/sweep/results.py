@@ -69,16 +69,16 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     law = np.array(table.column("law").to_pylist(), dtype=object)
     outcome = np.array(table.column("outcome").to_pylist(), dtype=object)
     phase = np.array(table.column("lost_phase").to_pylist(), dtype=object)
-    error = table.column("load_error_max_m").to_numpy()
-    index, seed = (table.column(column).to_numpy() for column in ("index", "seed"))
+    error = np.array(table.column("load_error_max_m").to_pylist(), dtype=np.float64)
+    index, seed = (np.array(table.column(name).to_pylist(), dtype=np.int64) for name in ("index", "seed"))
+    varied = {v.name: np.array(table.column(v.name).to_pylist(), dtype=np.float64) for v in plan.varied}
     found = []
     for reference in plan.laws:
-        name = name_of(reference)
-        rows = law == name
+        rows = law == name_of(reference)
         found.append(
             Flights(
-                name,
-                {v.name: table.column(v.name).to_numpy()[rows] for v in plan.varied},
+                name_of(reference),
+                {name: values[rows] for name, values in varied.items()},
                 outcome[rows] == COMPLETED,
                 error[rows],
                 tuple(outcome[rows].tolist()),

@@ -13,7 +13,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from autopilot.own.law import name_of
+from gcs.formats.arrow import array_of, text_array
 from gcs.sweep.flight import Flown
 from gcs.sweep.plan import Case, SweepPlan
 
@@ -62,6 +65,21 @@ def row_of(plan: SweepPlan, case: Case, flown: Flown, wall_s: float) -> Row:
     }
 
 
+def table_of(rows: Sequence[Row], kinds: pyarrow.Schema) -> pyarrow.Table:
+    """Rows as a table of these columns."""
+    import pyarrow as pa
+
+    def column(field: pa.Field) -> pa.Array:
+        values: list[Any] = [row.get(field.name) for row in rows]
+        if field.type == pa.string():
+            return text_array(values)
+        kind = np.int64 if field.type == pa.int64() else np.float64
+        known = np.array([0 if value is None else value for value in values], dtype=kind)
+        return array_of(known, np.array([value is None for value in values]))
+
+    return pa.Table.from_arrays([column(field) for field in kinds], schema=kinds)
+
+
 class Store:
     """The flights of a sweep's directory."""
 
@@ -85,21 +103,17 @@ class Store:
 
         found: set[int] = set()
         for path in self._files():
-            found.update(pq.read_table(path, columns=["index"]).column("index").to_pylist())
+            found.update(pq.ParquetFile(path).read(columns=["index"]).column("index").to_pylist())
         return found
 
     def add(self, rows: Sequence[Row]) -> None:
         """Store rows as a part of its own."""
-        import pyarrow as pa
-
         if not rows:
             return
         folder = self._directory / PARTS
         folder.mkdir(parents=True, exist_ok=True)
         first = min(row["index"] for row in rows)
-        self._write(
-            folder / f"{first:09d}-{len(rows)}.parquet", pa.Table.from_pylist(list(rows), self._schema)
-        )
+        self._write(folder / f"{first:09d}-{len(rows)}.parquet", table_of(rows, self._schema))
 
     def merge(self) -> pyarrow.Table:
         """One table of all that is stored, in the order of the flights; the parts go when it is on disk."""
@@ -117,13 +131,13 @@ class Store:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        tables = [pq.read_table(path, schema=self._schema) for path in self._files()]
+        # `read_table` and `to_numpy` import pandas too
+        tables = [pq.ParquetFile(path).read().cast(self._schema) for path in self._files()]
         if not tables:
             return self._schema.empty_table()
-        table = pa.concat_tables(tables).sort_by("index")
-        index = table.column("index").to_numpy()
-        first = [True, *(index[1:] != index[:-1]).tolist()] if len(index) else []
-        return table.filter(pa.array(first, pa.bool_())).replace_schema_metadata(self._schema.metadata)
+        table = pa.concat_tables(tables)
+        _, first = np.unique(table.column("index").to_pylist(), return_index=True)
+        return table.take(array_of(first)).replace_schema_metadata(self._schema.metadata)
 
     def clear(self) -> None:
         """Forget all flights."""

@@ -9,6 +9,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+import pyarrow
 import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
@@ -99,6 +100,19 @@ def test_a_sweep_that_was_killed_goes_on(whole: tuple[SweepPlan, Path, run.Swept
     done = swept(plan, tmp_path)
     assert (done.flights, done.flown) == (6, 3)
     assert without_clock(tmp_path) == without_clock(complete)
+
+
+def test_flights_are_stored_without_what_imports_pandas(
+    whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, complete, _ = whole
+    rows = pq.read_table(complete / "flights.parquet").to_pylist()
+    for module, name in ((pyarrow, "array"), (pyarrow, "table"), (pq, "read_table")):
+        monkeypatch.delattr(module, name)
+    store = Store(tmp_path, plan)
+    store.add(rows[3:])
+    store.add(rows[:3])
+    assert str(store.merge().to_pylist()) == str(rows)  # nan is not equal to itself
 
 
 def test_report_holds_map_curve_and_margin(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
