@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import signal
+import sys
+import threading
 import time
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
+from multiprocessing.context import ForkContext, SpawnContext
+from multiprocessing.process import BaseProcess
 
 from autopilot.onboard.onboard import Gains, Onboard, Rehearsal, Work
 from autopilot.shell.watched_calls import watched_calls
@@ -26,14 +30,28 @@ class Aside:
         self._work: Work | Gains | None = None  # what it is at
         self._since = 0.0  # when that began
         self._loaded = False
-        self._process: SpawnProcess | None = None
+        self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
+
+    def branch_off(self) -> None:
+        """Begin the process with what is loaded here, while there is no thread, lock or socket to take along.
+
+        Where that cannot be, `start` begins one that loads all of it itself: a second of processor time.
+        """
+        if sys.platform.startswith("linux") and threading.active_count() == 1:
+            self._begin(get_context("fork"))
 
     def start(self, rehearsal: Rehearsal) -> None:
         """Have the process load what it needs, which it does by `rehearsal`."""
-        context = get_context("spawn")
+        if self._process is None:
+            self._begin(get_context("spawn"))
+        with suppress(OSError):  # it has died: the next look finds that out
+            self._pipe.send(rehearsal)  # type: ignore[union-attr]
+
+    def _begin(self, context: ForkContext | SpawnContext) -> None:
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(rehearsal, theirs), daemon=True)
+        ours = self._pipe if isinstance(context, ForkContext) else None
+        self._process = context.Process(target=_serve, args=(theirs, ours), daemon=True)
         self._process.start()
         theirs.close()
 
@@ -83,11 +101,16 @@ class Aside:
         self._loaded = False
 
 
-def _serve(rehearsal: Rehearsal, pipe: Connection) -> None:
+def _serve(pipe: Connection, of_parent: Connection | None) -> None:
+    """Work for whom `pipe` leads to; a fork has the other end too, and would not see it closed."""
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # whoever began it ends it
-    rehearsal.done()
+    if of_parent is not None:
+        of_parent.close()
+        gc.enable()
     with suppress(EOFError, OSError), watched_calls():  # our parent is gone
+        rehearsal: Rehearsal = pipe.recv()
+        rehearsal.done()
         pipe.send(None)  # ready
         while True:
             work: Work | Gains = pipe.recv()

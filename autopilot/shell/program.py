@@ -91,6 +91,7 @@ class Program:
         storing: Storing,
         simulator: Address,
         ground: GroundStations | GroundInStep,
+        aside: Aside,
         say: Callable[[str], None],
     ) -> None:
         self._build = build
@@ -115,7 +116,7 @@ class Program:
             system_status=mavlink.MAV_STATE_BOOT,
             mavlink_version=3,
         )
-        self._aside = Aside()
+        self._aside = aside
         self.cost = TickCost()
         self._greeting = FrameWriter(SIMULATOR_SYSTEM, AUTOPILOT_COMPONENT).frame(greeting)
         self.onboard = build(mission)
@@ -298,7 +299,6 @@ class Program:
         self._storing.close()
         self._socket.close()
         self._ground.close()
-        self._aside.close()
 
 
 def _stored_by(storage: Storage, event: Event) -> Callable[[], None] | None:
@@ -451,11 +451,14 @@ def main(
     program: Program | None = None
     place = home or Home()
     in_step = ground_lockstep is not None
+    aside = Aside()
     try:
         own = Own(own_law(law or DEFAULT_LAW), estimator, planner)
         table = parameters_for(load_belief(vehicle), own)
         check_names(settings, table.names)
         kept = Storage(storage or user_state_path("plumbline"))
+        if not in_step:
+            aside.branch_off()
         kept.lock()
         troubles = kept.load_parameters(table)
         if law:
@@ -493,7 +496,7 @@ def main(
             ground = GroundInStep(ground_lockstep)
         else:
             ground = GroundStations(stations, programs, listen(tcp) if tcp else None, storing)
-        program = Program(build, mission, kept, storing, sim, ground, say)
+        program = Program(build, mission, kept, storing, sim, ground, aside, say)
         areas, unread = kept.load_areas(place)
         program.take_areas(areas)
         program.tell(troubles + unread)
@@ -513,6 +516,7 @@ def main(
     finally:
         if program is not None:
             program.close()
+        aside.close()
     if program is not None:
         cost = "" if in_step else program.cost.summary()
         say("; ".join(filter(None, (f"stopped at t = {program.onboard.now_us / 1e6:.3f} s", cost))))
