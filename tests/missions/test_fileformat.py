@@ -88,7 +88,7 @@ def test_every_kind_of_item_becomes_its_step() -> None:
 
 BAD = {
     WAYPOINT.replace("3.0", "-2.0"): (
-        "items[1].altitude_m = -2.0; must be > 0 and <= 1000 (height of the load above home)"
+        "items[1].altitude_m = -2.0; must be >= 0.01 and <= 1000 (height of the load above home)"
     ),
     WAYPOINT.replace("3.0", "nan"): (
         "items[1].altitude_m = nan; must be a finite number (height of the load above home)"
