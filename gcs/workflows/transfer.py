@@ -77,7 +77,7 @@ def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
             f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip goes on"
         )
     if not judged.items:
-        raise GcsError(f"{path}: nothing that can be flown; gcs clear takes the mission off the vehicle")
+        raise GcsError(f"{path}: nothing that can be flown; gcs clear deletes the mission on the vehicle")
     return judged.items
 
 
