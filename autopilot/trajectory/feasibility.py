@@ -370,7 +370,7 @@ def _excess(value: float, limit: float) -> str:
     return (
         f"{100.0 * (times - 1.0):.0f} % over"
         if times < _MANIFOLD
-        else f"{float(f'{times:.2g}'):.0f} times the limit"
+        else f"{float(f'{times:.2g}'):g} times the limit"
     )
 
 
