@@ -209,7 +209,7 @@ def _problem(error: dict[str, Any], path: str, field: FieldInfo | None) -> str:
     about = f" ({field.description})" if field is not None and field.description else ""
     if error["type"] == "missing":
         return f"{path} is missing{about}"
-    if error["type"] in ("too_long", "too_short") and isinstance(error["input"], list | tuple):
+    if error["type"] == "too_long" and isinstance(error["input"], list | tuple):
         return f"{path} has {len(error['input'])} entries; must be {_allowed(error, field)}{about}"
     if error["type"] == "value_error":
         return f"{path} {error['ctx']['error']}".lstrip()

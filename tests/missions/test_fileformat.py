@@ -116,7 +116,7 @@ BAD = {
     "[[items]]\nduration_s = 1.0": (f"items[1].type is missing; must be one of {KINDS}"),
     "[[items]]\ntype = 3": (f"items[1].type = 3; must be one of {KINDS}"),
     SIGNALS: "items[1].terms is missing",
-    SIGNALS + "terms = []": "items[1].terms has 0 entries; must be a list of at least 1",
+    SIGNALS + "terms = []": "items[1].terms = []; must be a list of at least 1",
     SIGNALS + "terms = [3]": "items[1].terms[0] = 3; must be a table",
     SIGNALS + TERM.replace('"z"', '"up"'): (
         'items[1].terms[0].axis = "up"; must be "x", "y" or "z" (x east, y north, z up)'
