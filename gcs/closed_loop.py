@@ -18,10 +18,10 @@ from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.wire.convert import Home
-from autopilot.wire.items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, TruthQueue, ground_turn
+from gcs.mission_items import items_of
 from missions.model import Mission
 from sitl.hil import HilSimulator
 
@@ -74,7 +74,7 @@ def fly(
     onboard = build_onboard(conditions, home)
     onboard.add_link(_GROUND)
     simulator = build_simulator(conditions, home)
-    client = client or FlightClient(encode_mission(mission, home), expected_duration_s(mission))
+    client = client or FlightClient(items_of(mission, home), expected_duration_s(mission))
     capture = Capture(log)
     turns, truth_queue = LockstepTurns(), TruthQueue()
     said: list[bytes] = []

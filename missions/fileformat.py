@@ -21,6 +21,12 @@ class MissionFileError(FileError):
     """A mission file is missing or wrong: the fault of whoever wrote or named it."""
 
 
+# tables that belong within others, at the top of a file
+_MISPLACED = {
+    "terms": 'not a key of the file; write [[items.terms]] behind an item of type "signals"',
+    "factors": "not a key of the file; write [[items.terms.factors]] behind its [[items.terms]]",
+}
+
 MISSIONS = TomlFiles("mission", "missions", error=MissionFileError)
 
 
@@ -42,6 +48,13 @@ def parse_mission(text: str, name: str, where: str) -> Mission:
 
 def mission_of(table: Mapping[str, Any], name: str, where: str) -> Mission:
     """The mission of these keys and values. `where` begins each line of a MissionFileError."""
+    misplaced = [f"{where}: {key}: {says}" for key, says in _MISPLACED.items() if key in table]
+    if isinstance(table.get("items"), Mapping):
+        misplaced.append(
+            f"{where}: items is a single table; write [[items]], in two brackets, before each item"
+        )
+    if misplaced:
+        raise MissionFileError(misplaced)
     head = MISSIONS.record(FileSpec, table, where)
     items: list[Item] = []
     wrong: list[str] = []

@@ -9,20 +9,19 @@ from __future__ import annotations
 from math import radians
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from missions import model
+from missions import limits, model
 
-LONGEST_S = 3600.0
-FARTHEST_M = 1000.0
-
-Seconds = Annotated[float, Field(ge=0.0, le=LONGEST_S)]
-PositiveSeconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
-# The vehicle evaluates its path every few milliseconds: a faster wave or a steeper edge is a typing mistake.
-EdgeSeconds = Annotated[float, Field(ge=0.1, le=LONGEST_S)]
-Metres = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
-Height = Annotated[float, Field(gt=0.0, le=FARTHEST_M, description="height of the load above home")]
-Degrees = Annotated[float, Field(gt=-90.0, lt=90.0)]
+Seconds = Annotated[float, Field(ge=0.0, le=limits.LONGEST_S)]
+RunSeconds = Annotated[float, Field(ge=limits.SHORTEST_RUN_S, le=limits.LONGEST_S)]
+EdgeSeconds = Annotated[float, Field(ge=limits.SHORTEST_EDGE_S, le=limits.LONGEST_S)]
+Metres = Annotated[float, Field(ge=-limits.FARTHEST_M, le=limits.FARTHEST_M)]
+Height = Annotated[
+    float,
+    Field(ge=limits.LOWEST_M, le=limits.FARTHEST_M, description="height of the load above home"),
+]
+Degrees = Annotated[float, Field(ge=-limits.LARGEST_TILT_DEG, le=limits.LARGEST_TILT_DEG)]
 
 
 class Spec(BaseModel):
@@ -57,14 +56,16 @@ class WaypointItem(Item):
 
 
 class SpeedItem(Item):
-    speed_m_s: float = Field(gt=0.0, le=20.0, description="peak speed on the transfers that follow")
+    speed_m_s: float = Field(
+        ge=limits.SLOWEST_M_S, le=limits.FASTEST_M_S, description="peak speed on the transfers that follow"
+    )
 
     def step(self) -> model.Step:
         return model.Speed(self.speed_m_s)
 
 
 class DelayItem(Item):
-    duration_s: PositiveSeconds = Field(description="time to hold the load where it hangs")
+    duration_s: RunSeconds = Field(description="time to hold the load where it hangs")
 
     def step(self) -> model.Step:
         return model.Delay(self.duration_s)
@@ -86,16 +87,26 @@ class ReleaseItem(Item):
 
 
 class WinchItem(Item):
-    length_m: Metres = Field(description="by which the cable gets longer; negative: shorter")
-    speed_m_s: float | None = Field(None, ge=0.01, le=1.0, description="peak rate of the winch")
+    length_m: float = Field(
+        ge=-limits.LONGEST_CABLE_M,
+        le=limits.LONGEST_CABLE_M,
+        description="by which the cable gets longer; negative: shorter",
+    )
+    speed_m_s: float | None = Field(
+        None, ge=limits.SLOWEST_REEL_M_S, le=limits.FASTEST_REEL_M_S, description="peak rate of the winch"
+    )
 
     def step(self) -> model.Step:
         return model.Winch(self.length_m, self.speed_m_s)
 
 
 class SineSpec(Spec):
-    period_s: float = Field(ge=0.1, le=2000.0, description="period of the sine")
-    phase_deg: float = Field(0.0, ge=-360.0, le=360.0, description="phase at start_s")
+    period_s: float = Field(
+        ge=limits.SHORTEST_PERIOD_S, le=limits.LONGEST_PERIOD_S, description="period of the sine"
+    )
+    phase_deg: float = Field(
+        0.0, ge=-limits.LARGEST_PHASE_DEG, le=limits.LARGEST_PHASE_DEG, description="phase at start_s"
+    )
     start_s: Seconds = Field(0.0, description="time of the phase, from the beginning of the signals")
 
     def sine(self) -> model.Sine:
@@ -109,7 +120,7 @@ class TermSpec(Spec):
     rise_s: EdgeSeconds = Field(description="duration of the half-cosine rise")
     hold_s: Seconds | None = Field(None, description="time at the top; leave out with fall_s to stay there")
     fall_s: EdgeSeconds | None = Field(None, description="duration of the half-cosine fall")
-    factors: list[SineSpec] = Field(default_factory=list, max_length=3)
+    factors: list[SineSpec] = Field(default_factory=list, max_length=limits.MOST_FACTORS)
     rise_90_by_s: EdgeSeconds | None = Field(
         None, description="time after start_s by which nine tenths of the rise are to be made"
     )
@@ -142,8 +153,8 @@ class TermSpec(Spec):
 
 
 class SignalsItem(Item):
-    duration_s: PositiveSeconds = Field(description="duration of the whole trajectory")
-    terms: list[TermSpec] = Field(min_length=1, max_length=32)
+    duration_s: RunSeconds = Field(description="duration of the whole trajectory")
+    terms: list[TermSpec] = Field(min_length=1, max_length=limits.MOST_TERMS)
 
     def step(self) -> model.Step:
         return model.Signals(self.duration_s, tuple(term.term() for term in self.terms))
@@ -175,7 +186,18 @@ ITEMS: dict[str, type[Item]] = {
 
 
 class FileSpec(Spec):
-    title: str = Field(min_length=1, max_length=120, description="one line for lists and reports")
+    title: str = Field(
+        min_length=1, max_length=limits.LONGEST_TITLE, description="one line for lists and reports"
+    )
     description: str = Field("", description="what the mission is for")
     assumptions: list[str] = Field(default_factory=list, description="values chosen, one sentence each")
-    items: list[dict[str, Any]] = Field(min_length=1, max_length=1000, description="the [[items]] in order")
+    items: list[dict[str, Any]] = Field(
+        min_length=1, max_length=limits.MOST_ITEMS, description="the [[items]] in order"
+    )
+
+    @field_validator("title")
+    @classmethod
+    def _is_one_line(cls, title: str) -> str:
+        if not title.isprintable():
+            raise ValueError("must be one line of printable characters (for lists and reports)")
+        return title

@@ -27,6 +27,9 @@ Spec = TypeVar("Spec", bound=BaseModel)
 _SUFFIX = ".toml"
 _LONGEST_SHOWN = 40  # characters of a value
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+_NUMBER_WITH_UNIT = re.compile(
+    r"\s*(\w+)\s*=\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[A-Za-z%/][\w%/^*]*\s*(?:#.*)?$"
+)
 # last part of a key: its unit in words; the longest that fits counts
 _UNITS = {
     "_m_s": "metres per second",
@@ -166,7 +169,18 @@ def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
         line, column = place.groups()
     else:
         line, column = str(text.count("\n") + 1), str(len(text) - text.rfind("\n"))
-    return f"{where}:{line}:{column}: not TOML: {message.split(' (at ', maxsplit=1)[0]}"
+    lines = text.splitlines()
+    at = lines[int(line) - 1] if 0 < int(line) <= len(lines) else ""
+    return f"{where}:{line}:{column}: not TOML: {message.split(' (at ', maxsplit=1)[0]}{_toml_hint(at)}"
+
+
+def _toml_hint(line: str) -> str:
+    """What to write instead, for mistakes whose kind the line shows."""
+    found = _NUMBER_WITH_UNIT.match(line)
+    if found:
+        key, number = found.groups()
+        return f"; a number is written without its unit, which the key names: {key} = {number}"
+    return ""
 
 
 def _place(location: Sequence[str | int], spec: type[BaseModel], at: str) -> tuple[str, str, type[BaseModel]]:
@@ -195,6 +209,8 @@ def _problem(error: dict[str, Any], path: str, field: FieldInfo | None) -> str:
     about = f" ({field.description})" if field is not None and field.description else ""
     if error["type"] == "missing":
         return f"{path} is missing{about}"
+    if error["type"] == "too_long" and isinstance(error["input"], list | tuple):
+        return f"{path} has {len(error['input'])} entries; must be {_allowed(error, field)}{about}"
     if error["type"] == "value_error":
         return f"{path} {error['ctx']['error']}".lstrip()
     return f"{path} = {shown(error['input'])}; must be {_allowed(error, field)}{about}"

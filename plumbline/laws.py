@@ -1,4 +1,4 @@
-"""What a control law of one's own is written with: `docs/laws.md` shows how.
+"""What a custom control law is written with: `docs/laws.md` shows how.
 
 World ENU, body FLU, SI.
 """

@@ -62,7 +62,7 @@ def _run_on(cpu: int) -> None:
     default="bebop",
     show_default=True,
     metavar="NAME|FILE",
-    help=f"What really flies: {VEHICLES.choice()}.",
+    help=f"The simulated vehicle: {VEHICLES.choice()}.",
 )
 @click.option(
     "--seed", default=1, show_default=True, type=WholeNumber(0, MOST_SEED), help="Seed of all noise."
@@ -70,6 +70,7 @@ def _run_on(cpu: int) -> None:
 @click.option(
     "--speed",
     type=click.FloatRange(0.0, 1000.0, min_open=True),
+    metavar="NUMBER",
     help="Simulated seconds per second, at most.  [default: 1; with --lockstep: no limit]",
 )
 @click.option("--lockstep", is_flag=True, help="As fast as the autopilot answers.")
@@ -82,7 +83,7 @@ def _run_on(cpu: int) -> None:
     "--listen",
     type=address_option,
     metavar="HOST:PORT",
-    help="Where autopilots find us.  [default: 127.0.0.1:4560; for ardupilot and betaflight :9002]",
+    help="Where to listen for autopilots.  [default: 127.0.0.1:4560; for ardupilot and betaflight :9002]",
 )
 @click.option(
     "--truth",
@@ -90,7 +91,7 @@ def _run_on(cpu: int) -> None:
     metavar="HOST:PORT",
     default="127.0.0.1:14560",
     show_default=True,
-    help="Where the truth goes, for logs and reports.",
+    help="Where to send the true state, for logs and reports.",
 )
 @click.option(
     "--truth-every",
@@ -104,16 +105,16 @@ def _run_on(cpu: int) -> None:
     type=setting_option,
     metavar="NAME=VALUE",
     multiple=True,
-    help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are passed over.",
+    help="Set a SIM_ parameter; repeatable. Parameters of the autopilot are ignored.",
 )
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option("--cpu", type=WholeNumber(0), metavar="N", help="Run on this processor core only.")
 @click.option(
     "--parameters",
     is_flag=True,
-    help="Print the path of the parameter file that the autopilot of others wants, and end.",
+    help="Print the path of the parameter file for the third-party autopilot, and exit.",
 )
-@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+@click.option("--quiet", is_flag=True, help="Print errors only.")
 @click.version_option(package_name="plumbline", message="sitl (Plumbline) %(version)s")
 def main(
     interface: str,
@@ -135,7 +136,7 @@ def main(
     """Simulate a quadrotor with a load on a cable, and its sensors.
 
     Waits for an autopilot, sends it sensor readings and takes rotor commands back, by MAVLink over UDP (the
-    autopilots of others as they want it). The world waits for the answer to every tick: on a busy machine
+    third-party autopilots as they want it). The world waits for the answer to every tick: on a busy machine
     its clock is slower, and nothing is lost.
     """
     if lockstep and real_time:
@@ -143,7 +144,7 @@ def main(
     kind = AUTOPILOTS[interface]
     if parameters:
         if kind.run is None:
-            raise click.UsageError("--parameters is for the autopilots of others: add --for")
+            raise click.UsageError("--parameters is for third-party autopilots: add --for")
         click.echo(parameter_file(interface))
         return
     if real_time and kind.run is not None and not kind.real_time:

@@ -1,4 +1,4 @@
-"""Where a control law of one's own and the compiled tick meet: a row of numbers, and functions at addresses.
+"""Where a custom control law and the compiled tick meet: a row of numbers, and functions at addresses.
 
 The tick writes what the law is given (`Now`) to the front of the row, calls the function of the present mode
 with the row's address, and reads what it asks for (`Asked`) from behind it. What lies behind that is the

@@ -349,7 +349,7 @@ def _address_or_none(text: str) -> Address | None:
     multiple=True,
     default=("127.0.0.1:14550",),
     show_default=True,
-    help="Ground station to speak to; repeatable, `none` for none.",
+    help="Ground station to send to; repeatable, `none` for none.",
 )
 @click.option(
     "--api",
@@ -358,7 +358,7 @@ def _address_or_none(text: str) -> Address | None:
     multiple=True,
     default=("127.0.0.1:14540",),
     show_default=True,
-    help="API client to speak to; repeatable, `none` for none.",
+    help="API client to send to; repeatable, `none` for none.",
 )
 @click.option(
     "--tcp",
@@ -377,7 +377,7 @@ def _address_or_none(text: str) -> Address | None:
     default="bebop",
     show_default=True,
     metavar="NAME|FILE",
-    help=f"What is believed to fly: {VEHICLES.choice()}.",
+    help=f"The vehicle as the autopilot knows it: {VEHICLES.choice()}.",
 )
 @click.option(
     "--law",
@@ -402,7 +402,7 @@ def _address_or_none(text: str) -> Address | None:
     type=setting_option,
     metavar="NAME=VALUE",
     multiple=True,
-    help="Set a parameter; repeatable. SIM_ parameters of the simulator are passed over.",
+    help="Set a parameter; repeatable. SIM_ parameters, which are the simulator's, are ignored.",
 )
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(
@@ -415,14 +415,14 @@ def _address_or_none(text: str) -> Address | None:
     "--signing-key",
     type=signing_key_option,
     metavar="FILE",
-    help="Hear only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
+    help="Accept only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
 )
 @click.option(
     "--allow-setup-signing",
     is_flag=True,
     help="Take a first signing key from whoever sends SETUP_SIGNING.",
 )
-@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+@click.option("--quiet", is_flag=True, help="Print errors only.")
 @click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")
 def main(
     sim: Address,

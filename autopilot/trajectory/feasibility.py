@@ -49,6 +49,7 @@ _JUMP_M = 1e-3
 _JUMP_M_S = 1e-2
 # How far below the ground (m) a path may dip by rounding.
 _GROUND_M = 1e-6
+_MANIFOLD = 3.0  # from here on an excess is told as a multiple
 _NUMBERS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
@@ -277,7 +278,8 @@ def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterato
     # a step that begins under the ground has been told of at the one that led there
     if along.height_low.value < min(entry.begin[2], 0.0) - _GROUND_M:
         says = f"the load would be {-along.height_low.value:.2f} m under the ground"
-        advice = "begin higher (altitude_m) or lower amplitude_m of z"
+        lower = "length_m" if isinstance(entry.step, Winch) else "amplitude_m of z"
+        advice = f"begin higher (altitude_m) or lower {lower}"
         yield violation("height", along.height_low, 0.0, says, advice)
     if fall.value >= gravity:
         # beyond this the cable would have to push: thrust and tilt mean nothing any more
@@ -362,7 +364,14 @@ def _kind(entry: TimelineEntry) -> str:
 
 
 def _excess(value: float, limit: float) -> str:
-    return f"{100.0 * (value / limit - 1.0):.0f} % over" if limit > 0.0 else f"{value - limit:.2f} over"
+    if limit <= 0.0:
+        return f"{value - limit:.2f} over"
+    times = value / limit
+    return (
+        f"{100.0 * (times - 1.0):.0f} % over"
+        if times < _MANIFOLD
+        else f"{float(f'{times:.2g}'):g} times the limit"
+    )
 
 
 def _advice(entry: TimelineEntry, time: float) -> str:

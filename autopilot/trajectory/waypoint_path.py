@@ -45,6 +45,7 @@ _PER_SEGMENT = 8  # intervals to the shortest segment
 _MOST_INTERVALS = 400
 _SAMPLES = 4  # to an interval, of the integral
 _FINE_S = 0.01
+_MOST_FINE = 20_000  # samples, 50 to an interval: a flight of hours takes no more memory than one of minutes
 _SPLIT_ROUNDS = 6
 _MOST_SPLIT = 8  # segments whose times are optimised; more get those of the rule of thumb
 _SCALE_ROUNDS = 8
@@ -147,7 +148,8 @@ class MinimumSnap:
 
     def jets(self) -> tuple[Array, Array]:
         """Times (n,) and jets (7, n, 3) along the path, relative to its first point."""
-        times = np.linspace(0.0, self.basis.breaks[-1], max(int(self.basis.breaks[-1] / _FINE_S), 50) + 1)
+        whole = float(self.basis.breaks[-1])
+        times = np.linspace(0.0, whole, int(np.clip(whole / _FINE_S, 50, _MOST_FINE)) + 1)
         values, first = self.basis.band(times, 7)
         return times, band_jets(values, first, self.coefficients)
 

@@ -1,6 +1,6 @@
 """What a flight asked of the load, where the autopilot knows of none and says nothing: read from its mission.
 
-An autopilot of others flies the vehicle along lines between its waypoints; the load belongs a cable length
+A third-party autopilot flies the vehicle along lines between its waypoints; the load belongs a cable length
 below. What is asked of the load at a time is the nearest point of the line that is being flown: the error is
 the load's distance from the path, whatever the time table. The phases are Plumbline's, seen in the truth.
 """

@@ -192,7 +192,7 @@ class MissionDownload:
 
 
 class MissionClear:
-    """Take the mission off the vehicle."""
+    """Delete the mission on the vehicle."""
 
     def __init__(self, target: Target) -> None:
         self.result: Result | None = None

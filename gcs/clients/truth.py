@@ -70,6 +70,11 @@ class Truth:
         where = f"UDP {self._where}"
         if self.heard:
             return ""
+        if not self._worlds and self._run is not None:
+            return (
+                f"the simulator that the vehicle flies in is silent at {where}: it stands still (SIGSTOP, a "
+                f"debugger), has ended, or tells its truth elsewhere; {_OTHER}"
+            )
         if not self._worlds:
             return f"no simulator tells its truth at {where}; {_OTHER}"
         if self._run is not None:

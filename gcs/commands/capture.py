@@ -29,7 +29,7 @@ def capture_command(
 ) -> None:
     """Capture telemetry until Ctrl-C.
 
-    The fast messages of the report are asked for, so that gcs report can be made of the log.
+    The fast messages that a report needs are requested, so that gcs report can use the log.
     """
     from gcs.workflows.capture import capture_to
 

@@ -10,7 +10,7 @@ import click
 from gcs.clients import command
 from gcs.clients.operation import Operation
 from gcs.clients.vehicle_view import FLOWN_MODES
-from gcs.commands.options import FiniteType, PositiveType, connect_option
+from gcs.commands.options import FiniteType, OptionalArgument, PositiveType, connect_option
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 
@@ -81,7 +81,7 @@ def resume_command(address: Address) -> None:
 
 
 @click.command("takeoff", context_settings={"ignore_unknown_options": True})  # -1 is a number here
-@click.argument("height", type=PositiveType(), required=False)
+@click.argument("height", type=PositiveType(), required=False, cls=OptionalArgument)
 @click.option("--altitude", type=PositiveType(), help="The same as HEIGHT.")
 @connect_option
 def takeoff_command(height: float | None, altitude: float | None, address: Address) -> None:
@@ -107,7 +107,7 @@ def takeoff_command(height: float | None, altitude: float | None, address: Addre
 @click.command("goto", context_settings={"ignore_unknown_options": True})  # -1 is a number here
 @click.argument("east", type=FiniteType())
 @click.argument("north", type=FiniteType())
-@click.argument("up", type=FiniteType(), required=False)
+@click.argument("up", type=FiniteType(), required=False, cls=OptionalArgument)
 @click.option(
     "--frame",
     type=click.Choice(["home", "load"]),
@@ -123,8 +123,8 @@ def goto_command(
     """Take the load to a place and hold it there.
 
     EAST, NORTH and UP are the place of the load in m; without UP it keeps its height. The vehicle must be
-    flying. It is told how far the load has to go; the vehicle refuses what is more than 100 km off, or beyond
-    its fence.
+    flying. The distance to go is printed; the vehicle refuses what is more than 100 km off, or beyond its
+    fence.
     """
     from gcs.workflows.reposition import reposition
 

@@ -55,12 +55,12 @@ _OWN = (
     "--autopilot",
     "firmware",
     metavar="KIND=PROGRAM",
-    help="Fly with an autopilot of others, ardupilot=PROGRAM or px4=PROGRAM; see docs/autopilots.md.",
+    help="Fly with a third-party autopilot, ardupilot=PROGRAM or px4=PROGRAM; see docs/autopilots.md.",
 )
 @click.option(
     "--seed", type=WholeNumber(0, MOST_SEED), default=1, show_default=True, help="Seed of all noise."
 )
-@click.option("--lockstep", is_flag=True, help="As fast as it goes, the same bytes each time (default).")
+@click.option("--lockstep", is_flag=True, help="As fast as possible, and reproducible to the byte (default).")
 @click.option(
     "--speed",
     type=PositiveType(most=100.0),

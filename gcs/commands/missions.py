@@ -46,11 +46,11 @@ def check_command(
 ) -> int:
     """Check whether a vehicle can fly a mission.
 
-    MISSION is a shipped name or the path of a mission file. Every limit that it breaks is named, with by how
-    much and when; the exit code is 1 if there is any. Of what can be flown it is told how long it takes, how
-    far from the asked path it is, and what it takes of rotors, cable and tilt. With --as-asked the paths are
-    judged as the laws thesis and lqr fly them, not shaped to what can be flown. With --planner the paths
-    through waypoints are those of a planner of your own, and what is wrong with one is told.
+    MISSION is a shipped name or the path of a mission file. Every limit that it breaks is printed, with the
+    time and the excess; the exit code is 1 if there is any. Otherwise the duration of each path, its distance
+    from the asked path, and its peaks of rotor force, tension and tilt are printed. With --as-asked the paths
+    are judged as the laws thesis and lqr fly them, not shaped to what can be flown. With --planner the paths
+    through waypoints are those of a planner of your own, whose errors are printed.
     """
     if planner and as_asked:
         raise click.UsageError("--as-asked judges no path of a planner; leave --planner or it out", ctx)

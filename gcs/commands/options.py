@@ -65,6 +65,13 @@ class OutputPath(NamedPath):
 OUTPUT_FOLDER, OUTPUT_FILE = OutputPath(is_folder=True), OutputPath(is_folder=False)
 
 
+class OptionalArgument(click.Argument):
+    """An argument that may be left out; an error names it without the brackets of the usage line."""
+
+    def get_error_hint(self, ctx: click.Context | None) -> str:
+        return f"'{self.human_readable_name}'"
+
+
 class FiniteType(click.ParamType):  # type: ignore[type-arg]
     """A finite number."""
 
@@ -76,7 +83,7 @@ class FiniteType(click.ParamType):  # type: ignore[type-arg]
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            self.fail(f"{value!r}; must be a number", param, ctx)
+            self.fail(f"{value!r}; must be a finite number", param, ctx)
         return number
 
 
@@ -135,7 +142,7 @@ def truth_option(function: F) -> F:
         "--truth",
         "truth_at",
         type=TruthType(),
-        help="Where the vehicle's simulator tells what is true, PORT or HOST:PORT: what sitl --truth names.  "
+        help="Where the vehicle's simulator sends the true state, PORT or HOST:PORT (sitl --truth).  "
         f"[default: {SITL_TRUTH.port}]",
     )(function)
 
@@ -299,6 +306,30 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+_UNITS = {
+    "_n_s2_m2": "N s^2/m^2",
+    "_n_s_m": "N s/m",
+    "_m_s2": "m/s^2",
+    "_m_s": "m/s",
+    "_1_s": "1/s",
+    "_n": "N",
+    "_m": "m",
+    "_s": "s",
+    "_us": "us",
+    "_v": "V",
+    "_hz": "Hz",
+    "_kg": "kg",
+    "_deg": "deg",
+    "_rad": "rad",
+}
+
+
+def spoken(key: str) -> str:
+    """A key of a record as people read it: `cable_tension_n` is `cable tension (N)`."""
+    unit = max((one for one in _UNITS if key.endswith(one)), key=len, default="")
+    return key.removesuffix(unit).replace("_", " ") + (f" ({_UNITS[unit]})" if unit else "")
 
 
 def print_table(rows: Sequence[Sequence[str]], header: Sequence[str] = ()) -> None:

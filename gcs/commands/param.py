@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import click
 
-from gcs.commands.options import OUTPUT_FILE, connect_option, json_option, print_json, print_table
+from gcs.commands.options import OUTPUT_FILE, FiniteType, connect_option, json_option, print_json, print_table
 from gcs.errors import GcsError
 from gcs.shell.link import Address
 from gcs.workflows.parameters import (
@@ -58,12 +57,10 @@ def get_command(names: tuple[str, ...], as_json: bool, address: Address) -> None
 
 @param_command.command("set")
 @click.argument("name")
-@click.argument("value", type=float)
+@click.argument("value", type=FiniteType())
 @connect_option
 def set_command(name: str, value: float, address: Address) -> None:
     """Set parameter NAME to VALUE, and see that it was stored."""
-    if not math.isfinite(value):
-        raise click.BadParameter(f"{value}; must be a finite number", param_hint="VALUE")
     click.echo(set_parameter(name, value, address))
 
 

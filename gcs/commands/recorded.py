@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json, print_table
+from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json, print_table, spoken
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -51,7 +51,7 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     _print_rows(record)
     print_table(
         [
-            (name.replace("_", " "), f"{one['value']:.4f}", f"+- {one['half_width']:.4f}")
+            (spoken(name), f"{one['value']:.4f}", _interval(one["half_width"]))
             for name, one in record["identified"].items()
         ]
     )
@@ -63,7 +63,7 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,
-    help="Where table and picture go.  [default: replays/NAME]",
+    help="Where table and picture go.  [default: replays/, by the flight's folder or the file's name]",
 )
 @json_option
 def replay_command(file: Path, columns: str | None, out: Path | None, as_json: bool) -> None:
@@ -94,6 +94,11 @@ def _print_rows(record: dict[str, Any]) -> None:
     broken = f", broken at {record['breaks']} rows" if record["breaks"] else ""
     jitter = f", jitter {1e3 * record['row_jitter_s']:.1f} ms" if record["row_jitter_s"] else ""
     click.echo(f"{record['rows']} rows, {record['duration_s']:.1f} s{jitter}{broken}")
+
+
+def _interval(half_width: float) -> str:
+    """As +- with four decimals; a width that these do not show has its first digits."""
+    return f"+- {half_width:.4f}" if half_width == 0.0 or half_width >= 5e-5 else f"+- {half_width:.1e}"
 
 
 def _shown(key: str, value: float) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from gcs.commands.options import connect_option, json_option, print_json, print_table, truth_option
+from gcs.commands.options import connect_option, json_option, print_json, print_table, spoken, truth_option
 from gcs.shell.link import Address
 from gcs.workflows.status import vehicle_status, vehicle_texts
 
@@ -17,16 +17,16 @@ from gcs.workflows.status import vehicle_status, vehicle_texts
 @connect_option
 @truth_option
 def status_command(as_json: bool, address: Address, truth_at: Address | None) -> None:
-    """Show what the vehicle says of itself.
+    """Show the vehicle's status.
 
-    Below it stand its last warnings, and what was worse, with their age.
+    Its last warnings and errors follow, with their age.
     """
     record = vehicle_status(address, truth_at)
     if as_json:
         print_json(record)
         return
     texts = record.pop("texts")
-    print_table([(name.replace("_", " "), _shown(value)) for name, value in record.items()])
+    print_table([(spoken(name), _shown(value)) for name, value in record.items()])
     if texts:
         click.echo()
         print_table(_lines(texts))
@@ -36,9 +36,9 @@ def status_command(as_json: bool, address: Address, truth_at: Address | None) ->
 @json_option
 @connect_option
 def texts_command(as_json: bool, address: Address) -> None:
-    """List what the vehicle has told the operators.
+    """List the messages (STATUSTEXT) of the vehicle.
 
-    It keeps the last 50 texts, each with the time at which it was said last.
+    The vehicle keeps the last 50, each with the time at which it was last sent.
     """
     texts = vehicle_texts(address)
     if as_json:

@@ -116,7 +116,8 @@ def sweep_command(
     holds flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that
     was stopped goes on when the same command is given again.
 
-    What the vehicle cannot do is flown as well, as by gcs fly --force: gcs check MISSION tells it beforehand.
+    What the vehicle cannot do is flown as well, as by gcs fly --force: gcs check MISSION reports it
+    beforehand.
 
     \b
     gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5

@@ -39,11 +39,11 @@ _RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 )
 @connect_option
 def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address: Address) -> None:
-    """Put a mission on the vehicle.
+    """Upload a mission to the vehicle.
 
     MISSION is a shipped name, the path of a mission file, or a .plan or .waypoints file of another ground
-    station. The old mission stays in force until the new one is there whole. A .plan replaces fence and rally
-    points too, as it does from QGroundControl.
+    station. The old mission stays in force until the new one has arrived completely. A .plan replaces fence
+    and rally points too, as it does from QGroundControl.
     """
     upload(mission, vehicle, force, skip, address, click.echo)
 
@@ -53,7 +53,7 @@ def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address:
 @json_option
 @connect_option
 def download_command(file: Path | None, as_json: bool, address: Address) -> None:
-    """Fetch the mission from the vehicle.
+    """Download the mission from the vehicle.
 
     Each line is one mission item as it travels; null and - stand for values that are not given. With FILE,
     which ends in .plan or .waypoints, it is written for other ground stations, a .plan with fence and rally
@@ -75,7 +75,7 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
 @click.command("clear")
 @connect_option
 def clear_command(address: Address) -> None:
-    """Take the mission off the vehicle."""
+    """Delete the mission on the vehicle."""
     with Session(address) as session:
         click.echo(session.run(MissionClear(session.find())).text)
 

@@ -10,6 +10,7 @@ from autopilot.trajectory.route import PlanError, Planner
 from autopilot.wire.convert import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
+from gcs.mission_items import items_of
 from gcs.workflows.checked import note_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
@@ -17,7 +18,11 @@ from missions.model import Mission
 
 
 def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Violation]:
-    """What the vehicle cannot do of it; with paths `shaped` by the autopilot or as they are asked."""
+    """What the vehicle cannot do of it; with paths `shaped` by the autopilot or as they are asked.
+
+    InputError if a vehicle would not even accept it.
+    """
+    items_of(mission, Home())
     found = check(mission, load_limits(vehicle), shaped)
     if not found:
         note_flyable(mission, vehicle, shaped)

@@ -39,5 +39,7 @@ def remaining_s(
 
 
 def in_words(seconds: float) -> str:
-    """A rough time, as a person says it."""
-    return f"about {max(seconds, 1.0):.0f} s" if seconds < 90.0 else f"about {seconds / 60.0:.0f} min"
+    """A rough time, as a person says it: in whole minutes only where a minute is a small part of it."""
+    if seconds < 90.0:
+        return f"about {max(seconds, 1.0):.0f} s"
+    return f"about {seconds / 10.0:.0f}0 s" if seconds < 295.0 else f"about {seconds / 60.0:.0f} min"

@@ -67,7 +67,7 @@ def doubts(vehicle: str, settings: Iterable[tuple[str, float]]) -> list[str]:
 def split_settings(
     vehicle: str, sensors: str, settings: Iterable[tuple[str, float]]
 ) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
-    """The settings of the simulator, and those that are left to an autopilot of others; GcsError as above."""
+    """The settings of the simulator, and those left to a third-party autopilot; GcsError as above."""
     try:
         found = load_vehicle(vehicle)
         load_profile(sensors)

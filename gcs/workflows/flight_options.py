@@ -15,7 +15,7 @@ _REFUSED = 2.0  # MIS_INFEASIBLE
 
 
 class FirmwareProgram(NamedTuple):
-    """An autopilot of others that is started for the flight: which one, and its program."""
+    """A third-party autopilot that is started for the flight: which one, and its program."""
 
     kind: str
     path: Path

@@ -16,11 +16,11 @@ from typing import Any
 
 from autopilot.own.law import name_of
 from autopilot.wire.convert import Home
-from autopilot.wire.items import encode_mission
 from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
 from gcs.clients.flight import FlightClient
 from gcs.errors import GcsError
+from gcs.mission_items import items_of
 from gcs.shell.display import say
 from gcs.shell.feed import COMMAND, EVENT, TRUTH, VEHICLE, FeedEnd, pipe
 from gcs.shell.processes import Processes
@@ -155,7 +155,7 @@ def flight_page(mission: Mission, options: FlightOptions, page: PageOptions) -> 
 def _about(mission: Mission, options: FlightOptions) -> dict[str, Any]:
     own = options.connect is None
     record: dict[str, Any] = {"kind": "fly", "mission": mission.name, "title": mission.title}
-    record["waypoints"] = waypoints_record(encode_mission(mission, Home()), Home())
+    record["waypoints"] = waypoints_record(items_of(mission, Home()), Home())
     if own:
         record |= {"law": name_of(options.law), "sensors": options.sensors, "vehicle_name": options.vehicle}
         record |= {"seed": options.seed, "speed": options.speed}

@@ -1,4 +1,4 @@
-"""A flight by an autopilot of others, started for it on Plumbline's world, and stopped after it."""
+"""A flight by a third-party autopilot, started for it on Plumbline's world, and stopped after it."""
 
 from __future__ import annotations
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.wire.convert import Home
-from autopilot.wire.items import encode_mission
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient
+from gcs.mission_items import items_of
 from gcs.shell.display import FlightDisplay
 from gcs.shell.link import unix_us
 from gcs.shell.processes import STOPPED_LIMIT_S
@@ -30,7 +30,7 @@ def flight_client(
     """The ground station's side of the flight of a vehicle with this home, which may be silent so long."""
     slow = 1.0 if options.speed is None else max(1.0, 1.0 / options.speed)
     return FlightClient(
-        encode_mission(mission, home),
+        items_of(mission, home),
         expected_duration_s(mission),
         options.limit_s,
         round(silence_us * slow),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gcs.errors import GcsError, InputError, input_error
+from gcs.folders import TLOG_FILE
 
 if TYPE_CHECKING:
     from gcs.recorded.column_map import ColumnMap
@@ -54,7 +55,6 @@ def identify(path: Path, columns: str | None) -> dict[str, Any]:
 def replay(path: Path, columns: str | None, out: Path | None) -> tuple[dict[str, Any], Path]:
     """The scores of the estimates, and the folder in which their table and picture are."""
     from gcs.recorded.estimates import filtered, load_position, rows_of
-    from gcs.recorded.recording import name_of
     from gcs.recorded.replay_files import write_picture, write_table
     from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
 
@@ -90,6 +90,13 @@ def replay(path: Path, columns: str | None, out: Path | None) -> tuple[dict[str,
     except OSError as error:
         raise GcsError(f"{folder}: {error.strerror}") from None
     return record, folder
+
+
+def name_of(path: Path) -> str:
+    """The name of a recording; a flight goes by its folder, as the log in each is called flight.tlog."""
+    from gcs.recorded.recording import name_of as stem
+
+    return (path.resolve().parent.name if path.name == TLOG_FILE else "") or stem(path)
 
 
 def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel]:

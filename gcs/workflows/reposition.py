@@ -9,6 +9,7 @@ from autopilot.geometry.linear import Vec3, add, norm, sub
 from autopilot.wire.convert import Home
 from autopilot.wire.convert.geodesy import enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.items.limits import FARTHEST_M
 from gcs.clients import command
 from gcs.clients.operation import Operation
 from gcs.errors import GcsError
@@ -37,6 +38,12 @@ def reposition(
     if begin is None:
         raise GcsError("the vehicle does not tell where its load is")
     east, north, up = add(begin, (offset[0], offset[1], offset[2] or 0.0))
+    far = math.hypot(east, north)
+    if far > FARTHEST_M:
+        raise GcsError(
+            f"the place is {far / 1e3:.4g} km from the vehicle's origin; "
+            f"must be at most {FARTHEST_M / 1e3:g} km"
+        )
     latitude, longitude, _ = geodetic_from_enu((east, north, up), origin)
     height_m = math.nan if offset[2] is None else up
     operation = command.reposition(session.target, latitude, longitude, height_m, speed_m_s)

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from autopilot.wire.dialect import plumbline as mavlink
-from autopilot.wire.items import WireItem, encode_mission
+from autopilot.wire.items import WireItem
 from gcs.clients.missions import MissionDownload, MissionUpload
 from gcs.errors import GcsError
 from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
 from gcs.formats.plan import Plan
+from gcs.mission_items import items_of
 from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -45,7 +46,7 @@ def checked_upload(
     loaded = load_checked(mission, vehicle, force)
 
     def send(session: Session) -> None:
-        items = encode_mission(loaded, vehicle_home(session))
+        items = items_of(loaded, vehicle_home(session))
         tell(session.run(MissionUpload(session.target, items), "upload").text)
 
     return send
@@ -76,7 +77,7 @@ def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
             f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip goes on"
         )
     if not judged.items:
-        raise GcsError(f"{path}: nothing that can be flown; gcs clear takes the mission off the vehicle")
+        raise GcsError(f"{path}: nothing that can be flown; gcs clear deletes the mission on the vehicle")
     return judged.items
 
 

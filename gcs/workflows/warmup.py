@@ -29,7 +29,7 @@ _REPORT = Part("the report", "gcs.report.warm", (), ROOT / "gcs" / "report" / "s
 
 
 def flight_parts(laws: Sequence[str]) -> list[Part]:
-    """What `gcs fly` needs for flights with these laws; with none, by an autopilot of others."""
+    """What `gcs fly` needs for flights with these laws; with none, by a third-party autopilot."""
     own = autopilot_parts(*laws) if laws else ()
     return [*own, SIMULATOR, _CHECK, _REPORT]
 
@@ -70,6 +70,8 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
                 return "that was the last part"
             begun = [(part.cost_s, now_s - begun_s) for part, _, begun_s in running.values()]
             more = in_words(remaining_s(done, begun, [part.cost_s for part in waiting], cores, busy))
+            if total == 1:
+                return f"after {now_s - all_begun_s:.0f} s, {more} more"
             return f"{remain} of {total} parts remain after {now_s - all_begun_s:.0f} s, {more} more"
 
         while waiting or running:

@@ -1,1 +1,1 @@
-"""Control laws of one's own, as examples: docs/laws.md tells how they came about."""
+"""Custom control laws, as examples: docs/laws.md tells how they came about."""

@@ -75,15 +75,17 @@ def run_lockstep(
             clock.wait()
         link.gather_truth(simulator)
         link.send(simulator.sensor_datagram())
+        asked_s = time.monotonic()  # what is not counted as waiting looks like a busy machine
         if ticks is None:
             arrived = link.receive()
         else:
             moved, arrived = ticks.run()
             if moved:
                 continue
+            asked_s = time.monotonic()
         greeted = arrived is not None and link.take(*arrived, simulator)
         if not simulator.answered:
-            waited_s = _insist(link, simulator, stop, watch, arrived is None or greeted)
+            waited_s = _insist(link, simulator, stop, watch, arrived is None or greeted, asked_s)
             if waited_s >= WAITED_S:
                 say(f"waited {waited_s:.1f} s for the autopilot")
                 if clock is not None:
@@ -124,10 +126,12 @@ class Clock:
             self._simulator.parameters.say(text, mavlink.MAV_SEVERITY_NOTICE)
 
 
-def _insist(link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool) -> float:
+def _insist(
+    link: Link, simulator: HilSimulator, stop: StopRequest, watch: Watch, again: bool, began: float
+) -> float:
     """Until the present tick is answered, send it again; `again`: at once, as nothing came or a greeting.
-    Returns how long that took, in s."""
-    began = sent = time.monotonic()
+    Returns how long the answer took, in s, since the tick was sent at `began` (monotonic)."""
+    sent = time.monotonic()
     silence_s = _RESEND_FIRST_S
     while not simulator.answered:
         stop.check()

@@ -129,7 +129,7 @@ WHAT = {
     "hexarotor": "5 kg with a load of 1.5 kg on 1 m of cable: no real vehicle either; it lands with its load "
     "when it has lost any one rotor",
     "iris": "1.5 kg with a load of 0.3 kg on 1 m of cable, of the size of the 3DR Iris, for "
-    "autopilots of others ([autopilots.md](autopilots.md))",
+    "third-party autopilots ([autopilots.md](autopilots.md))",
     "octorotor": "7 kg with a load of 2.5 kg on 1 m of cable, of the same kind",
     "thesis": "the vehicle of the thesis's simulations: `bebop` without rotor limits, rotor lag and drag",
 }

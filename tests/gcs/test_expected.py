@@ -39,7 +39,8 @@ def test_a_fast_machine_is_not_promised_to_stay_fast():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "words"), [(0.0, "about 1 s"), (34.6, "about 35 s"), (130.0, "about 2 min")]
+    ("seconds", "words"),
+    [(0.0, "about 1 s"), (34.6, "about 35 s"), (134.0, "about 130 s"), (400.0, "about 7 min")],
 )
 def test_in_words(seconds, words):
     assert in_words(seconds) == words

@@ -88,7 +88,7 @@ def test_every_kind_of_item_becomes_its_step() -> None:
 
 BAD = {
     WAYPOINT.replace("3.0", "-2.0"): (
-        "items[1].altitude_m = -2.0; must be > 0 and <= 1000 (height of the load above home)"
+        "items[1].altitude_m = -2.0; must be >= 0.01 and <= 1000 (height of the load above home)"
     ),
     WAYPOINT.replace("3.0", "nan"): (
         "items[1].altitude_m = nan; must be a finite number (height of the load above home)"
@@ -127,7 +127,7 @@ BAD = {
     SIGNALS + TERM + "hold_s = 1.0": (
         "items[1].terms[0] needs hold_s and fall_s, both or neither (neither: it stays at the top)"
     ),
-    SIGNALS + TERM + FACTOR * 4: "items[1].terms[0].factors = [{'period_s': 1.5}, {'period_s': 1.5}...",
+    SIGNALS + TERM + FACTOR * 4: "items[1].terms[0].factors has 4 entries; must be a list of at most 3",
     SIGNALS + TERM + FACTOR.replace("period_s", "period_ms"): (
         "items[1].terms[0].factors[0].period_ms: unknown key; write period_s (in seconds)"
     ),
@@ -176,6 +176,21 @@ def test_several_problems_are_all_told() -> None:
         ('title = "T"\nitems = 3', "x.toml: items = 3; must be a list (the [[items]] in order)"),
         ('title = "T"\nitems = [3]', "x.toml: items[0] = 3; must be a table"),
         ('title = ""\nitems = []', 'x.toml: title = ""; must be a text that is not empty'),
+        (
+            'title = "T\\nU"\n[[items]]\ntype = "land"',
+            "x.toml: title must be one line of printable characters",
+        ),
+        ('title = "T"\n[items]\ntype = "takeoff"', "x.toml: items is a single table; write [[items]]"),
+        ('title = "T"\n[[terms]]\naxis = "x"', "x.toml: terms: not a key of the file; write [[items.terms]]"),
+        (
+            'title = "T"\naltitude_m = 2.0 m # up',
+            "x.toml:2:18: not TOML: Expected newline or end of document after a statement; "
+            "a number is written without its unit, which the key names: altitude_m = 2.0",
+        ),
+        (
+            'title = "T"\nitems = [' + "{}, " * 1007 + "]",
+            "x.toml: items has 1007 entries; must be a list of at most 1000 (the [[items]] in order)",
+        ),
         ('titel = "T"\n[[items]]\ntype = "land"', "x.toml: titel: unknown key; write title"),
         (
             'title = "T"\n[[items]]\ntype = "land"',

@@ -1,4 +1,4 @@
-"""Autopilots of others in whole flights: where PLUMBLINE_ARDUCOPTER names the program of ArduCopter.
+"""Third-party autopilots in whole flights: where PLUMBLINE_ARDUCOPTER names the program of ArduCopter.
 
 PLUMBLINE_ARDUCOPTER=./arducopter pytest tests/processes/test_autopilots.py
 """

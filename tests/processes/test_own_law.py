@@ -1,4 +1,4 @@
-"""A law of one's own in the real autopilot, over UDP."""
+"""A custom law in the real autopilot, over UDP."""
 
 from __future__ import annotations
 

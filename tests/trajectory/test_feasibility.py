@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from math import cos, inf, pi, radians, sqrt
@@ -26,6 +27,7 @@ from missions.model import (
     Takeoff,
     Term,
     Waypoint,
+    Winch,
 )
 
 WITHOUT_DRAG = load_vehicle("bebop").model_copy(
@@ -88,6 +90,16 @@ def test_under_the_ground() -> None:
         "items[1] (signals): at 10.0 s the load would be 1.00 m under the ground; begin higher (altitude_m) "
         "or lower amplitude_m of z"
     )
+
+
+def test_a_winch_that_reels_the_load_into_the_ground_is_told_of_its_length() -> None:
+    (violation,) = check(mission(Winch(2.5, 1.0)), LIMITS)
+    assert violation.text.endswith("0.50 m under the ground; begin higher (altitude_m) or lower length_m")
+
+
+def test_a_large_excess_is_a_multiple_of_the_limit() -> None:
+    (violation, *_) = check(mission(AttitudeRun("load", radians(3.0), 0.0, 0.1)), LIMITS)
+    assert re.search(r"\([\d.]+ times the limit\)", violation.text), violation.text
 
 
 def test_a_jump_of_position_and_of_velocity() -> None:

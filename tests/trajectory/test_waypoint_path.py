@@ -180,3 +180,9 @@ def test_the_stretches_of_a_passage_join() -> None:
     assert made[0].begin_s == 0.0
     assert all(x.end_s == y.begin_s and x.table is y.table for x, y in pairwise(made))
     assert made[-1].end_s == made[-1].table[-1, 1]
+
+
+def test_a_flight_of_days_is_judged_by_no_more_samples_than_one_of_minutes() -> None:
+    points = np.array([[0.0, 0.0, 2.0], [1000.0, 0.0, 2.0], [-1000.0, 0.0, 2.0]])
+    times, _ = MinimumSnap(points, np.array([0.0, 1e5, 3e5])).jets()
+    assert len(times) == 20_001

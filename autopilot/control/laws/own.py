@@ -1,4 +1,4 @@
-"""The law of one's own: it asks a function at an address what to do (`autopilot.control.law_desk`).
+"""The custom law: it asks a function at an address what to do (`autopilot.control.law_desk`).
 
 The modes that the function's owner does not define, and all modes once what it asks for was no number, are
 flown by the law `plumbline`. Who asks for a force, an attitude or body rates gets them by the innermost loop

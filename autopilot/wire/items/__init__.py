@@ -11,7 +11,7 @@ behind them. DO_JUMP is flown by flying its items again.
 
 from autopilot.wire.items.command import Command, Fate
 from autopilot.wire.items.decode import decode_items, endless_from, located_steps, unflown
-from autopilot.wire.items.encode import encode_mission, encode_steps
+from autopilot.wire.items.encode import encode_mission, encode_steps, step_of
 from autopilot.wire.items.nose import turn_nose
 from autopilot.wire.items.records import LocatedStep, MissionItemError, WireItem
 from autopilot.wire.items.table import COMMAND, COMMANDS, FLOWN_COMMANDS, fate
@@ -31,6 +31,7 @@ __all__ = [
     "endless_from",
     "fate",
     "located_steps",
+    "step_of",
     "turn_nose",
     "unflown",
 ]

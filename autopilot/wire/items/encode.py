@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import Any
 
 from autopilot.wire.convert.geodesy import Home
@@ -29,6 +30,12 @@ def encode_steps(steps: Sequence[Step], home: Home) -> tuple[WireItem, ...]:
         items.extend([_item(record, home, len(items)) for record in _records(step)])
     located_steps(items, home)  # the vehicle would refuse what this refuses
     return tuple(items)
+
+
+def step_of(seq: int, steps: Sequence[Step]) -> int:
+    """Which of the steps the item `seq` belongs to, of those that `encode_steps` makes of them."""
+    ends = accumulate(len(tuple(_records(step))) for step in steps)
+    return next((index for index, end in enumerate(ends) if seq < end), max(len(steps) - 1, 0))
 
 
 def _records(step: Step) -> Iterator[Any]:

@@ -1,4 +1,4 @@
-"""The path that an autopilot of others was asked to fly, read from its mission and from the truth."""
+"""The path that a third-party autopilot was asked to fly, read from its mission and from the truth."""
 
 from __future__ import annotations
 

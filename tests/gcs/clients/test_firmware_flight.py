@@ -1,4 +1,4 @@
-"""The flight machine with an autopilot of others: a firmware that knows no load, scripted, on fake time."""
+"""The flight machine with a third-party autopilot: a firmware that knows no load, scripted, on fake time."""
 
 from __future__ import annotations
 

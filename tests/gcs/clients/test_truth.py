@@ -49,6 +49,14 @@ def test_a_vehicle_that_does_not_say_has_the_one_world_of_the_port_that_somebody
     assert named.take([(run(9), OTHER), (status(1), OURS)]) == [], "which of the two is not known"
 
 
+def test_a_simulator_that_the_vehicle_has_named_and_that_is_silent_stands_still_or_tells_elsewhere() -> None:
+    truth = Truth(AT, vouched=False)
+    truth.of_vehicle(7)
+    assert truth.missing.startswith(
+        f"the simulator that the vehicle flies in is silent at UDP {AT}: it stands"
+    )
+
+
 def test_worlds_are_told_apart_by_where_they_tell_from() -> None:
     worlds = Worlds()
     assert worlds.run(status(1), OURS) is None

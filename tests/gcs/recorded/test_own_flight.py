@@ -13,7 +13,9 @@ from autopilot.vehicle.file import load_vehicle
 from autopilot.wire.tlog import TlogWriter
 from gcs.cli import gcs
 from gcs.closed_loop import Conditions, fly
+from gcs.commands.options import spoken
 from gcs.errors import EXIT_USAGE
+from gcs.workflows.recorded import name_of
 from missions.fileformat import load_mission
 from missions.model import Delay, Land, Mission, Takeoff
 
@@ -68,3 +70,13 @@ def test_a_flight_that_tells_nothing_is_told_in_one_line(hold_s: float, says: st
     assert result.stdout == ""
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"gcs: {path}: ") and says in line
+
+
+def test_a_flight_goes_by_its_folder_and_any_other_recording_by_its_file(tmp_path: Path) -> None:
+    assert name_of(tmp_path / "windy" / "flight.tlog") == "windy"
+    assert name_of(tmp_path / "windy" / "run-7.csv.gz") == "run-7"
+
+
+def test_a_key_is_spoken_with_its_unit() -> None:
+    spoken_keys = ("cable_tension_n", "late_p99_us", "drag_n_s_m", "mode")
+    assert list(map(spoken, spoken_keys)) == ["cable tension (N)", "late p99 (us)", "drag (N s/m)", "mode"]

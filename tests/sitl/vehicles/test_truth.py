@@ -1,4 +1,4 @@
-"""What really flies: the plant's record of a vehicle, and the SIM_ parameters that change it."""
+"""The simulated vehicle: the plant's record of a vehicle, and the SIM_ parameters that change it."""
 
 from __future__ import annotations
 
