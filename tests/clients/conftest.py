@@ -156,7 +156,7 @@ class Mavproxy:
         self.process.stdin.write(f"{line}\n".encode())
         self.process.stdin.flush()
 
-    def expect(self, text: str, timeout_s: float = 60.0) -> None:
+    def expect(self, text: str, timeout_s: float = LONG_S) -> None:
         """Wait until it has said `text`; what was said until then is forgotten."""
         until = time.monotonic() + timeout_s
         while text not in self.text:
@@ -167,7 +167,7 @@ class Mavproxy:
 
     def insist(self, line: str, text: str) -> None:
         """Type `line` every few seconds until it has said `text`: too early, it knows no parameter yet."""
-        until = time.monotonic() + 60.0
+        until = time.monotonic() + LONG_S
         while text not in self.text:
             assert time.monotonic() < until, f"MAVProxy did not say {text!r} but {self.all[-2000:]!r}"
             self.type(line)
@@ -286,7 +286,7 @@ class Stage:
         """Until the vehicle has said so to everybody."""
         self.wait_until(lambda: text in self.witness.texts, timeout_s)
 
-    def wait_until(self, condition: Callable[[], bool], timeout_s: float = 60.0) -> None:
+    def wait_until(self, condition: Callable[[], bool], timeout_s: float = LONG_S) -> None:
         """Until the witness has seen it."""
         turn = threading.Event()
         for _ in range(round(timeout_s / 0.05)):

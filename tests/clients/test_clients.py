@@ -231,7 +231,7 @@ def mavproxy_and_a_survey(stage: Stage) -> Surveyed:
     program.expect("Cable taut, lifting the load")
     program.type("setyaw 0 30 0")
     program.expect("Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
-    program.expect("Landed, disarmed", LONG_S)
+    program.expect("Landed, disarmed")
     program.type("ftp list /fs/microsd/log")
     program.expect(".ulg")
     program.type("log list")
@@ -374,14 +374,14 @@ def mavproxy_in_a_loop(stage: Stage) -> Looped:
     program.type("arm throttle")
     program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
     for item in (4, 2, 3):
-        program.expect(f"waypoint {item}", LONG_S)
+        program.expect(f"waypoint {item}")
     for _ in range(3):
         program.type("velocity 0 0 0")
     program.type("long DO_SET_MODE 129 6")
     stage.wait_until(lambda: stage.witness.phases[-1] == m.PLUMBLINE_PHASE_GUIDED)
     _push_forward(stage, program)
     program.type("long DO_SET_MODE 129 4 5")
-    program.expect("Landed, disarmed", LONG_S)
+    program.expect("Landed, disarmed")
     return Looped(program.end(), acknowledged(program, m.MAV_CMD_GET_HOME_POSITION), stage.witness)
 
 
@@ -433,7 +433,7 @@ def clients_of_ardupilot(stage: Stage) -> Ardupilot:
     program.type("guided 47.397745 8.545594 1.5")
     program.type("mode RTL")
     program.expect("RTL>")
-    program.expect("Landed, disarmed", 90.0)
+    program.expect("Landed, disarmed")
     said = program.end()
     return Ardupilot(dronekit, said, acknowledged(program, m.MAV_CMD_GET_HOME_POSITION), stage.witness)
 

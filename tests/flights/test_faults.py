@@ -282,6 +282,35 @@ def test_a_sensor_that_is_lost_leads_to_a_soft_landing(sensors: str, failed: int
     assert craft.texts[-1] == "Landed, disarmed"
 
 
+def hide_load(craft: Craft, seconds: float) -> float:
+    """The load hidden from its tracker: the greatest error of its estimated place meanwhile, m."""
+    set_parameter(craft, "SIM_SENS_FAIL", LOAD)
+    worst = 0.0
+    end_us = craft.onboard.now_us + round(seconds * 1e6)
+    while craft.onboard.now_us < end_us:
+        craft.tick()
+        worst = max(worst, dist(craft.onboard.core.estimator.load.x_load, craft.truth.x_load))
+    set_parameter(craft, "SIM_SENS_FAIL", 0)
+    return worst
+
+
+def test_a_load_that_is_hidden_for_a_moment_is_flown_on_by_the_pendulum() -> None:
+    craft = under_way("lab", 0.3)
+    assert hide_load(craft, 1.8) < 0.01
+    craft.wait(0.5)
+    assert (craft.flight.phase, craft.texts) == (Phase.MISSION, [])
+
+
+def test_a_load_that_is_hidden_while_its_cable_is_tautened_lies_where_it_was_seen() -> None:
+    craft = Craft(*ROUTE)
+    craft.begin()
+    craft.run(at_phase(Phase.TAUTEN))
+    craft.wait(0.5)
+    assert hide_load(craft, 0.5) < 0.1  # 0.1 m/s is how well a tracker knows its velocity
+    craft.run(at_phase(Phase.MISSION), 20.0)
+    assert not any("Failsafe" in text for text in craft.texts)
+
+
 def cable_told(craft: Craft) -> tuple[float, int]:
     """Tension and tautness as the vehicle told them last."""
     told = [m for m in craft.heard if m.get_type() == "LOAD_STATE"][-1]

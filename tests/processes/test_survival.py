@@ -54,9 +54,11 @@ def test_mission_and_parameters_outlive_a_killed_autopilot(
     uploaded = command("download", "--json", *connect).stdout
     status = json.loads(command("status", "--json", *connect).stdout)
     assert status["armed"] is True
+    (paths,) = _children(first.process.pid)
     first.kill()
 
     autopilot()
+    assert not _runs(paths), "the process that prepares paths is gone with whom it does it for"
     value = command("param", "get", "NGC_KX", *connect)
     assert value.exit_code == 0, value.stderr
     assert "6.5" in value.stdout
@@ -101,6 +103,14 @@ def test_a_closed_terminal_ends_a_flight_as_ctrl_c_does(tmp_path: Path) -> None:
         flight.wait()
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["outcome"] == "interrupted"
     assert (tmp_path / "out" / "report.html").stat().st_size > 0
+
+
+def _runs(pid: int) -> bool:
+    """False also of one that has ended, whose parent has not yet looked after it."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
 def _children(pid: int) -> list[int]:

@@ -1,0 +1,30 @@
+"""What `gcs check` fears of a mission that can be flown."""
+
+from __future__ import annotations
+
+import pytest
+
+from autopilot.trajectory.feasibility import PathReport
+from gcs.workflows.check_mission import Check, remarks_on
+
+CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
+
+
+def test_a_path_that_leaves_little_to_a_vehicle_that_is_not_as_believed_is_warned_of() -> None:
+    (warning,) = remarks_on([CASE_C], "heavy-real")
+    assert warning.startswith("warning: items[2] (signals): 16 % of the rotors' range is left for control")
+    assert "heavy-real is not what the autopilot takes it for (heavy)" in warning
+    assert "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1" in warning
+    assert Check("case-c", "heavy-real", (), (CASE_C,), (warning,)).lines()[-1] == warning
+
+
+@pytest.mark.parametrize(
+    ("low_n", "high_n", "warned_of"), [(2.9, 8.0, True), (4.0, 9.1, True), (3.1, 8.9, False)]
+)
+def test_either_limit_counts(low_n: float, high_n: float, warned_of: bool) -> None:
+    path = PathReport(2, "signals", 50.5, 0.0, low_n, high_n, 3.9, 20.0)
+    assert bool(list(remarks_on([path], "heavy-real"))) == warned_of
+
+
+def test_nothing_is_feared_of_a_vehicle_that_is_as_it_is_believed() -> None:
+    assert list(remarks_on([CASE_C], "heavy")) == []
