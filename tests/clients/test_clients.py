@@ -20,7 +20,7 @@ from autopilot.wire.convert import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.tlog import read_tlog
 
-from .conftest import LONG_S, LOOPBACK, Mavproxy, Place, Stage, Told, Witness, complaints, staged
+from .conftest import LOOPBACK, Mavproxy, Place, Stage, Told, Witness, complaints, staged
 
 pytestmark = [
     pytest.mark.processes,

@@ -176,10 +176,8 @@ def test_a_drop_out_grows_the_covariance_and_readings_end_it(motion: Motion) -> 
         assert std[gone][-1] > 10.0 * std[round(4.9 / TICK_S)]
         assert std[-1] == pytest.approx(std[round(4.9 / TICK_S)], rel=0.1)
     assert trace.states[-1].resets == 2.0, "a second without readings is bridged, not started over"
-    assert complaints(trace.states[round(5.9 / TICK_S)], 0.5) == (
-        "no vehicle pose from a tracker",
-        "no load position from a tracker",
-    )
+    # the load's place is known by the pendulum for longer
+    assert complaints(trace.states[round(5.9 / TICK_S)], 0.5) == ("no vehicle pose from a tracker",)
     assert complaints(trace.states[-1], 0.5) == ()
 
 
