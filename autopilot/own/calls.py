@@ -15,7 +15,7 @@ class TooSlow(Exception):
     """A call took longer than it may."""
 
     def __str__(self) -> str:
-        return "no answer for seconds"
+        return "no answer in time"
 
 
 @dataclass

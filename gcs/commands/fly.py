@@ -25,7 +25,7 @@ from gcs.commands.options import (
     vehicle_option,
 )
 from gcs.errors import EXIT_REQUIRED
-from gcs.shell.display import say
+from gcs.shell.display import say, to_reader
 from gcs.shell.link import DEFAULT_PORT, Address
 
 if TYPE_CHECKING:
@@ -194,9 +194,9 @@ def fly_command(
 
     def told(record: Record, outcome: Outcome) -> None:
         if as_json:
-            print_json(record)
+            to_reader(lambda: print_json(record))
         elif not quiet:
-            print_record(record)
+            to_reader(lambda: print_record(record))
         reason = f": {outcome.reason}" if outcome.reason else ""
         say(f"{mission}: {outcome.name}{reason}")
 
@@ -224,7 +224,7 @@ def fly_command(
     with reporting(run, junit):
         flight = fly(options, told, page)
     if not (as_json or quiet):
-        click.echo(f"report: {flight.out / 'report.html'}")
+        to_reader(lambda: click.echo(f"report: {flight.out / 'report.html'}"))
     wall_s = flight.record["wall_s"] or 0.0
     met = conclude(run, junit, flight.outcome.name, wall_s, judge(requirements, flight.record))
     return flight.exit_code if met or flight.stopped else EXIT_REQUIRED

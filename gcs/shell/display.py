@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -24,6 +26,15 @@ Row = Mapping[str, Any]  # description, completed, total and the fields of one b
 def say(line: str) -> None:
     """One line of trouble or news on stderr."""
     print(f"gcs: {line}", file=sys.stderr, flush=True)
+
+
+def to_reader(write: Callable[[], None]) -> None:
+    """Write to stdout by `write`. Whoever has closed it (`| head`) has read enough, and the work goes on."""
+    try:
+        write()
+        sys.stdout.flush()
+    except (BrokenPipeError, SystemExit):  # the latter of rich
+        sys.stdout = Path(os.devnull).open("w")
 
 
 def is_live() -> bool:

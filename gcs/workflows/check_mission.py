@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.trajectory.route import PlanError, Planner
+from autopilot.trajectory.timeline import MissionState, timeline
 from autopilot.vehicle.file import belief_of, load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
@@ -15,7 +17,7 @@ from gcs.mission_items import items_of
 from gcs.workflows.checked import note_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
-from missions.model import Mission
+from missions.model import Mission, Winch
 
 # Share of the rotors' range that a path must leave a vehicle whose truth is not its belief: slower rotors, a
 # battery that sags and a cable off the centre take a part of it, wind another. `heavy-real` loses Case C with
@@ -34,6 +36,25 @@ def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Viol
     if not found:
         note_flyable(mission, vehicle, shaped)
     return found
+
+
+def reels_too_far(mission: Mission, vehicle: str) -> Iterator[Violation]:
+    """Where it asks for a cable that the winch, as the vehicle comes, does not make; refused at its start."""
+    table = autopilot_parameters(load_belief(vehicle))
+    least, most = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
+    for entry in timeline(mission.steps, MissionState(cable_m=table["VEH_CABLE_LEN"])):
+        length_m = entry.after.cable_m
+        if not isinstance(entry.step, Winch) or length_m is None or least <= length_m <= most:
+            continue
+        yield Violation(
+            entry.item,
+            "cable length",
+            length_m,
+            least if length_m < least else most,
+            entry.transfer_s,
+            f"items[{entry.item}] (winch): a cable of {length_m:.2f} m; must be {least:g} ... {most:g} m: "
+            "change length_m, or the vehicle's WNC_LEN_MIN and WNC_LEN_MAX",
+        )
 
 
 def path_reports(mission: Mission, vehicle: str, planner: Planner | None = None) -> list[PathReport]:
@@ -87,7 +108,7 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Plan
     GcsError if somebody's own `planner` does not plan it.
     """
     mission = load(name_or_path)
-    found = violations(mission, vehicle, not as_asked)
+    found = [*violations(mission, vehicle, not as_asked), *reels_too_far(mission, vehicle)]
     reports = [] if found or as_asked else path_reports(mission, vehicle, planner)
     warnings = tuple(remarks_on(reports, vehicle))
     return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)

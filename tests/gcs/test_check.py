@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from autopilot.trajectory.feasibility import PathReport
-from gcs.workflows.check_mission import Check, remarks_on
+from gcs.workflows.check_mission import Check, reels_too_far, remarks_on
+from missions.model import Land, Mission, Takeoff, Winch
 
 CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
 
@@ -28,3 +29,14 @@ def test_either_limit_counts(low_n: float, high_n: float, warned_of: bool) -> No
 
 def test_nothing_is_feared_of_a_vehicle_that_is_as_it_is_believed() -> None:
     assert list(remarks_on([CASE_C], "heavy")) == []
+
+
+@pytest.mark.parametrize(("by_m", "cable_m", "limit_m"), [(-5.0, -4.3, 0.3), (2.31, 3.01, 3.0)])
+def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
+    by_m: float, cable_m: float, limit_m: float
+) -> None:
+    mission = Mission("deep", "Deep", "", (), (Takeoff(5.0), Winch(0.2), Winch(-0.2), Winch(by_m), Land()))
+    (found,) = reels_too_far(mission, "bebop")
+    assert (found.item, found.quantity, found.limit) == (3, "cable length", limit_m)
+    assert found.value == pytest.approx(cable_m)
+    assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")

@@ -26,7 +26,7 @@ class Fails(LoadPid):
 FAULTS = {
     "raise SystemExit(0)": "Law Fails failed: SystemExit: 0 (mine.py:8); landing by law plumbline",
     "time.sleep(600.0)": (
-        "Law Fails failed: TooSlow: no answer for seconds (mine.py:8); landing by law plumbline"
+        "Law Fails failed: TooSlow: no answer in time (mine.py:8); landing by law plumbline"
     ),
 }
 

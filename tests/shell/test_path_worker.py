@@ -96,7 +96,7 @@ class Hangs:
     attend(aside, onboard, lambda: onboard.work is None)
     ((done, prepared),) = onboard.finished
     assert done is work
-    assert "Planner Hangs failed: TooSlow: no answer for seconds (mine.py:6)" in prepared.refusal
+    assert "Planner Hangs failed: TooSlow: no answer in time (mine.py:6)" in prepared.refusal
 
 
 def test_what_is_asked_for_later_is_done_when_what_goes_on_is_over(aside: Aside) -> None:

@@ -9,9 +9,12 @@ import socket
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
@@ -20,7 +23,7 @@ from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient, Progress, Stage
 from gcs.errors import GcsError, NoVehicleError
 from gcs.shell import processes as processes_module
-from gcs.shell.display import FlightDisplay
+from gcs.shell.display import FlightDisplay, to_reader
 from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
@@ -32,6 +35,22 @@ GOODBYE = b"the test is over"
 # a program of the standard library that lasts as long as the statement it is given
 LASTING = ["-n", "1", "-r", "1", "import signal; signal.pause()"]
 DEAF = [*LASTING[:-1], "import signal; signal.signal(15, signal.SIG_IGN); print(flush=True); signal.pause()"]
+
+
+@pytest.mark.parametrize("write", [print, Console().print], ids=["print", "rich"])
+def test_a_reader_who_has_read_enough_stops_nothing(
+    write: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As `| head` does."""
+    reads, writes = os.pipe()
+    os.close(reads)
+    out = os.fdopen(writes, "w")
+    monkeypatch.setattr(sys, "stdout", out)
+    to_reader(lambda: write("first"))
+    assert sys.stdout is not out
+    to_reader(lambda: write("second"))
+    with suppress(BrokenPipeError):
+        out.close()
 
 
 # ---- addresses and sockets
