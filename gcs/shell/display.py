@@ -34,7 +34,7 @@ def to_reader(write: Callable[[], None]) -> None:
         write()
         sys.stdout.flush()
     except (BrokenPipeError, SystemExit):  # the latter of rich
-        sys.stdout = Path(os.devnull).open("w")
+        sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115 - it is stdout from here on
 
 
 def is_live() -> bool:
