@@ -276,7 +276,7 @@ def test_check_says_that_it_can_be_flown():
     result = run("check", "square", "--json")
     assert result.exit_code == EXIT_DONE
     told = json.loads(result.stdout)
-    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "paths": []}
+    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "paths": [], "warnings": []}
 
 
 def test_check_tells_how_signals_will_be_flown():
