@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,19 +66,22 @@ class Reach:
 
 def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     """The table law by law, in the order of the plan."""
-    law = np.array(table.column("law").to_pylist(), dtype=object)
-    outcome = np.array(table.column("outcome").to_pylist(), dtype=object)
-    phase = np.array(table.column("lost_phase").to_pylist(), dtype=object)
-    error = np.array(table.column("load_error_max_m").to_pylist(), dtype=np.float64)
-    index, seed = (np.array(table.column(name).to_pylist(), dtype=np.int64) for name in ("index", "seed"))
-    varied = {v.name: np.array(table.column(v.name).to_pylist(), dtype=np.float64) for v in plan.varied}
+
+    def values(column: str, kind: type) -> NDArray[Any]:
+        return np.array(table.column(column).to_pylist(), dtype=kind)
+
+    law, outcome, phase = (values(column, object) for column in ("law", "outcome", "lost_phase"))
+    error = values("load_error_max_m", float)
+    index, seed = values("index", int), values("seed", int)
+    varied = {v.name: values(v.name, float) for v in plan.varied}
     found = []
     for reference in plan.laws:
-        rows = law == name_of(reference)
+        name = name_of(reference)
+        rows = law == name
         found.append(
             Flights(
-                name_of(reference),
-                {name: values[rows] for name, values in varied.items()},
+                name,
+                {of: column[rows] for of, column in varied.items()},
                 outcome[rows] == COMPLETED,
                 error[rows],
                 tuple(outcome[rows].tolist()),
