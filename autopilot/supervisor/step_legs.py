@@ -21,7 +21,7 @@ from autopilot.supervisor.motion import AT_REST, carry, length_at
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import Flight, Phase
 from autopilot.trajectory.shaping import Shaped, unshaped
-from autopilot.trajectory.timeline import RELEASE_S, MissionState, state_after
+from autopilot.trajectory.timeline import LEAST_REEL_M, RELEASE_S, MissionState, state_after
 from autopilot.trajectory.waypoint_path import Passage
 from missions.model import (
     AttitudeRun,
@@ -37,7 +37,6 @@ from missions.model import (
     Winch,
 )
 
-LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
 NEAR_START = 0.3  # m beside the beginning of a path through waypoints from which it is still flown
 
 

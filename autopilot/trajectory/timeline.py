@@ -42,6 +42,17 @@ SPEED_M_S, ACCEL_M_S2 = 1.5, 1.5
 AT_REST_M2_S2 = 1e-4  # squared speed at which signals that end count as at rest
 
 
+LEAST_REEL_M = 1e-4  # a winch that is so near has nothing to do
+
+
+def cable_trouble(wanted_m: float, shortest_m: float, longest_m: float) -> str:
+    """Why a winch does not make a cable so long, WNC_LEN_MIN and WNC_LEN_MAX given; empty if it does."""
+    if shortest_m - LEAST_REEL_M <= wanted_m <= longest_m + LEAST_REEL_M:
+        return ""
+    limits = f"{shortest_m:g} ... {longest_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
+    return f"a cable of {wanted_m:.2f} m; must be {limits}"
+
+
 @dataclass(frozen=True, slots=True)
 class MissionState:
     """The state that the steps of a mission change, between two steps.

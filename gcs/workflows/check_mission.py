@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.trajectory.route import PlanError, Planner
-from autopilot.trajectory.timeline import MissionState, timeline
+from autopilot.trajectory.timeline import MissionState, cable_trouble, timeline
 from autopilot.vehicle.file import belief_of, load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert import Home
@@ -41,20 +41,16 @@ def violations(mission: Mission, vehicle: str, shaped: bool = True) -> list[Viol
 def reels_too_far(mission: Mission, vehicle: str) -> Iterator[Violation]:
     """Where it asks for a cable that the winch, as the vehicle comes, does not make; refused at its start."""
     table = autopilot_parameters(load_belief(vehicle))
-    least, most = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
+    least_m, most_m = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
     for entry in timeline(mission.steps, MissionState(cable_m=table["VEH_CABLE_LEN"])):
         length_m = entry.after.cable_m
-        if not isinstance(entry.step, Winch) or length_m is None or least <= length_m <= most:
+        if not isinstance(entry.step, Winch) or length_m is None:
             continue
-        yield Violation(
-            entry.item,
-            "cable length",
-            length_m,
-            least if length_m < least else most,
-            entry.transfer_s,
-            f"items[{entry.item}] (winch): a cable of {length_m:.2f} m; must be {least:g} ... {most:g} m: "
-            "change length_m, or the vehicle's WNC_LEN_MIN and WNC_LEN_MAX",
-        )
+        beyond = cable_trouble(length_m, least_m, most_m)
+        if beyond:
+            text = f"items[{entry.item}] (winch): {beyond}: change length_m, or these of the vehicle"
+            limit_m = least_m if length_m < least_m else most_m
+            yield Violation(entry.item, "cable length", length_m, limit_m, entry.transfer_s, text)
 
 
 def path_reports(mission: Mission, vehicle: str, planner: Planner | None = None) -> list[PathReport]:

@@ -39,4 +39,6 @@ def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
     (found,) = reels_too_far(mission, "bebop")
     assert (found.item, found.quantity, found.limit) == (3, "cable length", limit_m)
     assert found.value == pytest.approx(cable_m)
+    within = Mission("less", "Less", "", (), (Takeoff(5.0), Winch(-0.4), Land()))  # 0.7 - 0.4 rounds below
+    assert list(reels_too_far(within, "bebop")) == []
     assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")

@@ -14,8 +14,14 @@ from autopilot.supervisor.motion import length_at, stop
 from autopilot.supervisor.requests.limits import LEAST_ALTITUDE_M
 from autopilot.supervisor.settings import Settings
 from autopilot.supervisor.state import ON_GROUND, Flight, MissionPlan, View, below, fenced, forbidden
-from autopilot.supervisor.step_legs import LEAST_REEL_M
-from autopilot.trajectory.timeline import ANYWHERE, MissionState, TimelineEntry, timeline
+from autopilot.trajectory.timeline import (
+    ANYWHERE,
+    LEAST_REEL_M,
+    MissionState,
+    TimelineEntry,
+    cable_trouble,
+    timeline,
+)
 from missions.model import AttitudeRun, ReturnHome, Signals, Step, Takeoff, Waypoint, Winch
 
 WAY_M, MOST_PIECES = 0.25, 4000  # spacing of the places at which a way is looked at, and how many at most
@@ -149,11 +155,9 @@ def reels_too_far(ahead: Ahead, settings: Settings) -> str:
 
 def reel_trouble(wanted: float, height: float, settings: Settings) -> str:
     """Why the cable may not get so long (m) with the load at that height; an empty string if it may."""
-    if not settings.winch.shortest_m - LEAST_REEL_M <= wanted <= settings.winch.longest_m + LEAST_REEL_M:
-        limits = (
-            f"{settings.winch.shortest_m:g} ... {settings.winch.longest_m:g} m (WNC_LEN_MIN, WNC_LEN_MAX)"
-        )
-        return f"a cable of {wanted:.2f} m; must be {limits}"
+    beyond = cable_trouble(wanted, settings.winch.shortest_m, settings.winch.longest_m)
+    if beyond:
+        return beyond
     if height < LEAST_ALTITUDE_M - LEAST_REEL_M:
         return f"load height {height:.2f} m, least {LEAST_ALTITUDE_M} m"
     return ""

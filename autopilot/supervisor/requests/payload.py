@@ -26,7 +26,7 @@ from autopilot.supervisor.state import (
     View,
     off_mission,
 )
-from autopilot.supervisor.step_legs import LEAST_REEL_M
+from autopilot.trajectory.timeline import LEAST_REEL_M
 from autopilot.wire.dialect import plumbline as mavlink
 
 LEAST_REEL_M_S = 0.01
