@@ -44,11 +44,11 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps
 
-ASK_US = 500_000  # an item that was asked for is asked for again after this silence
-MAX_ASKS = 6  # times that one item is asked for: once, and five times more
+ASK_US = 250_000  # an item that was asked for is asked for again after this silence, as by PX4
+MAX_ASKS = 20  # times that one item is asked for: a link that loses a third each way fails 1 in 10^6 items
 # Times that the first item is asked for as MISSION_ITEM_INT, before a client that knows only MISSION_ITEM
 # (DroneKit) is taken to be there. Never asked the other way round: MAVSDK cancels on a MISSION_REQUEST.
-INT_ASKS = 3
+INT_ASKS = 6
 ECHOES = 3  # repetitions of the last ACK on a link that loses messages
 ECHO_US = 600_000  # between two of them
 LATE_US = 5_000_000  # a last item repeated within this time after the end means that our ACK was lost
