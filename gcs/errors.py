@@ -17,7 +17,7 @@ EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, as shells count it
 
 
 class GcsError(Exception):
-    """A known error. Its text is the one line that a person reads."""
+    """A known error. Its text is what a person reads: one line, or one for each mistake in a file."""
 
     exit_code = EXIT_ERROR
 
@@ -44,7 +44,7 @@ class RefusedError(GcsError):
 
 def input_error(error: FileError) -> GcsError:
     """What is wrong with a file that the command line names, or with the name."""
-    return InputError(str(error))
+    return InputError("\n".join(error.problems))
 
 
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)

@@ -1,7 +1,7 @@
 """TOML files that a pydantic schema describes: which are shipped, how one is read, and what is wrong with it.
 
-Missions, vehicles and sensor profiles are such files. This module knows none of them, so that every room may
-use it.
+Missions, vehicles and sensor profiles are such files. This module knows of each but a key by which it is
+told, so that every room may use it.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ Spec = TypeVar("Spec", bound=BaseModel)
 _SUFFIX = ".toml"
 _LONGEST_SHOWN = 40  # characters of a value
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+# a key that each file of a kind has, and those of no other kind: files of the wrong kind are told by it
+_MARKS = {"items": "mission", "quad_mass_kg": "vehicle", "imu": "sensors"}
 _NUMBER_WITH_UNIT = re.compile(
     r"\s*(\w+)\s*=\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[A-Za-z%/][\w%/^*]*\s*(?:#.*)?$"
 )
@@ -111,6 +113,9 @@ class TomlFiles:
 
     def record(self, spec: type[Spec], table: Mapping[str, Any], where: str) -> Spec:
         """The table as `spec` describes it."""
+        marks = [kind for key, kind in _MARKS.items() if key in table]
+        if marks and self.kind in _MARKS.values() and self.kind not in marks:
+            raise self.error([f"{where}: is a {marks[0]} file; a {self.kind} file is wanted here"])
         try:
             return spec.model_validate(table)
         except ValidationError as error:
@@ -125,17 +130,21 @@ class TomlFiles:
 
 
 def problems(error: ValidationError, spec: type[BaseModel], where: str, at: str = "") -> list[str]:
-    """One line for each finding, unknown keys first; a key missing for being misspelt is not told twice.
+    """One line for each finding, unknown keys first; a key missing for being misspelt is not told twice, and
+    what keys a table may have is told once.
 
     `where` names the file, `at` the table within it that was validated against `spec`.
     """
     unknown, others, meant = [], [], set()
+    listed: set[type[BaseModel]] = set()
     for finding in error.errors(include_url=False):
         path, key, owner = _place(finding["loc"], spec, at)
         if finding["type"] == "extra_forbidden":
             near = _meant_key(key, owner)
             meant.add(path.removesuffix(key) + near)
-            unknown.append(f"{where}: {path}: {_unknown_key(near, owner)}")
+            unknown.append(f"{where}: {path}: {_unknown_key(near, owner, owner in listed)}")
+            if not near:
+                listed.add(owner)
         else:
             others.append((path, _problem(dict(finding), path, owner.model_fields.get(key))))
     return unknown + [f"{where}: {line}" for path, line in others if path not in meant]
@@ -225,9 +234,12 @@ def _meant_key(key: str, owner: type[BaseModel]) -> str:
     return nearest(key, same, likeness=0.0) or nearest(key, known)
 
 
-def _unknown_key(near: str, owner: type[BaseModel]) -> str:
+def _unknown_key(near: str, owner: type[BaseModel], listed: bool) -> str:
+    """`listed`: an earlier line tells which keys there are."""
     if near:
         return f"unknown key; write {near}{_unit_note(near)}"
+    if listed:
+        return "unknown key"
     known = ", ".join(owner.model_fields)
     return "unknown key; " + (f"allowed: {known}" if known else "this item takes no keys")
 

@@ -53,7 +53,7 @@ class Guard:
             if is_interruption(error):
                 self.interrupted, self.why = error, "interrupted"
             else:
-                self.why = blamed(error, self.brought.path)
+                self.why = blamed(error, self.brought.path, self.brought.line(method))
         else:
             return right
         finally:

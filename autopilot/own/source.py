@@ -145,9 +145,10 @@ def _beside(path: Path) -> set[Path]:
     return {path, *(file for file in files if file.is_file() and file.is_relative_to(path.parent))}
 
 
-def blamed(error: BaseException, path: Path | None) -> str:
+def blamed(error: BaseException, path: Path | None, entered: str = "") -> str:
     """What is told of an error of what somebody has brought, written in the file `path`: one line, with file
-    and line, the last place in the folder of that file, or the last at all.
+    and line, the last place in the folder of that file, else the one that was to be `entered`, else the last
+    at all.
 
     What has only interrupted it, as Ctrl-C, is raised again.
     """
@@ -162,6 +163,8 @@ def blamed(error: BaseException, path: Path | None) -> str:
         return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}:{error.lineno})"
     frames = traceback.extract_tb(error.__traceback__)
     near = [one for one in frames if path is not None and _is_beside(path, one.filename)]
+    if entered and not near:  # as with an argument too few
+        return f"{text} ({entered})"
     last = near or [one for one in frames if not _of_importing(one.filename)]
     return f"{text} ({Path(last[-1].filename).name}:{last[-1].lineno})" if last else text
 

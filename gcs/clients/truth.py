@@ -47,11 +47,12 @@ class Truth:
         self._vouched = vouched
         self._worlds = Worlds()
         self._run: int | None = None  # of the vehicle
+        self._silent = False  # the vehicle, when it was asked
         self.heard = False  # the vehicle's own
 
-    def of_vehicle(self, run: int | None) -> None:
-        """The run of the world that the vehicle says it flies in; None: it does not say."""
-        self._run = run
+    def of_vehicle(self, run: int | None, silent: bool = False) -> None:
+        """The run of the world that the vehicle says it flies in; None: it does not say, or was `silent`."""
+        self._run, self._silent = run, silent
 
     def take(self, datagrams: Iterable[tuple[bytes, Sender]]) -> list[bytes]:
         """Of datagrams with their senders those that tell of the vehicle's world."""
@@ -81,6 +82,12 @@ class Truth:
             return f"the truth at {where} is refused: it is that of another simulator; {_OTHER}"
         if self._vouched:
             return f"{len(self._worlds)} simulators tell their truth at {where}; {_OTHER}"
+        if self._silent:
+            return (
+                f"the vehicle did not answer which simulator it flies in, so the truth at {where} is not "
+                "taken; it or its simulator stands still (SIGSTOP, a debugger), or the link loses messages: "
+                "try again"
+            )
         return (
             f"the vehicle does not say which simulator it flies in, so the truth at {where} is refused; "
             "if it is the vehicle's, say so by --truth PORT"

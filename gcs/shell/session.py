@@ -65,10 +65,11 @@ class Session:
         """
         target = self.find()
         try:
-            run = int(self.request(mavlink.MAVLINK_MSG_ID_SIM_BOOT).boot_id)
-        except GcsError:  # another firmware, or a vehicle that flies in no simulator
-            run = None
-        truth.of_vehicle(run)
+            truth.of_vehicle(int(self.request(mavlink.MAVLINK_MSG_ID_SIM_BOOT).boot_id))
+        except RefusedError:  # another firmware, or a vehicle that flies in no simulator
+            truth.of_vehicle(None)
+        except GcsError:
+            truth.of_vehicle(None, silent=True)
         self._truth = truth
         self.watch(lambda: truth.heard, TRUTH_S)
         return target

@@ -28,9 +28,9 @@ class TruthLink:
                 trouble = "is in use by another program, or not of this machine"
                 raise GcsError(f"--truth: UDP {named} {trouble}") from None
 
-    def of_vehicle(self, run: int | None) -> None:
-        """The run of the world that the vehicle says it flies in; None: it does not say."""
-        self._truth.of_vehicle(run)
+    def of_vehicle(self, run: int | None, silent: bool = False) -> None:
+        """The run of the world that the vehicle says it flies in; None: it does not say, or was `silent`."""
+        self._truth.of_vehicle(run, silent)
 
     def drain(self) -> list[bytes]:
         """All datagrams of the vehicle's own world that are there."""

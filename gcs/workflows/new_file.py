@@ -35,7 +35,7 @@ def kinds() -> tuple[str, ...]:
 def new_file(kind: str, name: str) -> NewFile:
     """Write the template of `kind` as `name`, which may lead into another folder and may have its ending.
 
-    InputError for a name that cannot be one; GcsError if the file is there already or cannot be written.
+    InputError for a name that cannot be one or is taken; GcsError if the file cannot be written.
     """
     suffix = _suffixes()[kind]
     given = Path(name)
@@ -53,7 +53,7 @@ def new_file(kind: str, name: str) -> NewFile:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise GcsError(f"{path} exists already and is left as it is; choose another name") from None
+        raise InputError(f"{path} exists already and is left as it is; choose another name") from None
     except OSError as error:
         raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
     return NewFile(path, _command(text, kind))

@@ -22,6 +22,7 @@ SPIN_NS = 150_000  # before a due time: longer than a sleep oversleeps
 _SLOW_SHARE = 0.95  # of the clock that was asked for: a slower one is said
 _SLOW_AGAIN_NS = 10_000_000_000  # between two words about it
 _STALL_NS = 200_000_000  # later than this the schedule is moved instead of caught up with
+_STOOD_NS = 2_000_000_000  # between two ticks, nobody waited for: longer than on a busy machine
 
 
 class Watch:
@@ -101,17 +102,24 @@ class Clock:
         self._period_ns = round(simulator.tick_us * 1000 / pacing.speed)
         self._due = time.perf_counter_ns()
         self._told_ns = 0
+        self._began_ns = time.perf_counter_ns()  # the last tick, or the end of a wait for somebody else
 
     def skip(self, seconds: float) -> None:
         """The clock stood for so long because nobody answered."""
-        self._due = time.perf_counter_ns()
+        self._due = self._began_ns = time.perf_counter_ns()
         self._pacing.pause(round(seconds * 1e9))
 
     def wait(self) -> None:
         """Until the next tick is due."""
         # what was waited for is not caught up with
         self._due = max(self._due, time.perf_counter_ns() - _STALL_NS) + self._period_ns
-        now = _sleep_until(self._due)
+        before, now = self._began_ns, _sleep_until(self._due)
+        self._began_ns = now
+        if now - before >= _STOOD_NS + self._period_ns:
+            stood_s = (now - before) * 1e-9
+            self._say(f"stood still for {stood_s:.1f} s (SIGSTOP, Ctrl-Z, a debugger, or the machine did)")
+            self.skip(stood_s)
+            return
         pacing = self._pacing
         pacing.record(self._due, now)
         figures = pacing.figures

@@ -229,11 +229,15 @@ def test_what_four_rotors_cannot_fly_is_refused_with_limit_and_excess(tmp_path):
         ('quad_mass_kg = "heavy"', "must be a number"),
     ],
 )
-def test_a_bad_vehicle_file_is_one_line(tmp_path, text, part):
+def test_a_bad_vehicle_file_is_a_line_for_each_mistake(tmp_path, text, part):
     path = tmp_path / "no-such.toml"
     if text is not None:
         path.write_text(text)
-    assert part in one_line(run("check", "hover", "--vehicle", str(path)), EXIT_USAGE)
+    refused = run("check", "hover", "--vehicle", str(path))
+    assert (refused.exit_code, refused.stdout) == (EXIT_USAGE, "")
+    lines = refused.stderr.splitlines()
+    assert all(line.startswith(f"gcs: {path}") for line in lines)
+    assert [line for line in lines if part in line] == lines[:1]
 
 
 def test_no_vehicle_is_one_line_after_the_stated_time(monkeypatch):

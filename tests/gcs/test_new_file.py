@@ -69,7 +69,7 @@ def test_a_file_that_exists_is_left_as_it_is(kind: str) -> None:
     path = written(kind)
     path.write_text("precious", encoding="utf-8")
     result = run("new", kind, "my-own")
-    assert (result.exit_code, result.stdout) == (EXIT_ERROR, "")
+    assert (result.exit_code, result.stdout) == (EXIT_USAGE, "")
     assert result.stderr == f"gcs: {path} exists already and is left as it is; choose another name\n"
     assert path.read_text(encoding="utf-8") == "precious"
 

@@ -96,6 +96,16 @@ def test_what_a_law_does_wrong_is_told(wrong: str) -> None:
         tried(law_that(answers))
 
 
+def test_a_method_with_an_argument_too_few_is_named_with_its_place() -> None:
+    class Own:
+        def load_position(self, now: Now) -> Any:
+            raise AssertionError
+
+    told = r"TypeError: .*load_position\(\) takes 2 positional argume.* \(test_host\.py:\d+\)$"
+    with pytest.raises(OwnError, match=told):
+        tried(Own)
+
+
 def test_a_law_that_cannot_be_made_is_told() -> None:
     class Unmade:
         def __init__(self, parameters: Any) -> None:

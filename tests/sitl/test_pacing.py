@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from sitl.pacing import Pacing, percentile
+from sitl.shell import loops
 
 SECOND = 1_000_000_000
 
@@ -65,3 +69,29 @@ def test_waiting_for_somebody_else_is_not_counted() -> None:
         pacing.record(due, due)
     assert pacing.figures.rate_hz == pytest.approx(250.0, rel=0.01)
     assert pacing.summary(0) == "250.00 ticks/s, late p50 0 p99 0 max 0 us, 0 of 500 commands missed"
+
+
+def test_a_clock_that_was_stopped_is_not_a_busy_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, stopped_s, said = [0], [0.0], list[str]()
+
+    def sleep(seconds: float) -> None:
+        now[0] += round((seconds + stopped_s[0]) * SECOND)
+        stopped_s[0] = 0.0
+
+    def perf_counter_ns() -> int:
+        now[0] += 1000
+        return now[0]
+
+    monkeypatch.setattr(loops, "time", SimpleNamespace(sleep=sleep, perf_counter_ns=perf_counter_ns))
+    simulator: Any = SimpleNamespace(
+        tick_us=4000, pacing=None, parameters=SimpleNamespace(say=lambda text, severity: said.append(text))
+    )
+    pacing = Pacing(1.0)
+    clock = loops.Clock(pacing, simulator, said.append)
+    for tick in range(2000):
+        if tick == 500:
+            stopped_s[0] = 30.0
+        clock.wait()
+    assert said == ["stood still for 30.0 s (SIGSTOP, Ctrl-Z, a debugger, or the machine did)"]
+    assert pacing.figures.rate_hz == pytest.approx(250.0, rel=0.01)
+    assert "stalled" not in pacing.summary(0)

@@ -1,0 +1,38 @@
+"""A file of another kind than the one that is wanted is told as such, and not key by key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from autopilot.vehicle.file import VEHICLES, load_vehicle
+from missions.fileformat import MISSIONS, load_mission
+from missions.toml_files import FileError, TomlFiles
+from sitl.sensors.files import load_profile
+from sitl.sensors.shipped import PROFILES
+
+KINDS: tuple[tuple[TomlFiles, Callable[[Path], Any]], ...] = (
+    (MISSIONS, load_mission),
+    (VEHICLES, load_vehicle),
+    (PROFILES, load_profile),
+)
+
+
+@pytest.mark.parametrize(("wanted", "load"), KINDS, ids=lambda one: getattr(one, "kind", ""))
+def test_the_shipped_files_of_the_other_kinds_are_told_as_what_they_are(
+    tmp_path: Path, wanted: TomlFiles, load: Callable[[Path], Any]
+) -> None:
+    for other, _ in KINDS:
+        for name in other.names():
+            text = other.read(name).text
+            if other is wanted or "believed =" in text:  # which is not whole by itself
+                continue
+            path = tmp_path / f"{name}.toml"
+            path.write_text(text, encoding="utf-8")
+            with pytest.raises(FileError) as told:
+                load(path)
+            line = f"{path}: is a {other.kind} file; a {wanted.kind} file is wanted here"
+            assert told.value.problems == (line,)
