@@ -76,8 +76,9 @@ def name_what_is_compiled() -> None:
     class Names(event.Listener):
         def on_start(self, event: object) -> None:
             function = event.data["dispatcher"].py_func  # type: ignore[attr-defined]
-            if function.__module__:  # numba's own have none
-                print(f"{function.__module__}.{function.__name__}", flush=True)
+            module = function.__module__  # of what numba makes up there is none
+            if module and module.partition(".")[0] != "numba":
+                print(f"{module}.{function.__name__}", flush=True)
 
         def on_end(self, event: object) -> None:
             pass

@@ -230,9 +230,9 @@ def pace_of(flight: Flight, settings: Settings) -> FollowLimits:
 def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     """Why load or vehicle may not be there, the vehicle a cable length above; an empty string if they may."""
     if settings.fence.radius_m > 0.0 and hypot(x_load[0], x_load[1]) > settings.fence.radius_m:
-        return f"more than GF_MAX_HOR_DIST {settings.fence.radius_m:g} m from home"
+        return f"beyond the fence, GF_MAX_HOR_DIST {settings.fence.radius_m:g} m from home"
     if settings.fence.height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence.height_m:
-        return f"higher than GF_MAX_VER_DIST {settings.fence.height_m:g} m"
+        return f"beyond the fence, GF_MAX_VER_DIST {settings.fence.height_m:g} m above home"
     return fence.complaint(x_load[0], x_load[1])
 
 

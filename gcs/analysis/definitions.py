@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any, Literal
 
@@ -84,3 +85,13 @@ GROUPS: tuple[tuple[Group, tuple[Metric, ...]], ...] = tuple(
     (group, _FILE.of(name)) for name, group in _FILE.groups.items()
 )
 HEADLINE: dict[str, str] = _FILE.headline  # key: label at the top of the report
+
+
+def told(record: Mapping[str, Any]) -> list[tuple[Group, list[Metric]]]:
+    """The groups of which a report tells, each with its metrics that are known; a group in which nothing
+    happened, as where no gust blew, is left out."""
+    return [
+        (group, [metric for metric in metrics if record.get(metric.name) is not None])
+        for group, metrics in GROUPS
+        if any(record.get(metric.name) for metric in metrics)
+    ]

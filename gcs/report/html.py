@@ -6,7 +6,7 @@ import base64
 from pathlib import Path
 from typing import Any
 
-from gcs.analysis.definitions import GROUPS, HEADLINE, METRICS, Metric
+from gcs.analysis.definitions import HEADLINE, METRICS, Metric, told
 from gcs.analysis.record import FlightMeta, Record
 from gcs.report.plots import PICTURES, headline
 from gcs.report.replay import Json
@@ -82,20 +82,11 @@ def _figures(record: Record, replay: Json) -> list[Json]:
 
 
 def _groups(record: Record) -> list[dict[str, Any]]:
-    """The groups of figures, each with what is known; a group in which nothing happened is left out."""
+    """The groups of figures, each with what is known."""
     return [
-        {
-            "title": group.title,
-            "window": group.window,
-            "rows": [_row(metric, record) for metric in metrics if _known(metric, record)],
-        }
-        for group, metrics in GROUPS
-        if any(record[metric.name] for metric in metrics)
+        {"title": group.title, "window": group.window, "rows": [_row(metric, record) for metric in metrics]}
+        for group, metrics in told(record)
     ]
-
-
-def _known(metric: Metric, record: Record) -> bool:
-    return record[metric.name] is not None
 
 
 def _row(metric: Metric, record: Record) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gcs.analysis.definitions import GROUPS
+from gcs.analysis.definitions import told
 from gcs.analysis.record import Record
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ _OUTCOME_STYLES = {"completed": "bold green", "diverged": "bold red", "lost": "b
 
 
 def record_table(record: Record) -> Table:
-    """What is known of a flight, a section per group; groups of which nothing is known are left out."""
+    """What is known of a flight, a section per group."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -23,8 +23,7 @@ def record_table(record: Record) -> Table:
     table.add_column(style="dim")
     table.add_column()
     table.add_column(justify="right")
-    for group, metrics in GROUPS:
-        known = [metric for metric in metrics if record.get(metric.name) is not None]
+    for group, known in told(record):
         for i, metric in enumerate(known):
             # values are data, not markup: a mission path may hold brackets
             value = Text(metric.read(record))

@@ -28,8 +28,7 @@
 
   function length(id, metres) {
     if (metres === null || metres === undefined) figure(id, null, "");
-    else if (Math.abs(metres) < 0.01) figure(id, (metres * 1000).toFixed(1), "mm");
-    else if (Math.abs(metres) < 1) figure(id, (metres * 100).toFixed(1), "cm");
+    else if (Math.abs(metres) < 1) figure(id, (metres * 1000).toFixed(Math.abs(metres) < 0.1 ? 1 : 0), "mm");
     else figure(id, metres.toFixed(2), "m");
   }
 

@@ -5,7 +5,7 @@
   const AT = Object.fromEntries(FIELDS.map((name, index) => [name, index]));
   // read gives the number of a sample, or null
   const SIGNALS = [
-    { key: "error", label: "Error", unit: "cm", read: (s) => scaled(s[AT.error], 100), on: true },
+    { key: "error", label: "Error", unit: "mm", read: (s) => scaled(s[AT.error], 1000), on: true },
     { key: "tension", label: "Tension", unit: "N", read: (s) => s[AT.tension], on: true },
     { key: "swing", label: "Swing", unit: "°", read: (s) => s[AT.swing], on: true },
     { key: "use", label: "Rotor use", unit: "%", read: (s) => scaled(s[AT.use], 100) },
@@ -17,7 +17,7 @@
   const COLOURS = ["#4ea1ff", "#ffb454", "#54c7ac", "#c792ea", "#ff7a5c", "#8fb8de", "#e0c341", "#93a3b3"];
   const SPANS = [[20, "20 s"], [60, "1 min"], [300, "5 min"], [Infinity, "all"]];
   const HEIGHT = 132;
-  const LEAST = 0.01; // what an axis spans at least: less is noise, in every unit of these signals
+  const LEAST = 0.1; // what an axis spans at least: less is noise, in every unit of these signals
 
   function scaled(value, factor) {
     return value === null || value === undefined ? null : value * factor;

@@ -426,7 +426,7 @@
         box.style.color = theme.label;
         const stops = theme.scale.map((colour) => `#${colour.toString(16).padStart(6, "0")}`);
         bar.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
-        high.textContent = full >= 1 ? `${full} m` : `${Math.round(full * 1000) / 10} cm`;
+        high.textContent = full >= 1 ? `${full} m` : `${Math.round(full * 1000)} mm`;
       },
       remove() {
         box.remove();

@@ -106,7 +106,7 @@ def test_a_fence_that_is_switched_off_stops_nobody() -> None:
 def test_distance_and_height() -> None:
     sky = fenced(radius_m=3.0).airborne()
     assert eastward(sky, 10.0) < 3.0
-    assert sky.texts[-1] == "Fence: more than GF_MAX_HOR_DIST 3 m from home"
+    assert sky.texts[-1] == "Fence: beyond the fence, GF_MAX_HOR_DIST 3 m from home"
     high = fenced(height_m=4.0).airborne()
     assert high.ask(Reposition(None, None, 3.5, True)).result == DENIED  # the vehicle would be at 4.2 m
     assert high.ask(Reposition(None, None, 3.2, True)).result == ACCEPTED

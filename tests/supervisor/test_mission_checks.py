@@ -212,12 +212,12 @@ def test_a_longer_cable_needs_more_height_and_a_released_load_less() -> None:
     low = {"height_m": 3.0, "fence": Fence()}
     assert not uploaded(fenced(**low), Takeoff(2.0), high, Land())
     text = uploaded(fenced(**low), Takeoff(2.0), Winch(0.5), high, Land())
-    assert text == "Mission denied: item 2 leads higher than GF_MAX_VER_DIST 3 m"
+    assert text == "Mission denied: item 2 leads beyond the fence, GF_MAX_VER_DIST 3 m above home"
     alone = Waypoint(1.0, 0.0, 2.9)
     assert uploaded(fenced(**low), Takeoff(2.0), alone) is not None
     assert not uploaded(fenced(**low), Takeoff(2.0), Release(), alone, ReturnHome())
     text = uploaded(fenced(**low), Takeoff(2.0), Release(), Waypoint(1.0, 0.0, 3.1))
-    assert text == "Mission denied: item 2 leads higher than GF_MAX_VER_DIST 3 m"
+    assert text == "Mission denied: item 2 leads beyond the fence, GF_MAX_VER_DIST 3 m above home"
 
 
 def test_in_the_air_the_way_from_here_counts_at_the_start_and_not_at_the_upload() -> None:

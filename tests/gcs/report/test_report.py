@@ -19,7 +19,7 @@ from pyarrow import parquet
 from rich.console import Console
 
 from gcs.analysis.definitions import GROUPS, METRICS
-from gcs.analysis.record import FlightMeta, jsonable
+from gcs.analysis.record import FlightMeta, Record, jsonable
 from gcs.analysis.telemetry import load_telemetry
 from gcs.report import style
 from gcs.report.build import ReportError, build_report, load_meta
@@ -176,11 +176,14 @@ def test_the_page_says_what_matters_and_escapes_what_it_was_given(page):
     assert "Rotor 2 at its limit <b>&amp;" in said
 
 
-def test_figures_say_of_which_part_of_the_flight_they_are(page, built):
-    text = " ".join(page.text)
+def printed(record: Record) -> str:
     console = Console(width=100, record=True, file=io.StringIO())
-    console.print(record_table(built[1]))
-    table = console.export_text()
+    console.print(record_table(record))
+    return console.export_text()
+
+
+def test_figures_say_of_which_part_of_the_flight_they_are(page, built):
+    text, table = " ".join(page.text), printed(built[1])
     for group in ("Load position error", "Vehicle and cable", "Rotors"):
         assert re.search(rf"{group}\s+over the mission", text)
         assert re.search(rf"{group} .*\n *over the mission", table)
@@ -188,12 +191,12 @@ def test_figures_say_of_which_part_of_the_flight_they_are(page, built):
 
 
 def test_groups_in_which_nothing_happened_are_left_out(page, built):
-    text = " ".join(page.text)
-    for group, metrics in GROUPS:
-        known = [metric for metric in metrics if built[1][metric.name] is not None]
-        happened = any(built[1][metric.name] for metric in known)
-        assert (f"{group.title}" in text) == happened, group.title
-        assert all(metric.label in text for metric in known if happened)
+    for text in (" ".join(page.text), printed(built[1])):
+        for group, metrics in GROUPS:
+            known = [metric for metric in metrics if built[1][metric.name] is not None]
+            happened = any(built[1][metric.name] for metric in known)
+            assert (f"{group.title}" in text) == happened, group.title
+            assert all(metric.label in text for metric in known if happened)
 
 
 def test_parquet_has_units_phases_and_the_record(built):
@@ -218,9 +221,7 @@ def test_parquet_has_units_phases_and_the_record(built):
 
 def test_the_table_shows_what_is_known(built):
     _, record, _ = built
-    console = Console(width=100, record=True, file=io.StringIO())
-    console.print(record_table({**record, "mission": "[red]odd[/red]"}))
-    text = console.export_text()
+    text = printed({**record, "mission": "[red]odd[/red]"})
     assert "completed" in text
     assert "Step response" not in text
     assert "[red]odd[/red]" in text

@@ -144,7 +144,7 @@ def test_same_end_at_the_fence(swung: str, action: float, outcome: str) -> None:
     fence = {"GF_MAX_HOR_DIST": FENCE_M, "GF_ACTION": action}
     found, states = flown(swung, Conditions(sensors="lab", seed=1, settings=fence))
     assert found.outcome == outcome
-    assert any("ence: more than GF_MAX_HOR_DIST 0.3 m from home" in text for text in found.texts)
+    assert any("ence: beyond the fence, GF_MAX_HOR_DIST 0.3 m from home" in text for text in found.texts)
     if action == LAND:
         assert np.hypot(states[:, 0], states[:, 1]).max() < FENCE_M + 0.05
 
@@ -155,7 +155,7 @@ def test_a_mission_that_leads_over_the_fence_is_refused(short: str) -> None:
     fenced = Conditions(settings={"GF_MAX_HOR_DIST": FENCE_M})
     found = fly(mission, fenced, arms)
     assert found.outcome == "refused"
-    assert "item 1 leads more than GF_MAX_HOR_DIST 0.3 m from home" in found.reason
+    assert "item 1 leads beyond the fence, GF_MAX_HOR_DIST 0.3 m from home" in found.reason
     with pytest.raises(ValueError, match="does not start under the conditions of the sweep") as refusal:
         boarding(mission, fenced)
-    assert "item 1 leads more than GF_MAX_HOR_DIST" in str(refusal.value)
+    assert "item 1 leads beyond the fence, GF_MAX_HOR_DIST" in str(refusal.value)
