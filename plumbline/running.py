@@ -20,9 +20,9 @@ from typing import TypeVar
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import KEY_BYTES
 from gcs.clients import command
+from gcs.clients.modes import MODES, change_mode
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterGet, ParameterSet
-from gcs.clients.vehicle_view import FLOWN_MODES
 from gcs.errors import GcsError, NoVehicleError, RefusedError
 from gcs.shell.link import monotonic_us, parse_address
 from gcs.shell.session import Session
@@ -206,13 +206,11 @@ class RunningVehicle:
 
     def mode(self, name: str) -> None:
         """Change the flight mode, in plain words: hold, mission, return, land ..."""
-        if text("mode", name, "hold") not in FLOWN_MODES:
-            hint = did_you_mean(name, FLOWN_MODES)
-            known = ", ".join(sorted(FLOWN_MODES))
+        if text("mode", name, "hold") not in MODES:
+            hint = did_you_mean(name, MODES)
+            known = ", ".join(MODES)
             raise GcsError(f"mode {name!r}: there is none; {hint}must be one of {known}")
-        main, sub = FLOWN_MODES[name]
-        armed = bool(self.state.armed)
-        self._command(lambda session: command.set_mode(session.target, name, main, sub, armed))
+        self._command(lambda session: change_mode(session.target, name, session.view.latest["HEARTBEAT"]))
 
     def parameter(self, name: str) -> float:
         """The value of a parameter."""

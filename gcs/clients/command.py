@@ -161,7 +161,7 @@ def reposition(
 
 
 def set_mode(target: Target, name: str, main: int, sub: int, armed: bool) -> CommandOperation:
-    """Change the PX4 mode."""
+    """Change the mode: PX4's main mode and sub-mode, or another autopilot's number and 0."""
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0)
     return CommandOperation(
         target, f"mode {name}", mavlink.MAV_CMD_DO_SET_MODE, (float(base), float(main), float(sub))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from autopilot.wire.codec import Field, Received
 from autopilot.wire.convert.flight import rotor_forces
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.clients.modes import mode_name
 
 BOOT_CLOCK = "SYSTEM_TIME"
 _TEXT_LENGTH = 50  # of one STATUSTEXT; a longer text comes in chunks
@@ -26,35 +27,6 @@ _SOURCES = {
     message_id: Field(kind, "source")
     for message_id, kind in mavlink.mavlink_map.items()
     if "source" in kind.fieldnames
-}
-
-_AUTO = 4
-_MAIN_MODES = {
-    1: "manual",
-    2: "altitude",
-    3: "position",
-    _AUTO: "auto",
-    5: "acro",
-    6: "offboard",
-    7: "stabilized",
-    8: "rattitude",
-}
-_AUTO_MODES = {
-    1: "ready",
-    2: "takeoff",
-    3: "hold",
-    4: "mission",
-    5: "return",
-    6: "land",
-    7: "return-ground",
-    8: "follow",
-    9: "precision-land",
-}
-_FLOWN = ("position", "offboard", "takeoff", "hold", "mission", "return", "land")
-# by this vehicle: main mode and sub-mode
-FLOWN_MODES: dict[str, tuple[int, int]] = {
-    **{name: (main, 0) for main, name in _MAIN_MODES.items() if name in _FLOWN},
-    **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items() if name in _FLOWN},
 }
 
 _PHASES = {
@@ -88,13 +60,6 @@ class Text(NamedTuple):
     now_us: int
     severity: int
     text: str
-
-
-def mode_name(custom_mode: int) -> str:
-    """The name of a packed PX4 mode."""
-    main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
-    names, key = (_AUTO_MODES, sub) if main == _AUTO else (_MAIN_MODES, main)
-    return names.get(key, f"mode {main}.{sub}")
 
 
 class Newest(Mapping[str, Any]):
@@ -177,7 +142,7 @@ class VehicleView:
     @property
     def mode(self) -> str | None:
         heartbeat = self.latest.get("HEARTBEAT")
-        return None if heartbeat is None else mode_name(heartbeat.custom_mode)
+        return None if heartbeat is None else mode_name(heartbeat)
 
     @property
     def state(self) -> str | None:

@@ -8,8 +8,8 @@ from math import isnan
 import click
 
 from gcs.clients import command
+from gcs.clients.modes import MODES, change_mode
 from gcs.clients.operation import Operation
-from gcs.clients.vehicle_view import FLOWN_MODES
 from gcs.commands.options import FiniteType, OptionalArgument, PositiveType, connect_option
 from gcs.shell.link import Address
 from gcs.shell.session import Session
@@ -143,16 +143,13 @@ def land_command(address: Address) -> None:
 
 
 @click.command("mode")
-@click.argument("name", metavar="MODE", type=click.Choice(sorted(FLOWN_MODES), case_sensitive=False))
+@click.argument("name", metavar="MODE", type=click.Choice(MODES, case_sensitive=False))
 @connect_option
 def mode_command(name: str, address: Address) -> None:
     """Change the flight mode.
 
-    MODE is a PX4 mode that the vehicle has, in plain words: hold, land, mission, offboard, position, return
-    or takeoff.
+    MODE is one that the vehicle has, in PX4's words: hold, land, mission, offboard, position, return or
+    takeoff. With ArduPilot's identity (MAV_IDENTITY 1) these are GUIDED, LAND, AUTO, POSHOLD and RTL; it has
+    no offboard and takeoff.
     """
-    main, sub = FLOWN_MODES[name]
-    _send(
-        address,
-        lambda session: command.set_mode(session.target, name, main, sub, armed=bool(session.view.armed)),
-    )
+    _send(address, lambda session: change_mode(session.target, name, session.view.latest["HEARTBEAT"]))

@@ -15,9 +15,9 @@ from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients import command
+from gcs.clients.modes import change_mode
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterSet
-from gcs.clients.vehicle_view import FLOWN_MODES
 from gcs.view.controls import NAMES
 from gcs.view.vehicle import WatchedVehicle
 
@@ -71,8 +71,7 @@ def _take_off(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
 
 
 def _return(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
-    main, sub = FLOWN_MODES["return"]
-    return [command.set_mode(vehicle.target, "return", main, sub, armed=bool(vehicle.view.armed))]
+    return [change_mode(vehicle.target, "return", vehicle.view.latest["HEARTBEAT"])]
 
 
 def _go_to(vehicle: WatchedVehicle, arguments: Arguments) -> list[Operation]:
