@@ -109,7 +109,6 @@ def _is_row_of_another_home(plan: Plan, home: Home) -> bool:
     (first, _), (second, _) = plan.items[:2]
     return (
         first.command == mavlink.MAV_CMD_NAV_WAYPOINT
-        and first.current == 1
         and first.frame in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
         and second.command == mavlink.MAV_CMD_NAV_TAKEOFF
         and _is_no_home(first, home)

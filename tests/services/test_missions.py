@@ -347,6 +347,24 @@ def test_for_clients_of_ardupilot_there_is_always_home(rig_with, as_message, as_
     assert said(rig.replies(m.MAVLink_mission_request_list_message(1, 1))) == [("MISSION_COUNT", 3)]
 
 
+@pytest.mark.parametrize("current", [0, 1])
+def test_the_home_of_a_file_is_the_vehicles_own_for_clients_of_ardupilot(
+    rig_with, items, as_message, current
+):
+    """Its height above the sea, or its place, would be flown to: of another home it is a waypoint."""
+    rig = rig_with(identity=Identity(flavour=ARDUPILOT))
+    canberra = WireItem(0, 16, current, 1, 0.0, 0.0, 0.0, 0.0, -353632620, 1491652370, 584.0)
+    assert upload(rig, (canberra, *items(2)), as_message) == [(ACK, m.MAV_MISSION_ACCEPTED)]
+    home, *rest = rig.endpoint.mission.items
+    assert (home.x, home.y, home.z) == (
+        round(Home().latitude_deg * 1e7),
+        round(Home().longitude_deg * 1e7),
+        0.0,
+    )
+    assert tuple(rest) == items(2)
+    assert [step.first for step in located_steps(rig.endpoint.mission.items, Home())] == [1, 2]
+
+
 @pytest.mark.parametrize("ask", [m.MAVLink_mission_request_int_message, m.MAVLink_mission_request_message])
 def test_an_item_that_is_not_there(rig_with, items, ask):
     rig = rig_with(items(2))

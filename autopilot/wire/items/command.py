@@ -87,9 +87,9 @@ class Asked:
         return self.item.frame in PLACE_FRAMES and (self.item.x, self.item.y) != (0, 0)
 
     def is_home_row(self) -> bool:
-        """Whether it is home itself as item 0, as MAVProxy and Mission Planner write it."""
+        """Whether it is home itself as item 0, as MAVProxy and Mission Planner write it, current or not."""
         item = self.item
-        if self.seq != 0 or item.current != 1 or item.frame not in ABSOLUTE_FRAMES:
+        if self.seq != 0 or item.frame not in ABSOLUTE_FRAMES:
             return False
         place = enu_from_geodetic(item.x, item.y, 0, self.home)
         height = item.z - self.home.altitude_m

@@ -215,17 +215,18 @@ def test_pymavlink_reads_our_waypoints_and_we_read_its(tmp_path: Path) -> None:
 
 
 def test_a_home_row_of_another_place_is_not_flown() -> None:
-    def rows(latitude: float) -> Plan:
-        text = f"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t{latitude}\t8.545594\t0\t1\n"
+    def rows(latitude: float, current: int = 1) -> Plan:
+        text = f"QGC WPL 110\n0\t{current}\t0\t16\t0\t0\t0\t0\t{latitude}\t8.545594\t0\t1\n"
         return Plan(read_waypoints(text + "1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t2\t1\n"), [])
 
     at_home = judge(rows(47.397742), HOME)
     assert at_home.left_out == []
     assert len(at_home.items) == 2
-    elsewhere = judge(rows(47.39), HOME)
-    assert len(elsewhere.left_out) == 1
-    assert "home row" in elsewhere.left_out[0]
-    assert [item.command for item in elsewhere.items] == [22]
+    for current in (0, 1):
+        elsewhere = judge(rows(47.39, current), HOME)
+        assert len(elsewhere.left_out) == 1
+        assert "home row" in elsewhere.left_out[0]
+        assert [item.command for item in elsewhere.items] == [22]
 
 
 BAD_PLANS = [
