@@ -87,7 +87,8 @@ class Gcs(click.Group):
         try:
             code = super().main(args, standalone_mode=False, **extra)
         except GcsError as error:
-            say(str(error))
+            for line in error.lines:
+                say(line)
             code = error.exit_code
         except click.UsageError as error:
             if isinstance(error, click.exceptions.NoArgsIsHelpError):

@@ -17,9 +17,13 @@ EXIT_INTERRUPTED = 130  # stopped by Ctrl-C, as shells count it
 
 
 class GcsError(Exception):
-    """A known error. Its text is what a person reads: one line, or one for each mistake in a file."""
+    """A known error. Its text is the one line that a person reads; `lines` has one for each mistake."""
 
     exit_code = EXIT_ERROR
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__("; ".join(lines))
+        self.lines = lines
 
 
 class InputError(GcsError):
@@ -44,7 +48,7 @@ class RefusedError(GcsError):
 
 def input_error(error: FileError) -> GcsError:
     """What is wrong with a file that the command line names, or with the name."""
-    return InputError("\n".join(error.problems))
+    return InputError(*error.problems)
 
 
 _DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from gcs.errors import GcsError, InputError
 
 SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
 TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
+LOCK_FILE = ".lock"  # of a folder that several flights are written into
 # of these three one lies in every folder that holds the results of one thing
 _HOLDS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis's experiments"}
 
@@ -46,6 +50,25 @@ def make_folder(path: Path, told: str) -> None:
             raise PermissionError(13, "Permission denied")
     except OSError as error:
         raise GcsError(f"{told}: {error.strerror}") from None
+
+
+@contextmanager
+def reserved(path: Path, what: str) -> Iterator[None]:
+    """Keep others from writing into a folder meanwhile; InputError if another does already, `what` it makes.
+
+    The lock goes with the process, however it ends.
+    """
+    lock = FileLock(path / LOCK_FILE)
+    try:
+        lock.acquire(blocking=False)
+    except Timeout:
+        raise InputError(
+            f"--out {path}: another {what} is writing there; wait until it has ended, or name another folder"
+        ) from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def check_writable(path: Path, is_folder: bool, told: str) -> None:

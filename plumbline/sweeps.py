@@ -125,6 +125,7 @@ def _run(words: list[str], quiet: bool) -> None:
             if len(said) > 1 and not quiet:
                 sys.stderr.write(said[-2])
     last = said[-1] if said else ""
+    told = said if quiet else [last]  # without progress, all that is said is what is wrong
     if program.returncode == 0:
         if not quiet:
             sys.stderr.write(last)
@@ -132,4 +133,5 @@ def _run(words: list[str], quiet: bool) -> None:
     if program.returncode == EXIT_INTERRUPTED:
         raise KeyboardInterrupt
     kind = InputError if program.returncode == InputError.exit_code else GcsError
-    raise kind(last.strip().removeprefix(_SAYS) or f"gcs sweep ended with {program.returncode}")
+    wrong = "; ".join(line.strip().removeprefix(_SAYS) for line in told if line.strip())
+    raise kind(wrong or f"gcs sweep ended with {program.returncode}")

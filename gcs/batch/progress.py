@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 
 _FIRST_S = 2.0  # after which a person wonders
+_MINUTES_S = 120.0  # from here on times are told in minutes
 
 
 class BatchDisplay(LiveBars):
@@ -61,8 +62,8 @@ class BatchDisplay(LiveBars):
     def _figures(self) -> str:
         if not self.flown:
             return "flights, the first are on their way" if self.elapsed_s > _FIRST_S else "flights"
-        pace = self.flown / max(self.elapsed_s, 1e-3)
-        return f"flights, {100.0 * self.completed / self.flown:.0f} % completed, {_pace(pace)}"
+        flights_per_s = self.flown / max(self.elapsed_s, 1e-3)
+        return f"flights, {100.0 * self.completed / self.flown:.0f} % completed, {pace(flights_per_s)}"
 
     def _line(self, running: Running) -> str:
         self._told = self.flown
@@ -73,11 +74,13 @@ class BatchDisplay(LiveBars):
         left = self._total - self._stored - self.flown
         if not left or not self.flown:
             return ""
-        minutes = left * self.elapsed_s / self.flown / 60.0
-        return f", {minutes:.1f} min remaining"
+        left_s = left * self.elapsed_s / self.flown
+        told = f"{left_s:.0f} s" if left_s < _MINUTES_S else f"{left_s / 60.0:.0f} min"
+        return f", {told} remaining"
 
 
-def _pace(flights_per_s: float) -> str:
+def pace(flights_per_s: float) -> str:
+    """In the unit that a person counts in."""
     if flights_per_s >= 1.0:
         return f"{flights_per_s:.1f} flights/s"
     return f"{60.0 * flights_per_s:.1f} flights/min"

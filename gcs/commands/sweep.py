@@ -127,6 +127,7 @@ def sweep_command(
     if jobs is not None and scheduler is not None:
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
 
+    from gcs.batch.progress import pace
     from gcs.workflows.requirements import COMPLETED, conclude, judge, read_requirements, reporting
     from gcs.workflows.sweep import FIGURES, SweepOptions, run_sweep
 
@@ -148,7 +149,7 @@ def sweep_command(
         reports=reports,
         fresh=fresh,
         quiet=quiet or as_json,
-        command=shlex.join(sys.argv),
+        command=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
     )
     with reporting(run, junit):
         sweep = run_sweep(options)
@@ -156,8 +157,8 @@ def sweep_command(
         print_json(sweep.record)
     else:
         done = sweep.done
-        pace = f", {done.flights_per_s:.1f} flights/s" if done.flown else ""
-        say(f"{mission}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{pace}")
+        flew = f", {pace(done.flights_per_s)}" if done.flown else ""
+        say(f"{mission}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{flew}")
         if not quiet:
             for one in sweep.flights:
                 click.echo(

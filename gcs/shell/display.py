@@ -23,10 +23,9 @@ _OPENS_AFTER_S = 0.5  # a short step needs no bar
 Row = Mapping[str, Any]  # description, completed, total and the fields of one bar
 
 
-def say(text: str) -> None:
-    """A line of trouble or news on stderr, or several."""
-    for line in text.splitlines() or [""]:
-        print(f"gcs: {line}", file=sys.stderr, flush=True)
+def say(line: str) -> None:
+    """One line of trouble or news on stderr."""
+    print(f"gcs: {line}", file=sys.stderr, flush=True)
 
 
 def to_reader(write: Callable[[], None]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from gcs.batch.reuse import Origin, file_digests, origin_of
 from gcs.folders import PLAN_FILE, make_folder
 from gcs.sweep.plan import PlanError, SweepPlan, from_json
 
+_NAMED = {"mission": "mission", "laws": "--law", "varied": "--vary", "settings": "--set"}
 ENTRIES = ("gcs.sweep.work",)  # of the code that flies a sweep
 
 
@@ -30,14 +32,54 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
         found = _read(directory)
         differing = origin.differences(found.get("origin"))
         if differing:
-            kind = "another sweep" if "settings" in differing else "a sweep flown by other code"
+            held = "this sweep as flown by another version or other code of Plumbline"
+            if "settings" in differing:
+                held = f"another sweep, with other {', '.join(_differing(origin, found))}"
             raise PlanError(
-                f"--out {directory}: holds {kind} ({', '.join(differing)} differ); name another, or add"
-                " --fresh to discard its flights"
+                f"--out {directory}: holds {held}; name another folder, or add --fresh to discard its flights"
             )
         return
     fields = {"command": command, "flights": plan.flights, "origin": origin.to_json()}
     path.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
+
+
+def default_directory(plan: SweepPlan, origin: Origin, fresh: bool) -> Path:
+    """sweeps/MISSION, or the first of sweeps/MISSION-2, -3 ... that holds this sweep, or nothing.
+
+    `fresh`: also one that other code has flown, whose flights are discarded.
+    """
+    stem = Path(plan.mission).stem
+    ordinal = 1
+    while True:
+        directory = Path("sweeps") / (stem if ordinal == 1 else f"{stem}-{ordinal}")
+        if not directory.exists() or _is_of(directory, origin, fresh):
+            return directory
+        ordinal += 1
+
+
+def _is_of(directory: Path, origin: Origin, fresh: bool) -> bool:
+    try:
+        differing = origin.differences(_read(directory).get("origin"))
+    except PlanError:
+        return False
+    return "settings" not in differing if fresh else not differing
+
+
+def _differing(origin: Origin, found: Mapping[str, Any]) -> list[str]:
+    """What of the settings differs, as the command line names it, with the value that is stored if it is
+    short."""
+    try:
+        stored, asked = found["origin"]["settings"], origin.to_json()["settings"]
+        pairs = [(name, stored["plan"].get(name), value) for name, value in asked["plan"].items()]
+        other_files = stored["files"] != asked["files"]
+    except (KeyError, TypeError, AttributeError):
+        return ["settings"]
+    named = [_NAMED.get(name, f"--{name}") + _was(theirs) for name, theirs, mine in pairs if theirs != mine]
+    return named or (["files of your own"] if other_files else [])
+
+
+def _was(value: object) -> str:
+    return f" ({value})" if isinstance(value, str | int | float) else ""
 
 
 def load_plan(directory: Path) -> SweepPlan:

@@ -41,7 +41,7 @@ def write_report(directory: Path, plan: SweepPlan) -> Path:
     for name in names if laws else []:
         picture = directory / f"curve-{name.lower()}.png"
         draw_curve(picture, laws, plan, name, units)
-        curves.append(_picture(picture, f"{name}: everything else thrown together"))
+        curves.append(_picture(picture, f"{name}: over all other settings and seeds"))
     for pair in list(combinations(names, 2))[:_MOST_PAIRS]:
         for flights in laws:
             picture = directory / f"map-{flights.law}-{pair[0].lower()}-{pair[1].lower()}.png"
@@ -118,6 +118,8 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
     """For each law and varied parameter: from where to where all is well, and what linear theory says."""
     rows = []
     for flights in laws:
+        planned = plan.flights // len(plan.laws)
+        none = "nowhere" if len(flights.outcome) == planned else "not known yet"
         for varied in plan.varied:
             parameter = _parameter(tables, varied.name)
             nominal, unit = parameter.default, parameter.unit
@@ -131,8 +133,8 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
                     "name": varied.name,
                     "unit": unit,
                     "nominal": f"{nominal:.4g}",
-                    "every": _range(found.all_from, found.all_to),
-                    "some": _range(found.some_from, found.some_to),
+                    "every": _range(found.all_from, found.all_to, none),
+                    "some": _range(found.some_from, found.some_to, none),
                     "flown": _range(float(values.min()), float(values.max())),
                     "linear": linear_range(plan, flights.reference, varied.name, nominal, limits),
                 }
@@ -140,9 +142,9 @@ def margins(plan: SweepPlan, laws: list[Flights], tables: tuple[ParameterTable, 
     return rows
 
 
-def _range(low: float, high: float) -> str:
+def _range(low: float, high: float, none: str = "") -> str:
     if math.isnan(low):
-        return "nowhere"
+        return none
     return f"{low:.4g}" if low == high else f"{low:.4g} … {high:.4g}"
 
 

@@ -108,7 +108,7 @@ def _nearest(values: Floats, centres: Floats) -> NDArray[np.intp]:
 
 
 def cells(flights: Flights, plan: SweepPlan, names: tuple[str, ...]) -> Cells:
-    """The figures over the parameters named, everything else thrown together."""
+    """The figures over the parameters named, over all other settings and seeds."""
     axes = tuple(levels(plan, name) for name in names)
     shape = tuple(len(axis) for axis in axes)
     at = np.ravel_multi_index(

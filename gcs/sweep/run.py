@@ -13,7 +13,7 @@ from autopilot.shell.compiling import Part
 from gcs.batch.pool import PoolCrew
 from gcs.batch.progress import BatchDisplay
 from gcs.batch.runner import Running, fly_all
-from gcs.folders import PAGE_FILE, PLAN_FILE, keep_others
+from gcs.folders import PAGE_FILE, PLAN_FILE, keep_others, make_folder, reserved
 from gcs.sweep.plan import SweepPlan
 from gcs.sweep.plan_file import store_plan, sweep_origin
 from gcs.sweep.results import COMPLETED
@@ -58,10 +58,23 @@ def sweep(
     """
     store = Store(directory, plan)
     keep_others(directory, PLAN_FILE, (PAGE_FILE,))
-    if fresh:
-        store.clear()
-        (directory / PLAN_FILE).unlink(missing_ok=True)
-    store_plan(directory, plan, command, sweep_origin(plan))
+    make_folder(directory, f"--out {directory}")
+    with reserved(directory, "gcs sweep"):
+        if fresh:
+            store.clear()
+            (directory / PLAN_FILE).unlink(missing_ok=True)
+        store_plan(directory, plan, command, sweep_origin(plan))
+        return _fly_missing(plan, store, workers, stopped, quiet, warm)
+
+
+def _fly_missing(
+    plan: SweepPlan,
+    store: Store,
+    workers: AbstractContextManager[tuple[Executor, int]],
+    stopped: Callable[[], bool],
+    quiet: bool,
+    warm: Callable[[Iterable[Part]], None],
+) -> Swept:
     stored = store.done()
     missing = [case for case in plan.cases() if case.index not in stored]
     whole, flown, wall_s = True, 0, 0.0
@@ -79,4 +92,5 @@ def sweep(
     outcomes = table.column("outcome").to_pylist()
     errors = table.column("load_error_max_m").to_pylist()
     completed = [error for error, outcome in zip(errors, outcomes, strict=True) if outcome == COMPLETED]
+    whole = whole or len(outcomes) == plan.flights  # a request to stop may come while the last ones fly
     return Swept(len(outcomes), flown, len(completed), max(completed, default=None), wall_s, whole)

@@ -15,6 +15,7 @@ from gcs.experiments.run import Ended, fly_missing, missing, start
 from gcs.experiments.store import experiment_origin
 from gcs.experiments.table import tables
 from gcs.experiments.thesis import FLIGHTS, Report, make_directory, write_docs, write_report
+from gcs.folders import reserved
 from gcs.shell.display import StepDisplay
 from gcs.shell.processes import Child
 from gcs.shell.stopping import StopRequest
@@ -28,7 +29,7 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
     """
     make_directory(out)
     plan, flights = experiments(), out / FLIGHTS
-    with StopRequest(STOPPING) as stop:
+    with reserved(out, "gcs experiments"), StopRequest(STOPPING) as stop:
         waiting = missing(plan, flights, fresh)
         with BatchDisplay(len(plan) - len(waiting), len(plan), quiet) as display:
 

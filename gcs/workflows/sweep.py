@@ -15,6 +15,7 @@ from gcs.folders import PAGE_FILE
 from gcs.shell.display import say
 from gcs.shell.stopping import StopRequest
 from gcs.sweep.plan import MOST_FLIGHTS, SweepPlan, make_plan, read_varied
+from gcs.sweep.plan_file import default_directory, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
@@ -108,7 +109,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
     )
     if not options.quiet:
         _tell_doubts(plan)
-    directory = options.out or Path("sweeps") / Path(options.mission).stem
+    directory = options.out or default_directory(plan, sweep_origin(plan), options.fresh)
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
     with StopRequest(STOPPING) as stop:
@@ -125,6 +126,8 @@ def run_sweep(options: SweepOptions) -> Sweep:
         found = stored_standouts(directory, plan)
         if options.reports and not stop:
             _fly_again(plan, found, directory, options.quiet)
+        if not options.quiet:
+            say("drawing the report")
         page = write_report(directory, plan)
     flights = tuple(_told(plan, one, directory) for one in found)
     return Sweep(done, plan.flights, directory, page, flights)

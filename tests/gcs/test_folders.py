@@ -9,8 +9,17 @@ import pytest
 from click.testing import CliRunner
 
 from gcs.cli import gcs
-from gcs.errors import EXIT_USAGE, GcsError
-from gcs.folders import PAGE_FILE, PLAN_FILE, RESULTS_FILE, SUMMARY_FILE, TLOG_FILE, fresh_folder, keep_others
+from gcs.errors import EXIT_USAGE, GcsError, InputError
+from gcs.folders import (
+    PAGE_FILE,
+    PLAN_FILE,
+    RESULTS_FILE,
+    SUMMARY_FILE,
+    TLOG_FILE,
+    fresh_folder,
+    keep_others,
+    reserved,
+)
 from gcs.workflows.fly import UNFLOWN_FILE, FlightFolder
 
 
@@ -110,3 +119,11 @@ def test_a_flight_leaves_a_sweep_and_files_of_others_as_they_are(tmp_path: Path)
             FlightFolder(tmp_path, overwrite=name == PLAN_FILE).__enter__()
         assert [file.name for file in tmp_path.iterdir()] == [name]
         (tmp_path / name).unlink()
+
+
+def test_a_folder_that_is_written_into_is_not_anothers(tmp_path: Path) -> None:
+    in_use = reserved(tmp_path, "sweep")
+    with in_use, pytest.raises(InputError, match=f"^--out {tmp_path}: another sweep is writing there; "):
+        reserved(tmp_path, "sweep").__enter__()
+    with reserved(tmp_path, "sweep"):
+        pass

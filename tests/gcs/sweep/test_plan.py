@@ -16,7 +16,7 @@ from gcs.sweep.plan import (
     make_plan,
     read_varied,
 )
-from gcs.sweep.plan_file import load_command, load_plan, store_plan, sweep_origin
+from gcs.sweep.plan_file import default_directory, load_command, load_plan, store_plan, sweep_origin
 
 
 def test_ranges_and_lists() -> None:
@@ -114,11 +114,11 @@ def test_a_directory_holds_one_plan(plan: SweepPlan, tmp_path: Path) -> None:
     assert load_plan(tmp_path) == plan
     assert load_command(tmp_path) == ("gcs sweep", "1")
     other = SweepPlan(plan.mission, "bebop", "lab", ("lqr",), (1,), (), ())
-    with pytest.raises(PlanError, match="another sweep"):
+    with pytest.raises(PlanError, match=r"another sweep, with other --law, --seeds, --vary; name"):
         store_plan(tmp_path, other, "gcs sweep", origin(other))
-    with pytest.raises(PlanError, match="other code"):
+    with pytest.raises(PlanError, match="this sweep as flown by another version or other code"):
         store_plan(tmp_path, plan, "gcs sweep", origin(plan, code="changed"))
-    with pytest.raises(PlanError, match="version differ"):
+    with pytest.raises(PlanError, match="another version"):
         store_plan(tmp_path, plan, "gcs sweep", origin(plan, version="2"))
     with pytest.raises(PlanError, match="no sweep"):
         load_plan(tmp_path / "empty")
@@ -142,3 +142,19 @@ def test_a_mission_file_that_changed_is_another_sweep(plan: SweepPlan, tmp_path:
     assert sweep_origin(moved).differences(before.to_json()) == ()
     mission.write_text(mission.read_text(encoding="utf-8").replace("0.4", "0.5"), encoding="utf-8")
     assert sweep_origin(moved).differences(before.to_json()) == ("settings",)
+
+
+def test_sweeps_without_a_name_do_not_get_into_each_others_way(
+    plan: SweepPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    stem = Path(plan.mission).stem
+    other = replace(plan, sensors="rtk" if plan.sensors == "lab" else "lab")
+    for number, one in enumerate((plan, other), start=1):
+        for _ in range(2):  # and each goes on where it was
+            directory = default_directory(one, origin(one), fresh=False)
+            assert directory == Path("sweeps") / (stem if number == 1 else f"{stem}-{number}")
+            store_plan(directory, one, "gcs sweep", origin(one))
+    changed = origin(plan, code="changed")
+    assert default_directory(plan, changed, fresh=False) == Path("sweeps") / f"{stem}-3"
+    assert default_directory(plan, changed, fresh=True) == Path("sweeps") / stem
