@@ -47,7 +47,8 @@ class KeptTexts:
     def keep(self, severity: int, text: str, now_us: int, about: Hashable = None) -> None:
         """A text is said now, maybe that something is refused; the oldest one may be forgotten for it."""
         said = severity, text
-        self._texts.pop(said, None)
+        for older in (said, (_OVERTAKEN, text)):
+            self._texts.pop(older, None)
         self._texts[said] = now_us
         if len(self._texts) > MOST:
             del self._texts[next(iter(self._texts))]
@@ -63,10 +64,11 @@ class KeptTexts:
             return
         for said in overtaken:
             del self._refusals[said]
-        self._texts = {
-            (_OVERTAKEN, said[1]) if said in overtaken else said: now_us
+        settled = [
+            ((_OVERTAKEN, said[1]) if said in overtaken else said, now_us)
             for said, now_us in self._texts.items()
-        }
+        ]
+        self._texts = dict(sorted(settled, key=lambda one: one[1]))  # of two that are one the later counts
 
     def inherit(self, texts: Iterable[KeptText], ended_us: int) -> None:
         """Texts of a run that ended at this time of its clock, as this one begins."""

@@ -117,7 +117,7 @@ class VehicleLimits:
 
 @dataclass(frozen=True, slots=True)
 class PathReport:
-    """How a step is flown: signals as shaped, waypoints as passed.
+    """How a step is flown: signals as shaped, waypoints as passed, a way from rest to rest, an attitude run.
 
     `distance_m` is between the flown and the asked path, at most; forces in N, `tilt_deg` of the vehicle.
     """
@@ -132,11 +132,13 @@ class PathReport:
     tilt_deg: float
 
     def __str__(self) -> str:
+        near = ""
+        if self.kind == "signals":
+            near = f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
         return (
-            f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s, at most "
-            f"{1e3 * self.distance_m:.1f} mm from the path asked; rotors {self.rotor_low_n:.2f} ... "
-            f"{self.rotor_high_n:.2f} N, tension from {self.tension_low_n:.2f} N, "
-            f"tilt to {self.tilt_deg:.0f} deg"
+            f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; "
+            f"rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, "
+            f"tension from {self.tension_low_n:.2f} N, tilt to {self.tilt_deg:.0f} deg"
         )
 
 
@@ -209,40 +211,48 @@ def _too_heavy(limits: VehicleLimits) -> list[Violation]:
 
 
 def paths(mission: Mission, limits: VehicleLimits, planner: Planner | None = None) -> list[PathReport]:
-    """How each step is flown that signals describe, or that waypoints without a hold are passed in.
+    """How each step is flown that carries the load along a path, or tracks an attitude.
 
-    `planner` is somebody's own, of paths through waypoints; PlanError, if what it gives is refused.
+    What the vehicle flies after it has released the load is left out. `planner` is somebody's own, of paths
+    through waypoints; PlanError, if what it gives is refused.
     """
     shaping = limits.shaping
     prepared = prepare(mission.steps, range(len(mission.steps)), shaping, planner=planner)
     if planner is not None and prepared.refusal:
         raise PlanError(prepared.refusal)
     found = []
-    for item, made in enumerate(prepared.made):
-        if isinstance(made, Shaped):
-            kind, distance = "signals", made.distance_m
-            times = linspace(-made.lead_s, made.duration_s + made.tail_s, _REPORT_SAMPLES)
-            jets = path_jets(made, times)
-        elif isinstance(made, Passage):
-            kind, distance = "waypoint", 0.0
-            times = linspace(made.begin_s, made.end_s, _REPORT_SAMPLES)
-            jets = passage_jets(made.table, times)
-        else:
+    for entry in _timeline(mission, limits):
+        made, distance, along = prepared.made[entry.item], 0.0, None
+        if entry.before.released or isinstance(entry.step, Winch | Land):
             continue
-        along = survey_path(times, jets, 0.0, shaping.body)
-        found.append(
-            PathReport(
-                item,
-                kind,
-                float(times[-1] - times[0]),
-                distance,
-                along.rotor_low.value,
-                along.rotor_high.value,
-                along.tension_low.value,
-                degrees(along.tilt.value),
-            )
-        )
+        if isinstance(made, Shaped):
+            distance = made.distance_m
+            times = linspace(-made.lead_s, made.duration_s + made.tail_s, _REPORT_SAMPLES)
+            along = survey_path(times, path_jets(made, times), 0.0, shaping.body)
+            duration_s = float(times[-1] - times[0])
+        elif isinstance(made, Passage):
+            times = linspace(made.begin_s, made.end_s, _REPORT_SAMPLES)
+            along = survey_path(times, passage_jets(made.table, times), 0.0, shaping.body)
+            duration_s = float(times[-1] - times[0])
+        else:
+            along = _survey(entry, limits)
+            duration_s = entry.duration_s if isinstance(entry.step, AttitudeRun) else entry.transfer_s
+        if along is not None:
+            found.append(_path_report(entry, duration_s, distance, along))
     return found
+
+
+def _path_report(entry: TimelineEntry, duration_s: float, distance_m: float, along: Peaks) -> PathReport:
+    return PathReport(
+        entry.item,
+        _kind(entry),
+        duration_s,
+        distance_m,
+        along.rotor_low.value,
+        along.rotor_high.value,
+        along.tension_low.value,
+        degrees(along.tilt.value),
+    )
 
 
 def peaks(mission: Mission, limits: VehicleLimits) -> dict[int, Peaks]:

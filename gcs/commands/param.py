@@ -55,7 +55,7 @@ def get_command(names: tuple[str, ...], as_json: bool, address: Address) -> None
         print_table([(name, f"{value:.9g}") for name, value in found.items()])
 
 
-@param_command.command("set")
+@param_command.command("set", context_settings={"ignore_unknown_options": True})  # -1 is a number here
 @click.argument("name")
 @click.argument("value", type=FiniteType())
 @connect_option

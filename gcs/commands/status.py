@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from gcs.commands.options import connect_option, json_option, print_json, print_table, spoken, truth_option
+from gcs.shell.display import say
 from gcs.shell.link import Address
 from gcs.workflows.status import vehicle_status, vehicle_texts
 
@@ -43,8 +44,10 @@ def texts_command(as_json: bool, address: Address) -> None:
     texts = vehicle_texts(address)
     if as_json:
         print_json(texts)
-    else:
+    elif texts:
         print_table(_lines(texts))
+    else:
+        say("the vehicle has said nothing yet, or keeps no texts")
 
 
 def _lines(texts: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:

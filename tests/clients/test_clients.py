@@ -51,7 +51,7 @@ FAILSAFE = m.PLUMBLINE_PHASE_FAILSAFE
         "Got COMMAND_ACK: DO_SET_MODE: TEMPORARILY_REJECTED",
         "Got MISSION_ACK: TYPE_MISSION: UNSUPPORTED",
         "fence breach",
-        "AP: Mission denied while lift",
+        "AP: Mission denied while the load is lifted",
     ],
 )
 def test_what_counts_as_a_complaint(line: str) -> None:

@@ -280,13 +280,18 @@ def test_check_says_that_it_can_be_flown():
     result = run("check", "square", "--json")
     assert result.exit_code == EXIT_DONE
     told = json.loads(result.stdout)
-    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "paths": [], "warnings": []}
+    ways = [(path.pop("item"), path.pop("kind")) for path in told["paths"]]
+    assert ways == [(0, "takeoff"), *((item, "waypoint") for item in (2, 3, 4, 5))]
+    assert all(
+        0.9 < path["tension_low_n"] < 1.0 and 3.0 < path["duration_s"] < 10.0 for path in told.pop("paths")
+    )
+    assert told == {"mission": "square", "vehicle": "bebop", "violations": [], "warnings": []}
 
 
 def test_check_tells_how_signals_will_be_flown():
     told = json.loads(run("check", "case-a", "--json").stdout)
-    (path,) = told["paths"]
-    assert (path["item"], path["kind"]) == (2, "signals")
+    lift, path = told["paths"]
+    assert (lift["kind"], path["item"], path["kind"]) == ("takeoff", 2, "signals")
     # measured 11.1 mm and 0.30 ... 1.64 N
     assert 0.001 < path["distance_m"] < 0.013
     assert 0.2 < path["rotor_low_n"] < path["rotor_high_n"] < 1.75

@@ -132,3 +132,16 @@ def test_a_refusal_is_a_warning_until_what_was_refused_is_accepted(rig: Rig) -> 
     rig.run(4_000_000)
     rig.send(start)
     assert severities()["StartMission denied"] == WARNING, "it is refused once more"
+
+
+def test_a_text_is_kept_once_and_in_its_place_whatever_becomes_of_what_was_refused() -> None:
+    kept = KeptTexts(TextWriter())
+    kept.keep(WARNING, "Mission denied", 1, about="mission")
+    kept.settle("mission")
+    kept.keep(WARNING, "another", 2)
+    kept.keep(WARNING, "Mission denied", 3, about="mission")
+    assert [(text.now_us, text.text) for text in kept.texts] == [(2, "another"), (3, "Mission denied")]
+    kept.keep(WARNING, "last", 4)
+    kept.settle("mission")
+    notice = mavlink.MAV_SEVERITY_NOTICE
+    assert kept.texts[1:] == (KeptText(3, notice, "Mission denied"), KeptText(4, WARNING, "last"))

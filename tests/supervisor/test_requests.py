@@ -253,7 +253,7 @@ def test_a_reposition_keeps_what_is_not_given_and_holds_there() -> None:
 def test_a_phase_is_named_in_words() -> None:
     flight = replace(Sky().airborne().flight, phase=Phase.SET_DOWN)
     _, verdict = decide(flight, R.Reposition(1.0, None, None, True), hanging(), SETTINGS)
-    assert (verdict.result, verdict.text) == (LATER, "Reposition denied while set down")
+    assert (verdict.result, verdict.text) == (LATER, "Reposition denied while the load is set down")
 
 
 @pytest.mark.parametrize("place", [(2e5, 0.0, 2.0), (0.0, -2e5, 2.0), (0.0, 0.0, 2e5)])

@@ -7,11 +7,24 @@ from typing import Any
 
 from autopilot.services.records import Verdict
 from autopilot.supervisor.settings import Settings
-from autopilot.supervisor.state import Flight, View
+from autopilot.supervisor.state import Flight, Phase, View
 from autopilot.wire.dialect import plumbline as mavlink
 
 ACCEPTED = Verdict(mavlink.MAV_RESULT_ACCEPTED)
 Decision = tuple[Flight, Verdict]  # the flight after the request
+_MEANWHILE = {
+    Phase.DISARMED: "disarmed",
+    Phase.ARMED: "on the ground",
+    Phase.TAUTEN: "the cable is tautened",
+    Phase.LIFT: "the load is lifted",
+    Phase.HOLD: "holding",
+    Phase.MISSION: "flying a mission",
+    Phase.RETURN: "returning",
+    Phase.LOWER: "the load is lowered",
+    Phase.SET_DOWN: "the load is set down",
+    Phase.FAILSAFE: "in failsafe",
+    Phase.GUIDED: "guided",
+}
 Handler = Callable[[Flight, Any, View, Settings], Decision]
 
 
@@ -27,5 +40,4 @@ def later(text: str) -> Verdict:
 
 def wrong_phase(flight: Flight, what: str) -> Verdict:
     """The request cannot be followed in the present phase."""
-    phase = flight.phase.name.lower().replace("_", " ")
-    return later(f"{what} denied while {phase}")
+    return later(f"{what} denied while {_MEANWHILE[flight.phase]}")

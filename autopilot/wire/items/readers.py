@@ -99,7 +99,9 @@ def winch(asked: Asked) -> Iterator[Step]:
     step = Winch(asked["length_m"], asked["speed_m_s"])
     left_at = state_after(step, asked.state).position
     if left_at is None:
-        raise asked.refused("nothing before it says how high the load hangs")
+        raise asked.refused(
+            "the load's height is not known there, as after an attitude run; a waypoint first"
+        )
     if left_at[2] < LEAST_REELED_M:
         text = f"it would leave the load at {left_at[2]:.2f} m; least {LEAST_REELED_M} m"
         raise asked.refused(text, mavlink.MAV_MISSION_INVALID_PARAM3)

@@ -173,7 +173,7 @@ COMMANDS: tuple[Command, ...] = (
     Command(
         m.MAV_CMD_DO_WINCH,
         "the cable gets longer, or shorter for a negative length, where the load hangs. "
-        "Refused where no item before it says how high the load hangs",
+        "Refused where the load's height is not known, as right behind an attitude run: a waypoint first",
         (
             Choice(1, "winch", "winch", _ANY_OF_TWO),
             Choice(2, "action", "winch action", {_BY_LENGTH: "length"}),
