@@ -24,8 +24,11 @@ Row = Mapping[str, Any]  # description, completed, total and the fields of one b
 
 
 def say(line: str) -> None:
-    """One line of trouble or news on stderr."""
-    print(f"gcs: {line}", file=sys.stderr, flush=True)
+    """One line of trouble or news on stderr. Whoever has closed it (`2>&1 | head`) stops nothing."""
+    try:
+        print(f"gcs: {line}", file=sys.stderr, flush=True)
+    except BrokenPipeError:
+        sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - it is stderr from here on
 
 
 def to_reader(write: Callable[[], None]) -> None:

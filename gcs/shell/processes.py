@@ -18,6 +18,7 @@ from pathlib import Path
 from types import TracebackType
 
 from gcs.errors import GcsError
+from gcs.shell.display import say
 
 STOP_S = 3.0  # from SIGTERM to SIGKILL
 STOPPED_LIMIT_S = (
@@ -166,6 +167,9 @@ class Processes:
         since = {
             child.pid: self._stopped_s.get(child.pid, now_s) for child in self._children if child.stopped
         }
+        for child in self._children:
+            if child.pid in since and child.pid not in self._stopped_s:
+                say(f"{child.name} (process {child.pid}) is stopped by a signal: waiting for it")
         self._stopped_s = since
         for child in self._children:
             stopped_s = now_s - since.get(child.pid, now_s)

@@ -23,7 +23,7 @@ from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient, Progress, Stage
 from gcs.errors import GcsError, NoVehicleError
 from gcs.shell import processes as processes_module
-from gcs.shell.display import FlightDisplay, to_reader
+from gcs.shell.display import FlightDisplay, say, to_reader
 from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
@@ -37,18 +37,26 @@ LASTING = ["-n", "1", "-r", "1", "import signal; signal.pause()"]
 DEAF = [*LASTING[:-1], "import signal; signal.signal(15, signal.SIG_IGN); print(flush=True); signal.pause()"]
 
 
-@pytest.mark.parametrize("write", [print, Console().print], ids=["print", "rich"])
+def written(write: Callable[[str], None]) -> Callable[[str], None]:
+    return lambda text: to_reader(lambda: write(text))
+
+
+@pytest.mark.parametrize(
+    ("stream", "write"),
+    [("stdout", written(print)), ("stdout", written(Console().print)), ("stderr", say)],
+    ids=["print", "rich", "say"],
+)
 def test_a_reader_who_has_read_enough_stops_nothing(
-    write: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+    stream: str, write: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As `| head` does."""
+    """As `| head` and `2>&1 | head` do."""
     reads, writes = os.pipe()
     os.close(reads)
     out = os.fdopen(writes, "w")
-    monkeypatch.setattr(sys, "stdout", out)
-    to_reader(lambda: write("first"))
-    assert sys.stdout is not out
-    to_reader(lambda: write("second"))
+    monkeypatch.setattr(sys, stream, out)
+    write("first")
+    assert getattr(sys, stream) is not out
+    write("second")
     with suppress(BrokenPipeError):
         out.close()
 
@@ -303,7 +311,7 @@ def test_an_early_end_is_one_line_with_the_last_words(tmp_path):
     assert "\n" not in line
 
 
-def test_a_child_that_is_stopped_for_long_is_named_and_one_that_goes_on_is_not(tmp_path, monkeypatch):
+def test_a_child_that_is_stopped_for_long_is_named_and_one_that_goes_on_is_not(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(processes_module, "STOPPED_LIMIT_S", 0.2)
     monkeypatch.setattr(processes_module, "LOOK_S", 0.02)
     with Processes() as processes:
@@ -315,6 +323,8 @@ def test_a_child_that_is_stopped_for_long_is_named_and_one_that_goes_on_is_not(t
         assert said[-1] == f"timeit (process {child.pid}) stopped by a signal"
         poll_until(lambda: said.append(processes.ended()) or said[-1], child)
         assert said[-1].startswith(f"timeit (process {child.pid}) has been stopped by a signal for ")
+        waiting = f"gcs: timeit (process {child.pid}) is stopped by a signal: waiting for it\n"
+        assert capsys.readouterr().err == waiting, "at once, and once"
         os.kill(child.pid, signal.SIGCONT)
         poll_until(lambda: not processes.stopped(), child)
 
