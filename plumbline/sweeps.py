@@ -116,7 +116,7 @@ def _address(scheduler: Any) -> str:
 
 def _run(words: list[str], quiet: bool) -> None:
     """Run `gcs sweep`; its progress goes to our stderr, and its last word, if it fails, into the error."""
-    command = [sys.executable, "-m", "gcs", "sweep", *words, *(["--quiet"] if quiet else [])]
+    command = [sys.executable, "-P", "-m", "gcs", "sweep", *words, *(["--quiet"] if quiet else [])]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
         assert program.stderr is not None
         said: list[str] = []

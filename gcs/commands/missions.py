@@ -8,6 +8,7 @@ import click
 
 from gcs.commands.options import json_option, planner_option, print_json, print_table, vehicle_option
 from gcs.errors import EXIT_DONE, EXIT_ERROR
+from gcs.shell.display import told_if_slow
 
 
 @click.command("missions")
@@ -55,6 +56,7 @@ def check_command(
     if planner and as_asked:
         raise click.UsageError("--as-asked judges no path of a planner; leave --planner or it out", ctx)
 
+    from gcs.workflows.before_flight import CHECKING
     from gcs.workflows.check_mission import check_mission
 
     if planner:
@@ -63,7 +65,8 @@ def check_command(
         with own_planner(planner, vehicle) as own:
             found = check_mission(mission, vehicle, as_asked, own)
     else:
-        found = check_mission(mission, vehicle, as_asked)
+        with told_if_slow(CHECKING, as_json):
+            found = check_mission(mission, vehicle, as_asked)
     if as_json:
         print_json(asdict(found))
     else:

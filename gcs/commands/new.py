@@ -14,7 +14,7 @@ def new_command(kind: str, name: str) -> None:
     """Write a commented file of your own that flies as it is.
 
     KIND is one of those below, NAME is that of the file, without or with its ending; it may lead into another
-    folder. A file that exists is left as it is. Afterwards the command that flies it is printed.
+    folder, which is made. A file that exists is left as it is. The command that flies it is printed.
 
     \b
     gcs new law steady

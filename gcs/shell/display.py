@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Timer
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 
 _REFRESH_S = 0.1
 _PLAIN_S = 10.0  # between two plain lines of the same stage
+_WONDERS_S = 2.0  # of silence
 _OPENS_AFTER_S = 0.5  # a short step needs no bar
 
 Row = Mapping[str, Any]  # description, completed, total and the fields of one bar
@@ -29,6 +32,19 @@ def say(line: str) -> None:
         print(f"gcs: {line}", file=sys.stderr, flush=True)
     except BrokenPipeError:
         sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - it is stderr from here on
+
+
+@contextmanager
+def told_if_slow(line: str, quiet: bool = False) -> Iterator[None]:
+    """Say what is being done, if it takes longer than a person waits without wondering."""
+    timer = Timer(_WONDERS_S, say, (line,))
+    timer.daemon = True
+    if not quiet:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def to_reader(write: Callable[[], None]) -> None:

@@ -24,6 +24,7 @@ STOP_S = 3.0  # from SIGTERM to SIGKILL
 STOPPED_LIMIT_S = (
     15.0  # of a child that was stopped (SIGSTOP): before its silence is taken for that of another
 )
+_WORKING_SHARE = 0.05  # of a processor: one that waits, and asks again now and then, takes less
 LOOK_S = 1.0  # between two looks at the states of the children
 _PR_SET_PDEATHSIG = 1
 _LAST_LINE = 4096  # bytes of the log in which the last line is looked for
@@ -75,6 +76,14 @@ class Child:
             return False
         return state in ("T", "t")
 
+    def used_s(self) -> float:
+        """Processor time that it has used so far; 0 where the system does not say."""
+        try:
+            fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+            return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        except (OSError, IndexError, ValueError):
+            return 0.0
+
     def last_line(self) -> str:
         """The last line it wrote, empty if none."""
         try:
@@ -119,6 +128,8 @@ class Processes:
         self._children: list[Child] = []
         self._cpus_before: set[int] | None = None
         self._looked_s = 0.0
+        self._used = 0.0, 0.0  # time of the last look, and processor time that they had used
+        self._works = False
         self._stopped_s: dict[int, float] = {}  # since when a child is seen to be stopped, by its id
 
     def start(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> Child:
@@ -154,6 +165,16 @@ class Processes:
             if not child.running:
                 return child.obituary()
         return self._stopped(time.monotonic())
+
+    def works(self) -> bool:
+        """Whether one of them has used the processor since the last look, as while it prepares paths."""
+        now_s, used_s = time.monotonic(), sum(child.used_s() for child in self._children)
+        before_s, before_used_s = self._used
+        if now_s - before_s < LOOK_S:
+            return self._works
+        self._used = now_s, used_s
+        self._works = used_s - before_used_s > _WORKING_SHARE * (now_s - before_s)
+        return self._works
 
     def stopped(self) -> str:
         """Who is stopped by a signal at this moment; empty where nobody is."""

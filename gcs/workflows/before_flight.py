@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from autopilot.vehicle.file import VEHICLES
+from gcs.shell.display import told_if_slow
 from gcs.workflows.checked import known_flyable
 from gcs.workflows.flight_options import FlightOptions, setting_of
 from missions.model import Mission
 from sitl.sensors.shipped import PROFILES
+
+CHECKING = "checking whether the vehicle can fly it; paths that are hard to shape take a while"
 
 
 def check_options(options: FlightOptions) -> list[str]:
@@ -39,4 +42,5 @@ def check_mission(mission: Mission, options: FlightOptions) -> None:
     if not known_flyable(mission, options.vehicle, shaped):
         from gcs.workflows.check_mission import refuse_unflyable
 
-        refuse_unflyable(mission, options.vehicle, shaped)
+        with told_if_slow(CHECKING, options.quiet):
+            refuse_unflyable(mission, options.vehicle, shaped)

@@ -10,7 +10,7 @@ from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient
 from gcs.clients.lockstep import LockstepTurns, TruthQueue, ground_turn
 from gcs.errors import NoVehicleError
-from gcs.shell.display import FlightDisplay
+from gcs.shell.display import FlightDisplay, say
 from gcs.shell.link import UdpSocket, monotonic_us
 from gcs.shell.stopping import StopRequest
 from gcs.shell.vehicle_socket import VehicleSocket
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _WAIT_S = 0.2
 _TICK_S = 0.01  # on the wall clock; not at each datagram, to leave the cores to those who must be punctual
 START_LIMIT_S = 60.0  # some seconds on an idle machine; all kernels are compiled before
+WORKING_S = 3.0  # of silence, after which it is looked whether the autopilot works
 SILENCE_LIMIT_S = 20.0  # of a vehicle in lockstep that was there before
 STANDING_LIMIT_S = 60.0  # of the clock of a vehicle that speaks; no busy machine holds it up for so long
 
@@ -65,10 +66,12 @@ def run_lockstep(
     stop: StopRequest,
     first_word: Callable[[], None],
     page: FlightPage | None = None,
+    works: Callable[[], bool] = lambda: False,
 ) -> None:
     """Fly until the client has its outcome. `first_word` is called when the vehicle is heard at first.
 
-    A process that ends before that raises NoVehicleError; one that ends later is an outcome.
+    A process that ends before that raises NoVehicleError; one that ends later is an outcome. An autopilot
+    that is silent while it `works` prepares what it is asked for, and is waited for.
     """
     turns = LockstepTurns()
     truth_queue = TruthQueue()
@@ -77,7 +80,8 @@ def run_lockstep(
     promised_us = 0  # how far the vehicle may go by itself
     asked_us: int | None = None  # the time of the vehicle's last question
     clock = Clock(time.monotonic())
-    heard_s = time.monotonic()
+    heard_s = worked_s = time.monotonic()
+    waits = False
     while client.outcome is None:
         datagrams = vehicle.wait(_WAIT_S)
         if stop:
@@ -85,7 +89,12 @@ def run_lockstep(
         elif not datagrams:
             limit_s = SILENCE_LIMIT_S if started else START_LIMIT_S
             reason = ended()
-            if not reason and time.monotonic() - heard_s > limit_s:
+            silent_s = time.monotonic() - heard_s
+            if started and silent_s > WORKING_S and works():
+                if not waits:
+                    say("the autopilot is at work, as on paths that are hard to shape: waiting for it")
+                waits, worked_s = True, time.monotonic()
+            if not reason and time.monotonic() - max(heard_s, worked_s) > limit_s:
                 reason = f"the autopilot has sent nothing for {limit_s:.0f} s"
             if reason and not started:
                 raise NoVehicleError(reason)
@@ -93,7 +102,7 @@ def run_lockstep(
                 client.lose(reason)
             _show(display, client)
             continue
-        heard_s = time.monotonic()
+        heard_s, waits = time.monotonic(), False
         for datagram in datagrams:
             question_ns = turns.question(datagram)
             if question_ns is None:

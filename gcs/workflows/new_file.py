@@ -8,7 +8,9 @@ in it that begins with `Fly it:` holds the command that flies it.
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import dataclass
+from importlib.machinery import PathFinder
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -25,6 +27,15 @@ class NewFile:
 
     path: Path
     fly: str
+
+
+def _is_taken(module: str) -> bool:
+    """Whether scripts beside the file would import it in place of what they mean; what lies in the present
+    folder already is not meant."""
+    if module in sys.stdlib_module_names:
+        return True
+    elsewhere = [place for place in sys.path if Path(place or ".").resolve() != Path.cwd()]
+    return PathFinder.find_spec(module, elsewhere) is not None
 
 
 def kinds() -> tuple[str, ...]:
@@ -46,10 +57,13 @@ def new_file(kind: str, name: str) -> NewFile:
         )
     # a module's name is an identifier
     stem = word.replace("-", "_") if suffix == ".py" else word
+    if suffix == ".py" and _is_taken(stem):
+        raise InputError(f"{name!r}: {stem} is a module of Python or of a library; choose another name")
     path = given.with_name(stem + suffix)
     text = _template(kind + suffix).replace(f"my_name{suffix}", str(path))
     text = text.replace("my_name", stem).replace("MyName", _class_name(stem))
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:

@@ -59,7 +59,7 @@ def fly_own(
     with FlightDisplay(mission.name, options.quiet) as display:
         link = own.vehicle, own.truth, own.processes.ended, display, stop, begun, page
         if options.speed is None:
-            run_lockstep(client, Capture(log, LOCKSTEP_BOOT_UNIX_US), *link)
+            run_lockstep(client, Capture(log, LOCKSTEP_BOOT_UNIX_US), *link, own.processes.works)
         else:
             run_wall_clock(client, Capture(log, unix_us()), *link)
             client.explain_silence(own.processes.stopped())

@@ -64,6 +64,19 @@ def test_the_next_command_is_said(kind: str) -> None:
     assert "my_name" not in path.read_text(encoding="utf-8") and "MyName" not in path.read_text()
 
 
+@pytest.mark.parametrize("name", ["numpy", "signal", "sitl", "pytest"])
+def test_a_module_that_there_is_already_is_not_hidden(name: str) -> None:
+    result = run("new", "law", name)
+    assert result.exit_code == EXIT_USAGE
+    assert "is a module of Python or of a library; choose another name" in result.stderr
+    assert run("new", "mission", name).exit_code == EXIT_DONE
+
+
+def test_folders_are_made() -> None:
+    assert run("new", "mission", "a/b/c").exit_code == EXIT_DONE
+    assert Path("a/b/c.toml").is_file()
+
+
 @pytest.mark.parametrize("kind", kinds())
 def test_a_file_that_exists_is_left_as_it_is(kind: str) -> None:
     path = written(kind)
@@ -87,9 +100,9 @@ def test_a_name_may_lead_into_a_folder_and_have_its_ending() -> None:
         (("mission", 'a"b'), EXIT_USAGE, "letters, digits, - and _"),
         (("mission", "1st"), EXIT_USAGE, "beginning with a letter"),
         (
-            ("mission", "none/such"),
+            ("mission", "/dev/null/such"),
             EXIT_ERROR,
-            "none/such.toml: cannot be written: No such file or directory",
+            "/dev/null/such.toml: cannot be written: Not a directory",
         ),
         (("aeroplane", "mine"), EXIT_USAGE, "'aeroplane' is not one of"),
     ],

@@ -27,6 +27,7 @@ from gcs.shell.display import FlightDisplay, say, to_reader
 from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
+from gcs.workflows import flight_loops as loops_module
 from gcs.workflows.flight_loops import STANDING_LIMIT_S, Clock, run_lockstep, run_wall_clock
 
 WAIT_S = 10.0  # for what takes milliseconds on an idle machine
@@ -210,6 +211,32 @@ def fly_lockstep(new_world, items, path: Path, repeat: int, turns: int = 1_000) 
     return client
 
 
+def test_an_autopilot_that_works_is_waited_for(new_world, items, tmp_path, monkeypatch, capsys):
+    for limit in ("SILENCE_LIMIT_S", "WORKING_S"):
+        monkeypatch.setattr(loops_module, limit, 0.05)
+    looked = []
+    scripted = new_world().vehicle
+    scripted.script = short_flight
+    client = FlightClient(items[:2] + items[-1:], 10.0)
+    path = tmp_path / "x.tlog"
+    with UdpContext() as ground, UdpContext() as truth, StopRequest("") as stop, path.open("wb") as file:
+        LockstepVehicle(scripted, ground, truth, 0, turns=100).start()
+        run_lockstep(
+            client,
+            Capture(TlogWriter(file)),
+            ground,
+            truth,
+            lambda: "it has ended" if len(looked) >= 3 else "",
+            FlightDisplay("test", quiet=True),
+            stop,
+            lambda: None,
+            works=lambda: not looked.append(None),
+        )
+        ground.send(GOODBYE)
+    assert client.outcome is not None and client.outcome.reason == "it has ended"
+    assert capsys.readouterr().err.count("the autopilot is at work") == 1
+
+
 def test_lockstep_writes_the_same_bytes_whatever_is_repeated(new_world, items, tmp_path):
     logs = []
     for repeat in (0, 5):
@@ -327,6 +354,17 @@ def test_a_child_that_is_stopped_for_long_is_named_and_one_that_goes_on_is_not(t
         assert capsys.readouterr().err == waiting, "at once, and once"
         os.kill(child.pid, signal.SIGCONT)
         poll_until(lambda: not processes.stopped(), child)
+
+
+def test_a_child_that_computes_works_and_one_that_waits_does_not(tmp_path, monkeypatch):
+    monkeypatch.setattr(processes_module, "LOOK_S", 0.1)
+    with Processes() as processes:
+        child = processes.start("timeit", ["-n", "1", "-r", "1", "while True: pass"], tmp_path / "log")
+        poll_until(processes.works, child)
+    with Processes() as processes:
+        child = processes.start("timeit", DEAF, tmp_path / "log")
+        poll_until(child.log.read_bytes, child)  # it has begun to wait
+        poll_until(lambda: not processes.works(), child)
 
 
 def test_the_prefix_of_the_program_is_said_once(tmp_path):
