@@ -19,6 +19,7 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 from platformdirs import user_cache_path
 
@@ -97,9 +98,23 @@ def _machine() -> str:
     return hashlib.sha256("\0".join(known).encode()).hexdigest()[:16]
 
 
-def _mark(source: Path, part: str) -> Path:
+def _marks() -> Path:
     base = Path(CHOSEN_BY_USER) if CHOSEN_BY_USER else user_cache_path("plumbline") / "kernels"
-    return base / "ready" / f"{sources_hash(source)}-{_machine()}-{part}"
+    return base / "ready"
+
+
+def _mark(source: Path, part: str) -> Path:
+    return _marks() / f"{sources_hash(source)}-{_machine()}-{part}"
+
+
+def why_not_kept() -> str:
+    """Why machine code cannot be kept, so that each program compiles anew; empty where it can."""
+    try:
+        _marks().mkdir(parents=True, exist_ok=True)
+        with NamedTemporaryFile(dir=_marks()):
+            return ""
+    except OSError as error:
+        return f"{_marks().parent}: {error.strerror}"
 
 
 def is_ready(source: Path, parts: Iterable[str]) -> bool:

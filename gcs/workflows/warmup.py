@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from autopilot.geometry.machine_code import ROOT
+from autopilot.geometry.machine_code import ROOT, why_not_kept
 from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
 from autopilot.vehicle.parameters import LAWS
 from gcs.errors import GcsError
@@ -54,7 +54,14 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
     if not quiet:
         expected = in_words(expected_s([part.cost_s for part in waiting], cores))
         count = f"{total} parts" if total > 1 else waiting[0].title
-        say(f"compiling the flight software, once: {count}, {expected} on an idle machine")
+        unkept = why_not_kept()
+        if unkept:
+            say(
+                f"what is compiled cannot be kept ({unkept}), and is compiled anew by every command; "
+                "XDG_CACHE_HOME=FOLDER names a folder that can be written"
+            )
+        once = "" if unkept else ", once"
+        say(f"compiling the flight software{once}: {count}, {expected} on an idle machine")
     with (
         tempfile.TemporaryDirectory(prefix="plumbline-") as logs,
         Processes() as processes,

@@ -129,3 +129,13 @@ def test_what_is_compiled_is_told_kernel_by_kernel(capsys):
         )
     kernels = "the paths (autopilot.trajectory.splines.sample), the report"
     assert capsys.readouterr().err == f"gcs: compiling {kernels}; 2 of 5 remain\n"
+
+
+def test_what_cannot_be_kept_is_told_and_compiled_all_the_same(tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    warm_up([part("tick", "pass")])
+    said = capsys.readouterr().err
+    kernels = tmp_path / "file" / "plumbline" / "kernels"
+    assert said.startswith(f"gcs: what is compiled cannot be kept ({kernels}: Not a directory)")
+    assert "compiling the flight software: the tick" in said
