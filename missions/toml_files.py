@@ -32,6 +32,11 @@ _MARKS = {"items": "mission", "quad_mass_kg": "vehicle", "imu": "sensors"}
 _NUMBER_WITH_UNIT = re.compile(
     r"\s*(\w+)\s*=\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[A-Za-z%/][\w%/^*]*\s*(?:#.*)?$"
 )
+# what the parser says in its own terms
+_TWICE = {
+    "Cannot overwrite": "{key} is given twice in this table",
+    "Cannot declare": "[{key}] stands there twice; each table of a list is written [[{key}]]",
+}
 # last part of a key: its unit in words; the longest that fits counts
 _UNITS = {
     "_m_s": "metres per second",
@@ -180,7 +185,11 @@ def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
         line, column = str(text.count("\n") + 1), str(len(text) - text.rfind("\n"))
     lines = text.splitlines()
     at = lines[int(line) - 1] if 0 < int(line) <= len(lines) else ""
-    return f"{where}:{line}:{column}: not TOML: {message.split(' (at ', maxsplit=1)[0]}{_toml_hint(at)}"
+    said = message.split(" (at ", maxsplit=1)[0]
+    key = re.split(r"[\]=]", at.lstrip(" \t["), maxsplit=1)[0].strip()
+    for begins, instead in _TWICE.items():
+        said = instead.format(key=key) if said.startswith(begins) else said
+    return f"{where}:{line}:{column}: not TOML: {said}{_toml_hint(at)}"
 
 
 def _toml_hint(line: str) -> str:

@@ -191,6 +191,11 @@ def test_several_problems_are_all_told() -> None:
             'title = "T"\nitems = [' + "{}, " * 1007 + "]",
             "x.toml: items has 1007 entries; must be a list of at most 1000 (the [[items]] in order)",
         ),
+        ('title = "T"\n title= "U"', "x.toml:2:12: not TOML: title is given twice in this table"),
+        (
+            'title = "T"\n[items]\n[items]',
+            "x.toml:3:7: not TOML: [items] stands there twice; each table of a list is written [[items]]",
+        ),
         ('titel = "T"\n[[items]]\ntype = "land"', "x.toml: titel: unknown key; write title"),
         (
             'title = "T"\n[[items]]\ntype = "land"',
