@@ -5,7 +5,7 @@ from __future__ import annotations
 from autopilot.wire.convert import Home
 from autopilot.wire.items import MissionItemError, WireItem, encode_mission, step_of
 from gcs.errors import InputError
-from missions.model import Mission
+from missions.model import KINDS, Mission
 
 
 def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
@@ -14,4 +14,5 @@ def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
         return encode_mission(mission, home)
     except MissionItemError as error:
         at = step_of(error.seq, mission.steps)
-        raise InputError(f"{mission.name}: items[{at}]: {error.text}") from None
+        kind = KINDS[type(mission.steps[at])]
+        raise InputError(f"{mission.name}: items[{at}] ({kind}): {error.text}") from None

@@ -144,6 +144,18 @@ class LookAt:
 
 NoseAim = TurnNose | LookAt  # asked for on the way, beside the steps
 Step = Takeoff | Waypoint | Speed | Delay | ReturnHome | Land | Release | Winch | Signals | AttitudeRun
+KINDS: dict[type[Step], str] = {  # as files call them
+    Takeoff: "takeoff",
+    Waypoint: "waypoint",
+    Speed: "speed",
+    Delay: "delay",
+    Signals: "signals",
+    AttitudeRun: "attitude",
+    ReturnHome: "return",
+    Release: "release",
+    Winch: "winch",
+    Land: "land",
+}
 
 
 @dataclass(frozen=True, slots=True)

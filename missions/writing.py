@@ -10,35 +10,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from missions.model import (
-    AttitudeRun,
-    Delay,
-    Land,
-    Release,
-    ReturnHome,
-    Signals,
-    Sine,
-    Speed,
-    Step,
-    Takeoff,
-    Term,
-    Waypoint,
-    Winch,
-)
+from missions.model import KINDS, Sine, Step, Term
 from missions.toml_files import FileError
-
-_TYPES: dict[type[Step], str] = {
-    Takeoff: "takeoff",
-    Waypoint: "waypoint",
-    Speed: "speed",
-    Delay: "delay",
-    Signals: "signals",
-    AttitudeRun: "attitude",
-    ReturnHome: "return",
-    Release: "release",
-    Winch: "winch",
-    Land: "land",
-}
 
 
 def write_toml(path: str | PathLike[str], table: Mapping[str, Any]) -> None:
@@ -62,14 +35,14 @@ def mission_table(
         table["assumptions"] = list(assumptions)
     return {
         **table,
-        "items": [{"type": _TYPES.get(type(step), type(step).__name__), **_keys(step)} for step in steps],
+        "items": [{"type": KINDS.get(type(step), type(step).__name__), **_keys(step)} for step in steps],
     }
 
 
 def _keys(record: Any) -> dict[str, Any]:
     """The keys of a step, a term or a factor; angles are degrees in a file. What is not given is left out."""
     table: dict[str, Any] = {}
-    known = isinstance(record, (*_TYPES, Term, Sine))
+    known = isinstance(record, (*KINDS, Term, Sine))
     for field in fields(record) if known else ():
         value = getattr(record, field.name)
         if field.name.endswith("_rad") and isinstance(value, Real):

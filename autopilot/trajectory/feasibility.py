@@ -36,7 +36,7 @@ from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import Passage, passage_jets
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.rotors import ROTOR_MARGIN, columns
-from missions.model import AttitudeRun, Land, Mission, ReturnHome, Signals, Takeoff, Term, Waypoint, Winch
+from missions.model import KINDS, AttitudeRun, Land, Mission, Signals, Takeoff, Term, Waypoint, Winch
 
 __all__ = ["PathReport", "Peaks", "VehicleLimits", "Violation", "check", "paths", "peaks"]
 
@@ -168,7 +168,7 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
     for entry in _timeline(mission, limits):
         if isinstance(entry.step, Takeoff | Waypoint) and entry.end[2] < LEAST_HEIGHT_M:
             text = (
-                f"items[{entry.item}] ({_kind(entry)}): the load would be carried {entry.end[2]:.2f} m above "
+                f"{_named(entry)}: the load would be carried {entry.end[2]:.2f} m above "
                 f"the ground; it must be at least {LEAST_HEIGHT_M:g} m: raise altitude_m"
             )
             found.append(
@@ -245,7 +245,7 @@ def paths(mission: Mission, limits: VehicleLimits, planner: Planner | None = Non
 def _path_report(entry: TimelineEntry, duration_s: float, distance_m: float, along: Peaks) -> PathReport:
     return PathReport(
         entry.item,
-        _kind(entry),
+        KINDS[type(entry.step)],
         duration_s,
         distance_m,
         along.rotor_low.value,
@@ -279,7 +279,7 @@ def _survey(entry: TimelineEntry, limits: VehicleLimits) -> Peaks | None:
 def _judge(entry: TimelineEntry, along: Peaks, limits: VehicleLimits) -> Iterator[Violation]:
     def violation(quantity: str, worst: Extreme, limit: float, says: str, advice: str = "") -> Violation:
         advice = advice or _advice(entry, worst.time_s)
-        text = f"items[{entry.item}] ({_kind(entry)}): at {worst.time_s:.1f} s {says}; {advice}"
+        text = f"{_named(entry)}: at {worst.time_s:.1f} s {says}; {advice}"
         return Violation(entry.item, quantity, worst.value, limit, worst.time_s, text)
 
     fall, thrust, low, high, tilt = along.fall, along.thrust, along.rotor_low, along.rotor_high, along.tilt
@@ -360,17 +360,8 @@ def _end(term: Term) -> float:
     return term.start_s + term.rise_s + term.hold_s + term.fall_s
 
 
-def _kind(entry: TimelineEntry) -> str:
-    names = {
-        Signals: "signals",
-        AttitudeRun: "attitude",
-        Takeoff: "takeoff",
-        Waypoint: "waypoint",
-        ReturnHome: "return",
-        Land: "land",
-        Winch: "winch",
-    }
-    return names[type(entry.step)]
+def _named(entry: TimelineEntry) -> str:
+    return f"items[{entry.item}] ({KINDS[type(entry.step)]})"
 
 
 def _excess(value: float, limit: float) -> str:

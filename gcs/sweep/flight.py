@@ -101,7 +101,10 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
 
     outcome = fly_with_wire(mission, conditions, _NoLog(), watch)
     if Phase.TAUTEN not in times:
-        raise ValueError(f"{mission.name} does not start under the conditions of the sweep: {outcome.reason}")
+        raise ValueError(
+            f"{mission.name} does not start under the conditions of the sweep: {outcome.reason} (items are "
+            "numbered as they are uploaded; gcs check names those of the file)"
+        )
     return Boarding(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
 
 

@@ -91,7 +91,10 @@ def test_what_the_file_accepts_the_wire_carries(kind: str, spec: type[Spec], key
 @pytest.mark.parametrize(
     ("items", "said"),
     [
-        ([{"type": "winch", "length_m": 1.9}], r"m: items\[1\]: it would leave the load at 0\.10 m"),
+        (
+            [{"type": "winch", "length_m": 1.9}],
+            r"m: items\[1\] \(winch\): it would leave the load at 0\.10 m",
+        ),
         (
             [
                 {
@@ -101,7 +104,7 @@ def test_what_the_file_accepts_the_wire_carries(kind: str, spec: type[Spec], key
                 }
             ]
             * 32,
-            r"m: items\[32\]: .* more than 4000 items",
+            r"m: items\[32\] \(signals\): .* more than 4000 items",
         ),
     ],
 )
