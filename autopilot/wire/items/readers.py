@@ -103,7 +103,8 @@ def winch(asked: Asked) -> Iterator[Step]:
             "the load's height is not known there, as after an attitude run; a waypoint first"
         )
     if left_at[2] < LEAST_REELED_M:
-        text = f"it would leave the load at {left_at[2]:.2f} m; least {LEAST_REELED_M} m: begin higher, or reel out less"
+        at = f"it would leave the load at {left_at[2]:.2f} m"
+        text = f"{at}; least {LEAST_REELED_M} m: begin higher, or reel out less"
         raise asked.refused(text, mavlink.MAV_MISSION_INVALID_PARAM3)
     yield step
 
