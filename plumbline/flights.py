@@ -150,7 +150,7 @@ class Flight:
         from gcs.workflows.report import make_report
 
         folder = file_path("out", out)
-        make_folder(folder, str(folder))
+        make_folder(folder)
         keep_others(folder, TLOG_FILE)
         (folder / TLOG_FILE).write_bytes(self.tlog)
         make_report(folder / TLOG_FILE, folder, self._meta, quiet)

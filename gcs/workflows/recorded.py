@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gcs.errors import GcsError, InputError, input_error
+from gcs.errors import InputError, input_error, not_written
 from gcs.folders import TLOG_FILE
 from gcs.shell.display import StepDisplay
 
@@ -103,7 +103,7 @@ def replay(
         write_table(folder / "load.csv", motion, load, sd)
         write_picture(folder / "load.png", motion, load, sd)
     except OSError as error:
-        raise GcsError(f"{folder}: {error.strerror}") from None
+        raise not_written(error, folder) from None
     return record, folder
 
 
