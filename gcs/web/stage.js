@@ -16,12 +16,15 @@
       const canvas = document.createElement("canvas");
       canvas.id = "scene";
       canvas.tabIndex = -1;
-      element.prepend(canvas);
+      const picture = document.createElement("div"); // what stands over the picture stays over it where the rest is below
+      picture.className = "picture";
+      picture.append(canvas);
+      element.prepend(picture);
       try {
         this.scene = new Plumbline.Scene(canvas, {
           rotors: layout.rotors, armLength: layout.arm, cableLength: layout.cable, theme: "auto" });
       } catch (error) {
-        canvas.remove();
+        picture.remove();
         throw error;
       }
       this._readings = element.appendChild(document.createElement("dl"));
