@@ -12,7 +12,7 @@
 
    chart = new Plumbline.Chart(element, {title, unit, series, time, bands, marks, sync, height, digits, least, zero})
        series   [{name, values, dash: true|false, color: 0 ... 6 or "ink"|"faint", width, quiet}], values as `time`;
-                quiet: without a name and a value beside the title
+                quiet: without a name and a value beside the title; about: more than the name, where it is pointed at
        time     array of seconds, rising; NaN or null in values: a gap
        sync     a ChartGroup; without it the plot stands alone and bands and marks are its own
        digits   decimals of the values beside the names; null: three digits, wherever the point is
@@ -156,7 +156,7 @@
       this._keys = this._series.map((one, i) => {
         const key = element("button", "chart-key");
         key.type = "button";
-        key.title = "show or hide";
+        key.title = one.about ? `${one.about}: show or hide` : "show or hide";
         key._swatch = element("i", one.dash ? "dashed" : "");
         key._value = element("output");
         key.append(key._swatch, element("span", "", one.name), key._value);
