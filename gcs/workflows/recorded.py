@@ -33,7 +33,7 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
     )
 
     path = find_recording(path)
-    with StepDisplay("reading the recording", quiet) as display:
+    with StepDisplay("reading the recording", quiet, long=True) as display:
         display.update(0, 0)
         asked, motion, model = _read(path, columns)
         _needs_load(path, motion)
