@@ -78,7 +78,7 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     _print_rows(record)
     print_table(
         [
-            (_NUMBERS[name], *_with_interval(one["value"], one["half_width"]), _told(name, record))
+            (_NUMBERS[name], *with_interval(one["value"], one["half_width"]), _told(name, record))
             for name, one in record["identified"].items()
         ]
     )
@@ -125,7 +125,7 @@ def _print_rows(record: dict[str, Any]) -> None:
     click.echo(f"{record['rows']} rows, {record['duration_s']:.1f} s{jitter}{broken}")
 
 
-def _with_interval(value: float, half_width: float) -> tuple[str, str]:
+def with_interval(value: float, half_width: float) -> tuple[str, str]:
     """A number and +- half its interval, to two digits of the latter; of a narrow one these alone."""
     if not math.isfinite(half_width):
         return f"{value:z.4f}", "+- ?"

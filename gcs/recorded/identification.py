@@ -29,7 +29,7 @@ from gcs.recorded.scoring import HORIZONS_S, SETTLED_ROWS
 from gcs.recorded.smoothing import Floats, smooth
 
 _BLOCK_S = 10.0  # residuals further apart are taken as independent
-_EVERY_ROWS = 30
+_EVERY_S = 1.0  # a prediction begins
 _ROUNDS = 6
 _BEND_M = 0.03  # errors beyond count by their size, not their square
 _FAR_WEIGHT = 0.35  # of the longer horizon
@@ -144,7 +144,7 @@ def identify_load(
     weights = _weights(errors)
     normal = np.einsum("jkhi,kh,lkhi->kjl", sensitivity, weights, sensitivity)
     gradient = np.einsum("jkhi,kh,khi->kj", sensitivity, weights, errors)
-    widths = steps * _half_widths(normal, gradient, times)
+    widths = steps * half_widths(normal, gradient, times)
     return [
         Identified(name, float(getattr(model, name)), float(width))
         for name, width in zip(names, widths, strict=True)
@@ -187,7 +187,7 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
         raise TooLittleMotionError("the vehicle moves too little for its numbers to be identified")
     found = np.linalg.solve(flat.T @ flat, flat.T @ right.ravel())
     each = np.einsum("kij,ki->kj", rows, rows @ found - right)
-    spread = _half_widths(np.einsum("kij,kil->kjl", rows, rows), each, time[kept])
+    spread = half_widths(np.einsum("kij,kil->kjl", rows, rows), each, time[kept])
     names = ("mass_ratio", "vehicle_drag_per_s", "tilt_share", "attitude_delay_s", "vehicle_drag_per_m")
     return [Identified(n, float(v), float(s)) for n, v, s in zip(names, found, spread, strict=False)]
 
@@ -196,7 +196,8 @@ def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:
     """Errors of predictions (k, horizons, 3) in metres, and when they began (k,)."""
     rows = rows_of(motion, model)
     estimates = filtered(rows, model, load=True, tilt=False)
-    begins = np.arange(SETTLED_ROWS, len(rows.time_s), _EVERY_ROWS)
+    every = max(1, round(_EVERY_S / float(np.median(np.diff(rows.time_s)))))
+    begins = np.arange(SETTLED_ROWS, len(rows.time_s), every)
     windows = predicted(rows, model, estimates, begins, HORIZONS_S, tilt=False)
     at = np.array([one.ends for one in windows], dtype=np.intp)
     direction = np.array([one.direction for one in windows])
@@ -240,7 +241,7 @@ def _student(blocks: int) -> float:
     return float(stdtrit(blocks - 1, 0.975)) if blocks > 1 else float("nan")
 
 
-def _half_widths(normal: Floats, gradient: Floats, time: Floats) -> Floats:
+def half_widths(normal: Floats, gradient: Floats, time: Floats) -> Floats:
     """Of 95 % intervals (j,) of least squares numbers, by leaving out one block after the other.
 
     `normal` (k, j, j) and `gradient` (k, j) are what each row adds. Infinite where the rows that are left do

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gcs.commands.recorded import _with_interval
+from gcs.commands.recorded import with_interval
 from gcs.recorded.column_map import ColumnMap, load_map
-from gcs.recorded.identification import Identified, _half_widths, identify_load
+from gcs.recorded.identification import Identified, half_widths, identify_load
 from gcs.recorded.load_model import LoadModel, step_load
 from gcs.recorded.motion import Motion, motion_of
 from gcs.recorded.recording import Recording
@@ -31,7 +31,7 @@ def test_intervals_of_few_blocks_hold_what_they_say() -> None:
         noise = np.convolve(rng.normal(size=len(time) + 9), np.ones(10) / 10.0, "valid")
         found = np.linalg.solve(rows.T @ rows, rows.T @ noise)  # of numbers that are 0
         gradient = rows * (rows @ found - noise)[:, None]
-        widths = _half_widths(np.einsum("ki,kj->kij", rows, rows), gradient, time)
+        widths = half_widths(np.einsum("ki,kj->kij", rows, rows), gradient, time)
         inside.append(np.abs(found) <= widths)
     assert 0.92 < np.mean(inside) <= 1.0
 
@@ -39,7 +39,7 @@ def test_intervals_of_few_blocks_hold_what_they_say() -> None:
 def test_rows_that_tell_nothing_have_no_end_of_an_interval() -> None:
     time = np.arange(0.0, 30.0, 0.1)
     rows = np.stack([np.ones_like(time), np.zeros_like(time)], axis=1)
-    widths = _half_widths(np.einsum("ki,kj->kij", rows, rows), rows * 0.1, time)
+    widths = half_widths(np.einsum("ki,kj->kij", rows, rows), rows * 0.1, time)
     assert not np.isfinite(widths).any()
 
 
@@ -87,4 +87,4 @@ def test_a_number_is_told_if_its_interval_leaves_anything_of_it() -> None:
 def test_a_number_is_printed_as_far_as_its_interval_tells_it(
     value: float, half_width: float, printed: tuple[str, str]
 ) -> None:
-    assert _with_interval(value, half_width) == printed
+    assert with_interval(value, half_width) == printed
