@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -51,12 +52,26 @@ def input_error(error: FileError) -> GcsError:
     return InputError(*error.problems)
 
 
-_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_DISK = (*_FULL, errno.EIO, errno.EROFS)
 
 
 def disk_trouble(error: BaseException | None) -> str:
     """What the disk did not take, and why, if that is what the error says; else nothing."""
-    if not isinstance(error, OSError) or error.errno not in _DISK or not error.strerror:
+    if not isinstance(error, OSError) or error.errno not in _DISK:
         return ""
     where = f"{error.filename}: " if error.filename else ""
-    return f"{where}{error.strerror.lower()}"
+    return f"{where}{reason(error).lower()}"
+
+
+def reason(error: OSError) -> str:
+    """Why, in the system's words; libraries (Arrow) wrap them into sentences of their own."""
+    return os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
+
+
+def not_written(error: OSError, told: object, kind: str = "folder") -> GcsError:
+    """That `told` cannot be written: with a full disk a known error, else wrong input, as another folder (or
+    other `kind`) is to be named."""
+    if error.errno in _FULL:
+        return GcsError(f"{told}: {reason(error)}; free some space, or name another {kind} by --out")
+    return InputError(f"{told}: {reason(error)}; name another {kind} by --out")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from gcs.errors import GcsError, InputError
+from gcs.errors import InputError, not_written, reason
 
 SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
 TLOG_FILE, PLAN_FILE, RESULTS_FILE = "flight.tlog", "plan.json", "results.json"
@@ -24,10 +24,7 @@ _HOLDS = {TLOG_FILE: "a flight", PLAN_FILE: "a sweep", RESULTS_FILE: "the thesis
 def fresh_folder(name: str) -> Path:
     """`flights/NAME-TIME`, made now and nobody else's: of two that begin in one second the later has `-2`."""
     parent, stem = Path("flights"), f"{name}-{datetime.now():%Y%m%d-%H%M%S}"
-    try:
-        make_folder(parent, str(parent))
-    except GcsError as error:
-        raise GcsError(f"{error}; name another folder by --out DIR") from None
+    make_folder(parent)
     folder, ordinal = parent / stem, 1
     while True:
         try:
@@ -39,17 +36,17 @@ def fresh_folder(name: str) -> Path:
             return folder
 
 
-def make_folder(path: Path, told: str) -> None:
+def make_folder(path: Path, told: Path | None = None) -> None:
     """Make a folder, with those above it, unless it is there.
 
-    GcsError, which calls it `told`, if it cannot be made or nothing can be written into it.
+    GcsError, which names it or `told`, if it cannot be made or nothing can be written into it.
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
         if not os.access(path, os.W_OK):
-            raise PermissionError(13, "Permission denied")
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
-        raise GcsError(f"{told}: {error.strerror}") from None
+        raise not_written(error, told or path) from None
 
 
 @contextmanager
@@ -63,7 +60,8 @@ def reserved(path: Path, what: str) -> Iterator[None]:
         lock.acquire(blocking=False)
     except Timeout:
         raise InputError(
-            f"--out {path}: another {what} is writing there; wait until it has ended, or name another folder"
+            f"{path}: another {what} is writing there; wait until it has ended, or name another folder "
+            "by --out"
         ) from None
     try:
         yield
@@ -83,7 +81,7 @@ def check_writable(path: Path, is_folder: bool, told: str) -> None:
             _try_file(path)
     except OSError as error:
         kind = "folder" if is_folder else "file in a folder"
-        raise InputError(f"{told}: {error.strerror}; name a {kind} that can be written") from None
+        raise InputError(f"{told}: {reason(error)}; name a {kind} that can be written") from None
 
 
 def _try_folder(path: Path) -> None:
@@ -109,9 +107,11 @@ def keep_others(path: Path, kind: str, written: Iterable[str] = ()) -> None:
     of the file that tells, or before it holds ours a file under a name that is `written`."""
     for mark, what in _HOLDS.items():
         if mark != kind and (path / mark).exists():
-            raise InputError(f"--out {path}: holds {what}; name another")
+            raise InputError(f"{path}: holds {what}; name another folder by --out")
     if (path / kind).exists():
         return
     for name in written:
         if (path / name).exists():
-            raise InputError(f"--out {path}: holds a {name} that is not of {_HOLDS[kind]}; name another")
+            raise InputError(
+                f"{path}: holds a {name} that is not of {_HOLDS[kind]}; name another folder by --out"
+            )

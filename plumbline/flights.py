@@ -150,10 +150,11 @@ class Flight:
         from gcs.workflows.report import make_report
 
         folder = file_path("out", out)
-        make_folder(folder, str(folder))
-        keep_others(folder, TLOG_FILE)
-        (folder / TLOG_FILE).write_bytes(self.tlog)
-        make_report(folder / TLOG_FILE, folder, self._meta, quiet)
+        with told_in_python():
+            make_folder(folder)
+            keep_others(folder, TLOG_FILE)
+            (folder / TLOG_FILE).write_bytes(self.tlog)
+            make_report(folder / TLOG_FILE, folder, self._meta, quiet)
         return folder / PAGE_FILE
 
     @cached_property

@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
-from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json, print_table, spoken
+from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json, print_table
+from gcs.shell.display import say
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_MOST_DECIMALS = 6
+_NUMBERS = {  # what is identified, as people read it
+    "tracked_length_m": "cable length, by the distance of the load (m)",
+    "length_m": "cable length, by the swing (m)",
+    "drag_per_m": "quadratic drag / mass of the load (1/m)",
+    "wash_per_s2": "rotor wash at the load, outwards (1/s^2)",
+    "swirl_per_s2": "rotor wash at the load, around (1/s^2)",
+    "wash_radius_m": "radius of the rotor wash (m)",
+    "wash_delay_s": "delay of the rotor wash (s)",
+    "acceleration_share": "force on the load / vehicle's acceleration (1)",
+    "push_x_m_s2": "constant force / mass of the load, x (m/s^2)",
+    "push_y_m_s2": "constant force / mass of the load, y (m/s^2)",
+    "mass_ratio": "mass of the load / mass of the vehicle (1)",
+    "vehicle_drag_per_s": "linear drag / mass of the vehicle (1/s)",
+    "tilt_share": "acceleration shown by the tilt / acceleration (1)",
+    "attitude_delay_s": "delay of the attitude (s)",
+    "vehicle_drag_per_m": "quadratic drag / mass of the vehicle (1/m)",
+}
 _WORDS = {
     "ahead_2s": "predicted 2 s ahead",
     "ahead_5s": "predicted 5 s ahead",
@@ -29,36 +49,43 @@ def columns_option(command: F) -> F:
 
 
 @click.command("identify")
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@click.argument("file", metavar="DIR|FILE", type=click.Path(path_type=Path))
 @columns_option
 @json_option
 def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     """Find cable, load and drag from a recorded flight.
 
-    FILE is rows of comma-separated numbers (.csv, .csv.gz) that a column map describes, or a telemetry log of
-    a simulated flight. Each number comes with its 95 % interval.
+    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), or rows of comma-separated numbers
+    (.csv, .csv.gz) that a column map describes. Each number comes with its 95 % interval; a warning says
+    which ones the recording does not tell, since load or vehicle move too little.
 
     \b
     gcs identify flight-15.csv.gz --columns motion-capture
-    gcs identify flights/case-b/flight.tlog --json
+    gcs identify flights/case-b --json
     """
     from gcs.workflows.recorded import identify
 
-    record = identify(file, columns)
+    record = identify(file, columns, as_json)
+    names = [_NUMBERS[name] for name in record["not_told"]]
+    if names:
+        say(
+            f"the recording does not tell: {', '.join(names)}; load and vehicle move too little for it: "
+            "record a longer or faster flight, with swings, turns and stops"
+        )
     if as_json:
         print_json(record)
         return
     _print_rows(record)
     print_table(
         [
-            (spoken(name), f"{one['value']:.4f}", _interval(one["half_width"]))
+            (_NUMBERS[name], *with_interval(one["value"], one["half_width"]), _told(name, record))
             for name, one in record["identified"].items()
         ]
     )
 
 
 @click.command("replay")
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@click.argument("file", metavar="DIR|FILE", type=click.Path(path_type=Path))
 @columns_option
 @click.option(
     "--out",
@@ -69,12 +96,14 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 def replay_command(file: Path, columns: str | None, out: Path | None, as_json: bool) -> None:
     """Estimate the load of a recorded flight, and score it.
 
-    The load is estimated from the vehicle's pose alone (load.csv, load.png) and, where it was measured,
-    predicted 2 s and 5 s ahead, with innovations, errors, and the share of them within the stated bounds.
+    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), or rows of comma-separated numbers
+    (.csv, .csv.gz) that a column map describes. The load is estimated from the vehicle's pose alone
+    (load.csv, load.png) and, where it was measured, predicted 2 s and 5 s ahead, with innovations, errors,
+    and the share of them within the stated bounds.
     """
     from gcs.workflows.recorded import replay
 
-    record, folder = replay(file, columns, out)
+    record, folder = replay(file, columns, out, as_json)
     if as_json:
         print_json(record)
         return
@@ -96,9 +125,18 @@ def _print_rows(record: dict[str, Any]) -> None:
     click.echo(f"{record['rows']} rows, {record['duration_s']:.1f} s{jitter}{broken}")
 
 
-def _interval(half_width: float) -> str:
-    """As +- with four decimals; a width that these do not show has its first digits."""
-    return f"+- {half_width:.4f}" if half_width == 0.0 or half_width >= 5e-5 else f"+- {half_width:.1e}"
+def with_interval(value: float, half_width: float) -> tuple[str, str]:
+    """A number and +- half its interval, to two digits of the latter; of a narrow one these alone."""
+    if not math.isfinite(half_width):
+        return f"{value:z.4f}", "+- ?"
+    digits = 1 - math.floor(math.log10(half_width)) if half_width > 0.0 else _MOST_DECIMALS
+    decimals = min(max(digits, 0), _MOST_DECIMALS)
+    width = f"{half_width:.{decimals}f}" if digits == decimals or digits < 0 else f"{half_width:.1e}"
+    return f"{value:z.{decimals}f}", f"+- {width}"
+
+
+def _told(name: str, record: dict[str, Any]) -> str:
+    return "not told by this recording" if name in record["not_told"] else ""
 
 
 def _shown(key: str, value: float) -> str:

@@ -67,7 +67,7 @@ def _order(record: Record) -> tuple[int, int, int]:
 def make_directory(out: Path) -> None:
     """`out`, or one line on why not."""
     keep_others(out, RESULTS_FILE, (PAGE_FILE, TABLE_FILE))
-    make_folder(out / FLIGHTS, f"--out {out}")
+    make_folder(out / FLIGHTS, out)
 
 
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"

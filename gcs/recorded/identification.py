@@ -3,18 +3,24 @@
 The length is found twice: by the distance between the tracked points, and by the swing alone. Numbers of the
 load are those that predict it best, 2 s and 5 s ahead: robust least squares (Huber's weights) by Gauss and
 Newton. Those of the vehicle are a linear regression: its thrust lies along its axis, so that the horizontal
-momentum of vehicle and load shows in the tilt. Intervals take the residuals of each ten seconds as one draw
-(a sandwich of block sums), since neighbouring ones are alike.
+momentum of vehicle and load shows in the tilt.
+
+Intervals come from a jackknife: the recording is cut into blocks of ten seconds (neighbouring residuals are
+alike, those of different blocks are not), and the numbers are found again without each block, by one step of
+Gauss and Newton. How far they scatter says how well the recording tells them, and Student's t how well so few
+blocks tell the scatter. A sandwich of sums of gradients does not do: in the optimum these sums cancel, and of
+three blocks hardly anything is left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
+from scipy.special import stdtrit
 
 from gcs.recorded.estimates import filtered, load_position, predicted, rows_of
 from gcs.recorded.load_model import LoadModel
@@ -22,14 +28,13 @@ from gcs.recorded.motion import SLOW_DENSITY, SLOW_NOISE_M, Motion
 from gcs.recorded.scoring import HORIZONS_S, SETTLED_ROWS
 from gcs.recorded.smoothing import Floats, smooth
 
-_NORMAL_95 = 1.96
 _BLOCK_S = 10.0  # residuals further apart are taken as independent
-_EVERY_ROWS = 30
+_EVERY_S = 1.0  # a prediction begins
 _ROUNDS = 6
 _BEND_M = 0.03  # errors beyond count by their size, not their square
 _FAR_WEIGHT = 0.35  # of the longer horizon
 _PART = 0.3  # of a step, for differences
-_PRIOR = 1e-7  # of a step squared, for what the flight says nothing of
+_HELD_STEPS = 100.0  # how far what the recording says nothing of may go: what begins there stays there
 _SHORTENED = (1.0, 0.5, 0.25)
 _ABOVE_SWING = 4.0  # times the pendulum's frequency is left of the tilt, the rest filtered
 _EDGE_S = 5.0  # left out at both ends of what is filtered
@@ -45,6 +50,20 @@ _STEPS = {
     "push_x_m_s2": 0.01,
     "push_y_m_s2": 0.01,
 }
+# of what may be zero: an interval within it tells that it is, as far as anybody would notice
+_SMALL = {
+    "drag_per_m": 1e-3,
+    "wash_per_s2": 0.05,
+    "swirl_per_s2": 0.05,
+    "wash_delay_s": 0.02,
+    "acceleration_share": 5e-3,
+    "push_x_m_s2": 0.01,
+    "push_y_m_s2": 0.01,
+    "vehicle_drag_per_s": 0.01,
+    "attitude_delay_s": 0.01,
+    "vehicle_drag_per_m": 5e-3,
+}
+_LEAST = {"length_m": 0.01, "wash_radius_m": 0.01, "wash_delay_s": 0.0}  # of what cannot be negative
 
 # shortest recording that something can be told from: the edges, and one block between them
 LEAST_S = 2.0 * _EDGE_S + _BLOCK_S
@@ -61,6 +80,11 @@ class Identified(NamedTuple):
     value: float
     half_width: float
 
+    @property
+    def is_told(self) -> bool:
+        """Whether the recording tells it: the interval is narrower than the number, or than what matters."""
+        return self.half_width <= max(abs(self.value), _SMALL.get(self.name, 0.0))
+
 
 def tracked_length(motion: Motion, below_m: float) -> Identified:
     """The median distance from the vehicle's tracked point, `below_m` above the attachment, to the load."""
@@ -68,43 +92,62 @@ def tracked_length(motion: Motion, below_m: float) -> Identified:
     far = np.linalg.norm(motion.load - arm, axis=1)
     known = np.isfinite(far)
     blocks = _blocks(motion.time_s[known])
-    medians = np.array(
-        [np.median(far[known][blocks == k]) for k in range(blocks[-1] + 1) if np.any(blocks == k)]
-    )
+    medians = np.array([np.median(far[known][blocks == k]) for k in np.unique(blocks)])
     spread = float(np.std(medians, ddof=1)) / np.sqrt(len(medians)) if len(medians) > 1 else float("nan")
-    return Identified("tracked_length_m", float(np.median(far[known])), _NORMAL_95 * spread)
+    return Identified("tracked_length_m", float(np.median(far[known])), _student(len(medians)) * spread)
 
 
-def identify_load(motion: Motion, model: LoadModel, names: Sequence[str]) -> list[Identified]:
-    """The numbers `names` of the model that predict this load best; the rest stays as it is in `model`."""
+def identify_load(
+    motion: Motion,
+    model: LoadModel,
+    names: Sequence[str],
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Identified]:
+    """The numbers `names` of the model that predict this load best; the rest stays as it is in `model`.
+
+    `progress` is told how many predictions of the recording are done, and how many there are at most.
+    """
+    total = 1 + _ROUNDS * (len(names) + len(_SHORTENED))
+    done = 0
+
+    def tried(asked: LoadModel) -> tuple[Floats, Floats]:
+        nonlocal done
+        found = _errors(motion, asked)
+        done += 1
+        progress(done, total)
+        return found
+
     steps = np.array([_STEPS[name] for name in names])
-    errors, times = _errors(motion, model)
+    errors, times = tried(model)
     sensitivity = np.zeros((len(names), *errors.shape))
     for _ in range(_ROUNDS):
         for j, name in enumerate(names):
             nudged = model._replace(**{name: getattr(model, name) + _PART * steps[j]})
-            sensitivity[j] = (_errors(motion, nudged)[0] - errors) / _PART
+            sensitivity[j] = (tried(nudged)[0] - errors) / _PART
         weights = _weights(errors)
         normal = np.einsum("jkhi,kh,lkhi->jl", sensitivity, weights, sensitivity)
-        normal += _PRIOR * np.eye(len(names))
-        change = -np.linalg.solve(normal, np.einsum("jkhi,kh,khi->j", sensitivity, weights, errors))
+        gradient = np.einsum("jkhi,kh,khi->j", sensitivity, weights, errors)
+        change = -np.linalg.solve(normal + _prior(errors) * np.eye(len(names)), gradient)
         before = _cost(errors)
         for shorter in _SHORTENED:
             moved = {
                 n: getattr(model, n) + shorter * s * c for n, s, c in zip(names, steps, change, strict=True)
             }
-            tried = model._replace(**moved)
-            found, _ = _errors(motion, tried)
+            if any(moved.get(name, least) < least for name, least in _LEAST.items()):
+                continue
+            found, _ = tried(model._replace(**moved))
             if _cost(found) < before:
-                model, errors = tried, found
+                model, errors = model._replace(**moved), found
                 break
         else:
             break
-    each = np.einsum("jkhi,kh,khi->kj", sensitivity, _weights(errors), errors)
-    spread = steps * _sandwich(normal, each, times)
+    weights = _weights(errors)
+    normal = np.einsum("jkhi,kh,lkhi->kjl", sensitivity, weights, sensitivity)
+    gradient = np.einsum("jkhi,kh,khi->kj", sensitivity, weights, errors)
+    widths = steps * half_widths(normal, gradient, times)
     return [
-        Identified(name, float(getattr(model, name)), _NORMAL_95 * float(s))
-        for name, s in zip(names, spread, strict=True)
+        Identified(name, float(getattr(model, name)), float(width))
+        for name, width in zip(names, widths, strict=True)
     ]
 
 
@@ -142,10 +185,9 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
     flat = rows.reshape(-1, len(terms))
     if np.linalg.matrix_rank(flat) < len(terms):
         raise TooLittleMotionError("the vehicle moves too little for its numbers to be identified")
-    normal = flat.T @ flat
-    found = np.linalg.solve(normal, flat.T @ right.ravel())
-    each = np.einsum("kij,ki->kj", rows, right - rows @ found)
-    spread = _NORMAL_95 * _sandwich(normal, each, time[kept])
+    found = np.linalg.solve(flat.T @ flat, flat.T @ right.ravel())
+    each = np.einsum("kij,ki->kj", rows, rows @ found - right)
+    spread = half_widths(np.einsum("kij,kil->kjl", rows, rows), each, time[kept])
     names = ("mass_ratio", "vehicle_drag_per_s", "tilt_share", "attitude_delay_s", "vehicle_drag_per_m")
     return [Identified(n, float(v), float(s)) for n, v, s in zip(names, found, spread, strict=False)]
 
@@ -154,7 +196,8 @@ def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:
     """Errors of predictions (k, horizons, 3) in metres, and when they began (k,)."""
     rows = rows_of(motion, model)
     estimates = filtered(rows, model, load=True, tilt=False)
-    begins = np.arange(SETTLED_ROWS, len(rows.time_s), _EVERY_ROWS)
+    every = max(1, round(_EVERY_S / float(np.median(np.diff(rows.time_s)))))
+    begins = np.arange(SETTLED_ROWS, len(rows.time_s), every)
     windows = predicted(rows, model, estimates, begins, HORIZONS_S, tilt=False)
     at = np.array([one.ends for one in windows], dtype=np.intp)
     direction = np.array([one.direction for one in windows])
@@ -178,16 +221,43 @@ def _cost(errors: Floats) -> float:
     return float(np.sum(bent * np.array([1.0, _FAR_WEIGHT])))
 
 
+def _prior(errors: Floats) -> float:
+    """Of a step squared, for what the recording says nothing of: the weight of an error that is a hundred
+    steps off, so that errors of the size of these ones tell more as soon as they tell anything."""
+    size = np.linalg.norm(errors, axis=2)
+    return float(np.mean(_weights(errors) * size**2)) / _HELD_STEPS**2
+
+
 def _blocks(time: Floats) -> NDArray[np.intp]:
-    blocks: NDArray[np.intp] = ((time - time[0]) / _BLOCK_S).astype(np.intp)
+    """Which block each row belongs to: two at least, equally long, of ten seconds or a little more."""
+    span = time[-1] - time[0]
+    count = max(2, int(span / _BLOCK_S))
+    blocks: NDArray[np.intp] = np.minimum((time - time[0]) / span * count, count - 1).astype(np.intp)
     return blocks
 
 
-def _sandwich(normal: Floats, each: Floats, time: Floats) -> Floats:
-    """Standard deviations of a least squares solution whose gradient is the sum of `each` (k, j)."""
+def _student(blocks: int) -> float:
+    """Half the width of a 95 % interval in standard deviations that were told from so many blocks."""
+    return float(stdtrit(blocks - 1, 0.975)) if blocks > 1 else float("nan")
+
+
+def half_widths(normal: Floats, gradient: Floats, time: Floats) -> Floats:
+    """Of 95 % intervals (j,) of least squares numbers, by leaving out one block after the other.
+
+    `normal` (k, j, j) and `gradient` (k, j) are what each row adds. Infinite where the rows that are left do
+    not tell the numbers.
+    """
     blocks = _blocks(time)
-    sums = np.zeros((blocks[-1] + 1, each.shape[1]))
-    np.add.at(sums, blocks, each)
-    inverse = np.linalg.inv(normal)
-    spread: Floats = np.sqrt(np.diag(inverse @ (sums.T @ sums) @ inverse))
-    return spread
+    count = int(blocks[-1]) + 1
+    normals = np.zeros((count, *normal.shape[1:]))
+    gradients = np.zeros((count, gradient.shape[1]))
+    np.add.at(normals, blocks, normal)
+    np.add.at(gradients, blocks, gradient)
+    rest, push = normals.sum(axis=0) - normals, gradients.sum(axis=0) - gradients
+    try:
+        moved = -np.linalg.solve(rest, push[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        return np.full(gradient.shape[1], np.inf)
+    scatter = np.sum((moved - moved.mean(axis=0)) ** 2, axis=0) * (count - 1) / count
+    widths: Floats = _student(count) * np.sqrt(scatter)
+    return widths

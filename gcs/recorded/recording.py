@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import zlib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,13 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcs.analysis.tracks import Telemetry
+from gcs.folders import TLOG_FILE
 from gcs.recorded.column_map import ColumnMap
 from gcs.recorded.smoothing import Floats
 
 LEAST_ROWS = 200
 _MOST_BYTES = 2**30
+_LONGEST_ROW = 2**16  # bytes
 _UNIT = 0.1  # by which the length of a quaternion may differ from 1
 _LIFTED_M = 0.05  # above the lowest place of the load: a log begins and ends on the ground
+
+
+# what `gcs identify` and `gcs replay` read
+READ = (
+    f"must be a flight's folder (with its {TLOG_FILE}), a telemetry log (.tlog), or rows of comma-separated "
+    "numbers (.csv, .csv.gz)"
+)
 
 
 class RecordingError(ValueError):
@@ -36,7 +47,7 @@ def read_recording(path: Path, columns: ColumnMap) -> Recording:
     """The recording in a file; RecordingError if it is none."""
     try:
         if not path.is_file():
-            raise RecordingError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+            raise RecordingError(f"{path}: {'not a file' if path.exists() else 'no such file'}; {READ}")
         found = _telemetry(path) if path.suffix == ".tlog" else _rows(path, columns)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
@@ -46,6 +57,26 @@ def read_recording(path: Path, columns: ColumnMap) -> Recording:
 def name_of(path: Path) -> str:
     """The file's name without what says its kind."""
     return path.name.removesuffix(".gz").rsplit(".", 1)[0]
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file begins with rows of comma-separated numbers, behind one line of headings at most."""
+    try:
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            lines = [file.readline(_LONGEST_ROW) for _ in range(2)]
+    except (OSError, EOFError, zlib.error):  # the last two of a torn archive
+        return False
+    return any(_is_row(line) for line in lines)
+
+
+def _is_row(line: bytes) -> bool:
+    cells = line.split(b",")
+    try:
+        for cell in cells:
+            float(cell or b"nan")
+    except ValueError:
+        return False
+    return len(cells) > 1
 
 
 def _rows(path: Path, columns: ColumnMap) -> Recording:

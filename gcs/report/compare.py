@@ -25,8 +25,19 @@ from gcs.web.page import render
 if TYPE_CHECKING:
     from rich.table import Table
 
-_WAYS = ("mission", "law", "sensors", "vehicle", "seed")  # keys of the record that say how it was flown
+_WAYS = (
+    "mission",
+    "law",
+    "estimator",
+    "planner",
+    "sensors",
+    "vehicle",
+    "seed",
+)  # keys of the record that say how it was flown
 _CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
+DEFAULT = "default"  # of a parameter that was not changed
+_PARTS = 3  # of a label; what differs beyond is in the table
+_UNTOLD = {"mission items"}  # in labels
 _HEADING = 14  # characters in a line of the name of a flight, in the terminal
 _LABELS = 32  # before the columns of the flights
 _DRAWN = {"load", "vehicle", "asked", "quat", "cable", "tension", "rotor", "taut", "attached", "scored"}
@@ -81,7 +92,7 @@ def differences(runs: Sequence[Run]) -> list[Difference]:
     """What is known of how they were flown and is not the same in all."""
     rows: dict[str, list[str]] = {name: [_shown(run.record[name]) for run in runs] for name in _WAYS}
     settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
-    unnamed = ["default" if run.meta.command or run.telemetry.parameters else UNKNOWN for run in runs]
+    unnamed = [DEFAULT if run.meta.command or run.telemetry.parameters else UNKNOWN for run in runs]
     for name in sorted(set().union(*settings)):
         rows[name] = [found.get(name, other) for found, other in zip(settings, unnamed, strict=True)]
     rows["mission items"] = [_steps(run) for run in runs]
@@ -115,11 +126,40 @@ def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
     return tuple(i for i in rated if read[i] == best)
 
 
+def labels(runs: Sequence[Run]) -> list[str]:
+    """What each flight is called on the page: by what differs, `thesis, SIM_ACT_DELAY_MS=72`; where that is
+    the same of several, or nothing, with the flight's name, which is its folder's."""
+    asked = {*_WAYS, *(name for run in runs for name in run.meta.settings)}
+    known = [one for one in differences(runs) if one.name not in _UNTOLD]
+    # what was asked for, without the parameters that follow; of captured flights what the vehicle said
+    different = [one for one in known if one.name in asked] or known
+    found = []
+    for i in range(len(runs)):
+        parts = [part for one in different if (part := _part(one.name, one.values[i]))]
+        more = f" and {len(parts) - _PARTS} more" if len(parts) > _PARTS else ""
+        found.append(", ".join(parts[:_PARTS]) + more)
+    told = [label or ("default settings" if different else "") for label in found]
+    return [
+        label if told.count(label) == 1 else ", ".join(filter(None, (label, run.name)))
+        for label, run in zip(told, runs, strict=True)
+    ]
+
+
+def _part(name: str, value: str) -> str:
+    """A difference in a label; empty where it is what is usual."""
+    if value in (UNKNOWN, DEFAULT):
+        return ""
+    if name in _WAYS and name != "seed":
+        return value.rsplit("/", 1)[-1]  # a file goes by its name
+    return f"{name} {value}" if name in ("seed", "version") else f"{name}={value}"
+
+
 def comparison(runs: Sequence[Run]) -> Json:
     """As `gcs compare --json` prints it; `best` has the places of the best runs, from 0."""
     return {
         "runs": [
-            {"name": run.name, **{k: v for k, v in run.record.items() if k != "report_dir"}} for run in runs
+            {"name": run.name, "label": label, **{k: v for k, v in run.record.items() if k != "report_dir"}}
+            for run, label in zip(runs, labels(runs), strict=True)
         ],
         "differences": {one.name: list(one.values) for one in differences(runs)},
         "best": {row.metric.name: list(row.best) for _, rows in figures(runs) for row in rows if row.best},
@@ -173,14 +213,17 @@ def cell(value: str, best: bool) -> Any:
 def comparison_page(runs: Sequence[Run]) -> str:
     """The page: tables, tracks over each other, errors over each other."""
     what, times = begins(runs)
+    called = labels(runs)
     return render(
         "gcs.report",
         "compare.html",
         SCRIPTS,
         STYLES,
-        [_embedded(run, time) for run, time in zip(runs, times, strict=True)],
+        [_embedded(run, *one) for run, one in zip(runs, zip(times, called, strict=True), strict=True)],
         begun=what,
-        runs=[{"name": run.name, **_told(run)} for run in runs],
+        runs=[
+            {"name": run.name, "label": label, **_told(run)} for run, label in zip(runs, called, strict=True)
+        ],
         differences=differences(runs),
         groups=[(group.title, rows) for group, rows in figures(runs)],
     )
@@ -191,10 +234,10 @@ def _told(run: Run) -> dict[str, str]:
     return {"outcome": outcome, "mood": mood(outcome), "reason": run.meta.reason or ""}
 
 
-def _embedded(run: Run, begin_s: float) -> Json:
+def _embedded(run: Run, begin_s: float, label: str) -> Json:
     """The flight, and its time at which the flights are laid over each other."""
     replay = replay_of(run.telemetry, run.samples, run.meta, _DRAWN)
-    return {**replay, "name": run.name, "begin": begin_s}
+    return {**replay, "name": run.name, "label": label, "begin": begin_s}
 
 
 def begins(runs: Sequence[Run]) -> tuple[str, list[float]]:

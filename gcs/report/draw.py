@@ -75,7 +75,7 @@ class Drawing:
             self._helper = None
 
     def _help(self, answer: Connection) -> None:
-        with suppress(KeyboardInterrupt), style():  # our parent has its own interrupt
+        with suppress(KeyboardInterrupt, OSError), style():  # our parent has its own, and draws what is left
             for picture in self._next():
                 self._draw(picture)
                 answer.send(picture.file)

@@ -238,18 +238,21 @@ class CompileDisplay(LiveBars):
 
 
 class StepDisplay(LiveBars):
-    """A bar for any other step that takes more than half a second; there is no plain line."""
+    """A bar for any other step that takes more than half a second; of a `long` one plain lines elsewhere."""
 
     _transient = True
 
-    def __init__(self, title: str, quiet: bool = False) -> None:
+    def __init__(self, title: str, quiet: bool = False, long: bool = False) -> None:
         super().__init__(quiet, _OPENS_AFTER_S)
         self._title = title
+        self._long = long
 
     def update(self, done: int, total: int, title: str | None = None) -> None:
         """Show that `done` of `total` are done; a `total` of 0 means that it is not known."""
-        row = {"description": title or self._title, "completed": done, "total": total or None}
-        self._show(lambda: {"step": row}, None)
+        named = title or self._title
+        row = {"description": named, "completed": done, "total": total or None}
+        far = f": {done} of {total}" if total else ""
+        self._show(lambda: {"step": row}, (lambda: named + far) if self._long else None)
 
     def columns(self) -> tuple[ProgressColumn | str, ...]:
         from rich.progress import BarColumn, MofNCompleteColumn, SpinnerColumn

@@ -26,7 +26,7 @@ def sweep_origin(plan: SweepPlan) -> Origin:
 def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -> None:
     """Write plan.json; PlanError if the directory holds flights of another origin, GcsError if nothing can be
     written into it."""
-    make_folder(directory, f"--out {directory}")
+    make_folder(directory)
     path = directory / PLAN_FILE
     if path.exists():
         found = _read(directory)
@@ -36,7 +36,8 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
             if "settings" in differing:
                 held = f"another sweep, with other {', '.join(_differing(origin, found))}"
             raise PlanError(
-                f"--out {directory}: holds {held}; name another folder, or add --fresh to discard its flights"
+                f"{directory}: holds {held}; name another folder by --out, or add --fresh to discard its "
+                "flights"
             )
         return
     fields = {"command": command, "flights": plan.flights, "origin": origin.to_json()}

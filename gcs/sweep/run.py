@@ -58,7 +58,7 @@ def sweep(
     """
     store = Store(directory, plan)
     keep_others(directory, PLAN_FILE, (PAGE_FILE,))
-    make_folder(directory, f"--out {directory}")
+    make_folder(directory)
     with reserved(directory, "gcs sweep"):
         if fresh:
             store.clear()

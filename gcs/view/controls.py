@@ -29,7 +29,7 @@ SLIDERS = (
     Slider("SIM_GUST_STD", "Random gusts", "m/s", 0.0, 4.0, 0.1, 0.0),
     Slider("SIM_LOAD_MASS", "True mass of the load", "kg", 0.02, 0.25, 0.005),
     Slider("SIM_ACT_DELAY_MS", "Delay of the rotors", "ms", 0.0, 60.0, 2.0, 0.0),
-    Slider("SIM_NOISE_SCALE", "Noise of the sensors", "times", 0.0, 10.0, 0.5, 1.0),
+    Slider("SIM_NOISE_SCALE", "Noise of the sensors", "×", 0.0, 10.0, 0.5, 1.0),
     Slider("SIM_LOSS_PCT", "Losses of the ground link", "%", 0.0, 60.0, 5.0, 0.0),
 )
 NAMES = {slider.name for slider in SLIDERS}

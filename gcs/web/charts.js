@@ -12,7 +12,7 @@
 
    chart = new Plumbline.Chart(element, {title, unit, series, time, bands, marks, sync, height, digits, least, zero})
        series   [{name, values, dash: true|false, color: 0 ... 6 or "ink"|"faint", width, quiet}], values as `time`;
-                quiet: without a name and a value beside the title
+                quiet: without a name and a value beside the title; about: more than the name, where it is pointed at
        time     array of seconds, rising; NaN or null in values: a gap
        sync     a ChartGroup; without it the plot stands alone and bands and marks are its own
        digits   decimals of the values beside the names; null: three digits, wherever the point is
@@ -70,6 +70,20 @@
 
   const plain = (value, digits) => (
     digits === null ? String(Number(value.toPrecision(3))) : (Number(value.toFixed(digits)) + 0).toFixed(digits)); // no -0.00
+
+  const RAISED = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+  const LONGEST_LABEL = 6; // characters that the space beside a plot surely holds
+
+  /** Labels of the vertical axis; of numbers too long for the space beside it with the power of ten of the greatest. */
+  Plumbline.tickLabels = function (ticks) {
+    const labels = ticks.map((v) => String(Number(v.toPrecision(6))));
+    const most = Math.max(...ticks.map(Math.abs));
+    const unfit = labels.some((label) => label.length > LONGEST_LABEL) && (most < 0.01 || most >= 1e5);
+    if (!unfit || !(most > 0)) return labels;
+    const power = Math.floor(Math.log10(most) + 1e-9);
+    const raised = Array.from(String(power), (sign) => RAISED[sign]).join("");
+    return ticks.map((v) => (v === 0 ? "0" : `${Number((v / 10 ** power).toPrecision(3))}·10${raised}`));
+  };
 
   function element(kind, className, text) {
     const made = document.createElement(kind);
@@ -142,7 +156,7 @@
       this._keys = this._series.map((one, i) => {
         const key = element("button", "chart-key");
         key.type = "button";
-        key.title = "show or hide";
+        key.title = one.about ? `${one.about}: show or hide` : "show or hide";
         key._swatch = element("i", one.dash ? "dashed" : "");
         key._value = element("output");
         key.append(key._swatch, element("span", "", one.name), key._value);
@@ -219,7 +233,7 @@
         scales: { x: { time: false }, y: { range: (_, low, high) => this._range(low, high) } },
         axes: [
           Object.assign({}, axis, { size: 24, gap: 3, values: (_, ticks) => ticks.map((v) => `${+v.toFixed(3)} s`), space: 60 }),
-          Object.assign({}, axis, { size: 48, gap: 4, space: 26, values: (_, ticks) => ticks.map((v) => String(Number(v.toPrecision(6)))) }),
+          Object.assign({}, axis, { size: 56, gap: 4, space: 26, values: (_, ticks) => Plumbline.tickLabels(ticks) }),
         ],
         series: [{}, ...this._series.map((one, i) => ({
           stroke: colour(this._colourOf(i)), width: one.width || 1.5, dash: one.dash ? [5, 4] : undefined,

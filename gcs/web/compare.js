@@ -52,7 +52,7 @@
     ];
     return kinds.map(([title, unit, of, digits]) => ({
       title, unit, digits, least: 0.1, time: grid,
-      series: flights.map((flight, i) => ({ name: flight.name, values: resampled(flight, of(flight), grid), color: i + 1 })),
+      series: flights.map((flight, i) => ({ name: flight.label, about: flight.name, values: resampled(flight, of(flight), grid), color: i + 1 })),
     }));
   }
 
@@ -101,7 +101,7 @@
         vehicle ? [{ ...vehicle, id: i + 1, colour: colourOf(i), asked: i === 0 ? vehicle.asked : null }] : []));
       stage.show({ time: t, vehicles, wind: null });
       stage.readings(found.map(({ readings }, i) => [
-        flights[i].name, Number.isFinite(readings.error) ? `${(1000 * readings.error).toFixed(1)} mm` : "–"]), first.phaseAt(t + first.begin));
+        flights[i].label, Number.isFinite(readings.error) ? `${(1000 * readings.error).toFixed(1)} mm` : "–", colourOf(i)]), first.phaseAt(t + first.begin));
     };
     transport.onTime((t) => { show(t); group.setTime(t); });
     group.onHover((t) => { if (!transport.playing) show(t === null ? transport.time : t); });

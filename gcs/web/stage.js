@@ -2,7 +2,7 @@
 
    stage = new Plumbline.Stage(element, layout)    throws where the browser offers no WebGL
    stage.show(state)          as Scene.show
-   stage.readings([[name, text], ...], phase)
+   stage.readings([[name, text, colour], ...], phase)    with a colour, its swatch stands before the name
    stage.camera(mode), stage.fit(places)
    stage.note(text)           a word over the scene; empty: none
    stage.scene                the Scene; drawn when something has changed */
@@ -16,12 +16,15 @@
       const canvas = document.createElement("canvas");
       canvas.id = "scene";
       canvas.tabIndex = -1;
-      element.prepend(canvas);
+      const picture = document.createElement("div"); // what stands over the picture stays over it where the rest is below
+      picture.className = "picture";
+      picture.append(canvas);
+      element.prepend(picture);
       try {
         this.scene = new Plumbline.Scene(canvas, {
           rotors: layout.rotors, armLength: layout.arm, cableLength: layout.cable, theme: "auto" });
       } catch (error) {
-        canvas.remove();
+        picture.remove();
         throw error;
       }
       this._readings = element.appendChild(document.createElement("dl"));
@@ -93,14 +96,15 @@
         this._phase.className = "phase";
       }
       if (this._phase.textContent !== phase) this._phase.textContent = phase;
-      for (const [name, text] of rows) {
+      for (const [name, text, colour] of rows) {
         let value = this._values.get(name);
         if (!value) {
           const term = this._readings.appendChild(document.createElement("dt"));
-          term.textContent = name;
+          term.textContent = term.title = name;
           value = this._readings.appendChild(document.createElement("dd"));
           this._values.set(name, value);
         }
+        if (colour) value.previousSibling.style.setProperty("--swatch", colour);
         if (value.textContent !== text) value.textContent = text;
       }
     }

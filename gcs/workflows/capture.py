@@ -9,7 +9,7 @@ from gcs.clients import command
 from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.clients.parameter_transfer import ParameterList
-from gcs.errors import GcsError, NoVehicleError, RefusedError
+from gcs.errors import NoVehicleError, RefusedError, not_written
 from gcs.folders import TLOG_FILE, fresh_folder
 from gcs.shell.display import say
 from gcs.shell.link import Address, monotonic_us, unix_us
@@ -39,7 +39,7 @@ def capture_to(
             path.parent.mkdir(parents=True, exist_ok=True)
             file = path.open("wb")
         except OSError as error:
-            raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
+            raise not_written(error, path, "file") from None
         with file:
             capture = Capture(TlogWriter(file), unix_us() - monotonic_us())
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gcs.errors import EXIT_USAGE, GcsError
+from gcs.errors import EXIT_USAGE, GcsError, not_written
 from gcs.folders import TLOG_FILE
 from gcs.workflows.report import find_log
 
@@ -47,7 +47,7 @@ def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]
         page.parent.mkdir(parents=True, exist_ok=True)
         page.write_text(comparison_page(runs), encoding="utf-8")
     except OSError as error:
-        raise GcsError(f"{page}: {error.strerror}") from None
+        raise not_written(error, page, "file") from None
     return runs, page
 
 

@@ -252,7 +252,7 @@ class FlightFolder:
         return (self._path / TLOG_FILE).rename(self._path / UNFLOWN_FILE)
 
     def __enter__(self) -> FlightFolder:
-        make_folder(self._path, f"--out {self._path}")
+        make_folder(self._path)
         keep_others(self._path, TLOG_FILE, () if self._overwrite else (SUMMARY_FILE, PAGE_FILE))
         try:
             (self._path / TLOG_FILE).touch(exist_ok=self._overwrite)
@@ -265,9 +265,7 @@ class FlightFolder:
         trouble, tlog = disk_trouble(error), self._path / TLOG_FILE
         if trouble:
             size = tlog.stat().st_size if tlog.exists() else 0
-            raise GcsError(
-                f"--out {self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}"
-            ) from None
+            raise GcsError(f"{self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}") from None
         if self._kept:
             return
         if isinstance(error, KeyboardInterrupt) and tlog.exists() and tlog.stat().st_size > 0:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gcs.errors import GcsError, InputError, input_error
+from gcs.errors import InputError, input_error, not_written
 from gcs.folders import TLOG_FILE
+from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
     from gcs.recorded.column_map import ColumnMap
@@ -20,8 +21,9 @@ FOLDER = Path("replays")
 OWN_MAP = "telemetry"  # of Plumbline's own logs
 
 
-def identify(path: Path, columns: str | None) -> dict[str, Any]:
-    """What the recording says of cable, load and vehicle, with half the widths of the 95 % intervals."""
+def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, Any]:
+    """What the recording says of cable, load and vehicle, with half the widths of the 95 % intervals, and of
+    what it says nothing."""
     from gcs.recorded.identification import (
         LEAST_S,
         TooLittleMotionError,
@@ -30,66 +32,90 @@ def identify(path: Path, columns: str | None) -> dict[str, Any]:
         tracked_length,
     )
 
-    asked, motion, model = _read(path, columns)
-    _needs_load(path, motion)
-    duration_s = float(motion.time_s[-1] - motion.time_s[0])
-    if duration_s < LEAST_S:
-        raise InputError(
-            f"{path}: {duration_s:.1f} s; at least {LEAST_S:.0f} s are needed to identify anything"
-        )
-    try:
-        vehicle = identify_vehicle(motion, model)
-    except TooLittleMotionError as error:
-        raise InputError(f"{path}: {error}") from None
-    found: list[Identified] = [
-        tracked_length(motion, asked.attachment.below_m),
-        *identify_load(motion, model, asked.identify.parameters),
-        *vehicle,
-    ]
+    path = find_recording(path)
+    with StepDisplay("reading the recording", quiet, long=True) as display:
+        display.update(0, 0)
+        asked, motion, model = _read(path, columns)
+        _needs_load(path, motion)
+        duration_s = float(motion.time_s[-1] - motion.time_s[0])
+        if duration_s < LEAST_S:
+            raise InputError(
+                f"{path}: {duration_s:.1f} s; at least {LEAST_S:.0f} s are needed to identify anything"
+            )
+        try:
+            vehicle = identify_vehicle(motion, model)
+        except TooLittleMotionError as error:
+            raise InputError(f"{path}: {error}") from None
+
+        def tell(done: int, total: int) -> None:
+            display.update(done, total, "fitting predictions of the load")
+
+        found: list[Identified] = [
+            tracked_length(motion, asked.attachment.below_m),
+            *identify_load(motion, model, asked.identify.parameters, tell),
+            *vehicle,
+        ]
     return {
         **_rows_record(path, motion),
         "identified": {one.name: {"value": one.value, "half_width": one.half_width} for one in found},
+        "not_told": [one.name for one in found if not one.is_told],
     }
 
 
-def replay(path: Path, columns: str | None, out: Path | None) -> tuple[dict[str, Any], Path]:
+def replay(
+    path: Path, columns: str | None, out: Path | None, quiet: bool = False
+) -> tuple[dict[str, Any], Path]:
     """The scores of the estimates, and the folder in which their table and picture are."""
     from gcs.recorded.estimates import filtered, load_position, rows_of
     from gcs.recorded.replay_files import write_picture, write_table
     from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
 
-    _, motion, model = _read(path, columns)
-    rows = rows_of(motion, model)
-    seen = bool(np.isfinite(motion.load).all())
-    record: dict[str, Any] = _rows_record(path, motion)
-    if seen:
-        squares = filtered(rows, model, load=True, tilt=True).squares
-        record["innovations"] = {
-            name: {
-                "mean_square_per_axis": float(np.mean(np.abs(each)) / 2.0),
-                "refused": int(np.sum(each < 0.0)),
+    path = find_recording(path)
+    with StepDisplay("estimating the load", quiet) as display:
+        display.update(0, 0)
+        _, motion, model = _read(path, columns)
+        rows = rows_of(motion, model)
+        seen = bool(np.isfinite(motion.load).all())
+        record: dict[str, Any] = _rows_record(path, motion)
+        if seen:
+            squares = filtered(rows, model, load=True, tilt=True).squares
+            record["innovations"] = {
+                name: {
+                    "mean_square_per_axis": float(np.mean(np.abs(each)) / 2.0),
+                    "refused": int(np.sum(each < 0.0)),
+                }
+                for name, each in (("load", squares[:, 0]), ("attitude", squares[:, 1]))
             }
-            for name, each in (("load", squares[:, 0]), ("attitude", squares[:, 1]))
-        }
-        for horizon, score in zip(HORIZONS_S, score_ahead(motion, rows, model), strict=True):
-            record[f"ahead_{horizon:g}s"] = {"median_m": score.median_m, "inside_95": score.inside}
-        alone = score_pose_alone(motion, rows, model)
-        record["pose_alone"] = {
-            "median_m": alone.median_m,
-            "nees_per_axis": float(np.mean(alone.square) / 2.0),
-            "inside_95": alone.inside,
-        }
-    found = filtered(rows, model, load=False, tilt=True, smoothed=True)
-    load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
-    sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
+            for horizon, score in zip(HORIZONS_S, score_ahead(motion, rows, model), strict=True):
+                record[f"ahead_{horizon:g}s"] = {"median_m": score.median_m, "inside_95": score.inside}
+            alone = score_pose_alone(motion, rows, model)
+            record["pose_alone"] = {
+                "median_m": alone.median_m,
+                "nees_per_axis": float(np.mean(alone.square) / 2.0),
+                "inside_95": alone.inside,
+            }
+        found = filtered(rows, model, load=False, tilt=True, smoothed=True)
+        load = load_position(motion, model, np.arange(len(motion.time_s)), found.states[:, :2])
+        sd = model.length_m * np.sqrt(found.covariances[:, [0, 1], [0, 1]])
     folder = out or FOLDER / name_of(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_table(folder / "load.csv", motion, load, sd)
         write_picture(folder / "load.png", motion, load, sd)
     except OSError as error:
-        raise GcsError(f"{folder}: {error.strerror}") from None
+        raise not_written(error, folder) from None
     return record, folder
+
+
+def find_recording(source: Path) -> Path:
+    """The recording that is named; of a flight's folder its telemetry log."""
+    from gcs.recorded.recording import READ
+
+    if not source.is_dir():
+        return source
+    if not (source / TLOG_FILE).is_file():
+        raise InputError(f"{source}: holds no {TLOG_FILE}; {READ}")
+    return source / TLOG_FILE
 
 
 def name_of(path: Path) -> str:
@@ -102,12 +128,20 @@ def name_of(path: Path) -> str:
 def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel]:
     from gcs.recorded.column_map import MAPS, MapError, load_map
     from gcs.recorded.motion import distances, motion_of
-    from gcs.recorded.recording import RecordingError, read_recording
+    from gcs.recorded.recording import READ, RecordingError, is_table, read_recording
 
-    if columns is None and path.suffix != ".tlog" and path.is_file():
+    is_log = path.suffix == ".tlog"
+    if columns is None and not is_log and path.is_file():
+        if not is_table(path):
+            raise InputError(f"{path}: no recording of a flight; {READ}")
         raise InputError(f"{path}: say what its columns are by --columns: {MAPS.choice()}")
     try:
         asked = load_map(columns or OWN_MAP)
+        if is_log and asked.vehicle is not None:
+            raise InputError(
+                f"--columns {columns}: describes rows of numbers by another system of tracking; {path} names "
+                "its columns itself: leave --columns out, or name a map without [vehicle]"
+            )
         motion = motion_of(read_recording(path, asked), asked)
     except MapError as error:
         raise input_error(error) from None

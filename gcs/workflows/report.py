@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from autopilot.wire.tlog import read_tlog, write_common
-from gcs.errors import GcsError, InputError
-from gcs.folders import TLOG_FILE, keep_others
+from gcs.errors import GcsError, InputError, disk_trouble, not_written
+from gcs.folders import SUMMARY_FILE, TLOG_FILE, keep_others
 from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
@@ -34,7 +36,28 @@ def make_report(
         except ReportError as error:
             raise InputError(str(error)) from None
         except OSError as error:
-            raise GcsError(f"{error.filename or out}: {error.strerror}") from None
+            raise _not_made(error, tlog, out) from None
+
+
+def _not_made(error: OSError, tlog: Path, out: Path) -> GcsError:
+    """That the report cannot be written; with a full disk what is kept, and how to make it later."""
+    if not disk_trouble(error):
+        return not_written(error, error.filename or out)
+    kept = [str(tlog)] if tlog.is_file() else []
+    if _is_whole(out / SUMMARY_FILE):
+        kept.append(str(out / SUMMARY_FILE))
+    again = shlex.quote(str(out)) if tlog == out / TLOG_FILE else shlex.join([str(tlog), "--out", str(out)])
+    return GcsError(
+        f"{out}: the report cannot be written: {disk_trouble(error)}; kept are {' and '.join(kept)}; "
+        f"make it when there is space: gcs report {again}"
+    )
+
+
+def _is_whole(summary: Path) -> bool:
+    try:
+        return bool(json.loads(summary.read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return False
 
 
 def find_log(source: Path) -> Path:
@@ -65,7 +88,7 @@ def make_mcap(source: Path, folder: Path) -> Path:
     except ReportError as error:
         raise InputError(str(error)) from None
     except OSError as error:
-        raise GcsError(f"{error.filename or folder}: {error.strerror}") from None
+        raise not_written(error, error.filename or folder) from None
 
 
 def make_common(source: Path, folder: Path) -> Path:
@@ -74,7 +97,7 @@ def make_common(source: Path, folder: Path) -> Path:
     try:
         write_common(find_log(source), path)
     except OSError as error:
-        raise GcsError(f"{error.filename or path}: {error.strerror}") from None
+        raise not_written(error, error.filename or path) from None
     return path
 
 

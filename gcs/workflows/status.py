@@ -15,8 +15,18 @@ from gcs.shell.session import Session
 from gcs.shell.truth import TruthLink
 
 LISTEN_S = 2.5  # every stream has come by then, the slowest are sent once a second
-RECALL_S = 1.0  # kept texts take a fifth of that
+RECALL_S = 1.0  # kept texts take a fifth of that; of a vehicle that has said nothing nothing comes
 SHOWN_TEXTS = 10  # of these that are warnings or worse
+# of what `status_record` reads: when all of it has come there is nothing left to listen for
+_READ = {
+    "SYS_STATUS",
+    "EXTENDED_SYS_STATE",
+    "MISSION_CURRENT",
+    "LOAD_SETPOINT",
+    "LOAD_STATE",
+    "CASCADE_ERRORS",
+    "ROTOR_STATE",
+}
 
 _SEVERITIES = {
     value: str(entry.name).removeprefix("MAV_SEVERITY_").lower()
@@ -31,10 +41,17 @@ def vehicle_status(address: Address, truth_at: Address | None = None) -> dict[st
     """
     with TruthLink(truth_at) as truth, Session(address) as session:
         session.find_with_truth(truth)
-        session.watch(lambda: False, LISTEN_S, "listening")
+        told = {"SIM_STATUS"} if truth.heard else set()
+        view = session.view
+        asked = _ask_for_texts(session)
+        session.watch(
+            lambda: view.latest.keys() >= _READ and view.truth.keys() >= told and asked.answered,
+            LISTEN_S,
+            "listening",
+        )
         if truth.missing:
             say(f"no rate, lateness and missed ticks of the simulator: {truth.missing}")
-        texts = [text for text in recall(session) if text.severity <= mavlink.MAV_SEVERITY_WARNING]
+        texts = [text for text in asked.texts if text.severity <= mavlink.MAV_SEVERITY_WARNING]
         return {**status_record(session.view), "texts": text_records(texts[-SHOWN_TEXTS:])}
 
 
@@ -47,15 +64,39 @@ def vehicle_texts(address: Address) -> list[dict[str, Any]]:
 
 def recall(session: Session) -> list[Text]:
     """What the vehicle has said, the oldest first; of one that keeps no texts, what it said meanwhile."""
-    view = session.view
+    asked = _ask_for_texts(session)
+    session.watch(lambda: asked.answered, RECALL_S)
+    return asked.texts
+
+
+class _Asked:
+    """Kept texts that a vehicle was asked for; `keeps` whether it said that it tells them."""
+
+    def __init__(self, view: VehicleView, keeps: bool) -> None:
+        self._view = view
+        self._keeps = keeps
+        self._heard = len(view.texts) if keeps else 0
+        self._until_us = monotonic_us() + round(RECALL_S * 1e6)
+
+    @property
+    def answered(self) -> bool:
+        """Whether all has come that will come."""
+        return not self._keeps or self._view.recalled_all or monotonic_us() >= self._until_us
+
+    @property
+    def texts(self) -> list[Text]:
+        """The kept ones, and what was said since then."""
+        kept = {(text.severity, text.text) for text in self._view.recalled}
+        new = (text for text in self._view.texts[self._heard :] if text[1:] not in kept)
+        return [*self._view.recalled, *new]
+
+
+def _ask_for_texts(session: Session) -> _Asked:
     try:
         session.run(command.request_message(session.target, mavlink.MAVLINK_MSG_ID_STATUSTEXT))
     except (RefusedError, NoVehicleError):
-        return list(view.texts)
-    heard = len(view.texts)
-    session.watch(lambda: view.recalled_all, RECALL_S)
-    kept = {(text.severity, text.text) for text in view.recalled}
-    return [*view.recalled, *(text for text in view.texts[heard:] if text[1:] not in kept)]
+        return _Asked(session.view, keeps=False)
+    return _Asked(session.view, keeps=True)
 
 
 def text_records(texts: list[Text]) -> list[dict[str, Any]]:

@@ -9,6 +9,8 @@ of what is varied with one seed, of the short mission too. Commands to a running
 
 from __future__ import annotations
 
+import ast
+import builtins
 import shlex
 import shutil
 import tomllib
@@ -327,3 +329,26 @@ def test_the_blocks_of_a_page_run(
             run_toml(block)
         elif block.language == "yaml":
             yaml.safe_load(block.text)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_block_of_python_imports_what_it_uses(page: Path) -> None:
+    """Readers copy one block and not the page."""
+    for block in split(page)[0]:
+        if block.language == "python":
+            assert not _undefined(block.text), f"{block.place}: {_undefined(block.text)}"
+
+
+def _undefined(code: str) -> set[str]:
+    """Names that are used and come from nowhere, scopes left aside."""
+    known, used = set(dir(builtins)), set()
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            known |= {(one.asname or one.name).split(".")[0] for one in node.names}
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            known.add(node.name)
+        elif isinstance(node, ast.arg):
+            known.add(node.arg)
+        elif isinstance(node, ast.Name):
+            (used if isinstance(node.ctx, ast.Load) else known).add(node.id)
+    return used - known

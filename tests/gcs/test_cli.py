@@ -495,6 +495,23 @@ def test_status(live, monkeypatch):
     assert "mode" in run("status", "--connect", port).stdout
 
 
+def test_status_ends_when_all_has_come(live, monkeypatch):
+    vehicle, port = live
+    monkeypatch.setattr(status_module, "LISTEN_S", 60.0)
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.1)
+    vehicle.kept_texts = [(mavlink.MAV_SEVERITY_WARNING, "[1/1, 3.0 s ago] Machine busy")]
+
+    def tell(scripted, t):
+        scripted.tell_load(1.0, 2.0, 0.5)
+        scripted.send(mavlink.MAVLink_extended_sys_state_message(0, mavlink.MAV_LANDED_STATE_ON_GROUND))
+
+    vehicle.script, vehicle.started_us = tell, 0
+    begun = time.monotonic()
+    record = json.loads(run("status", "--json", "--connect", port).stdout)
+    assert time.monotonic() - begun < 30.0
+    assert (record["landed"], record["load_up_m"], len(record["texts"])) == ("on the ground", 0.5, 1)
+
+
 def test_figures_that_only_the_simulator_knows_are_missed_with_the_option_that_gives_them(live, monkeypatch):
     _, port = live
     monkeypatch.setattr(status_module, "LISTEN_S", 0.3)

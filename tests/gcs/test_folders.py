@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from gcs.cli import gcs
-from gcs.errors import EXIT_USAGE, GcsError, InputError
+from gcs.errors import EXIT_USAGE, GcsError, InputError, disk_trouble, not_written
 from gcs.folders import (
     PAGE_FILE,
     PLAN_FILE,
@@ -21,6 +23,11 @@ from gcs.folders import (
     reserved,
 )
 from gcs.workflows.fly import UNFLOWN_FILE, FlightFolder
+from gcs.workflows.report import make_report
+
+
+def arrow_on_a_full_disk(_: Path) -> None:
+    raise OSError(errno.ENOSPC, "Error writing bytes to file. Detail: [errno 28] No space left on device")
 
 
 def test_flights_that_begin_in_one_second_have_folders_of_their_own(
@@ -36,7 +43,7 @@ def test_flights_that_begin_in_one_second_have_folders_of_their_own(
 def test_where_no_folder_can_be_made_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "flights").write_text("", encoding="utf-8")
-    with pytest.raises(GcsError, match="flights: File exists; name another folder by --out DIR"):
+    with pytest.raises(InputError, match=r"flights: File exists; name another folder by --out$"):
         fresh_folder("hover")
 
 
@@ -123,7 +130,55 @@ def test_a_flight_leaves_a_sweep_and_files_of_others_as_they_are(tmp_path: Path)
 
 def test_a_folder_that_is_written_into_is_not_anothers(tmp_path: Path) -> None:
     in_use = reserved(tmp_path, "sweep")
-    with in_use, pytest.raises(InputError, match=f"^--out {tmp_path}: another sweep is writing there; "):
+    with in_use, pytest.raises(InputError, match=f"^{tmp_path}: another sweep is writing there; "):
         reserved(tmp_path, "sweep").__enter__()
     with reserved(tmp_path, "sweep"):
         pass
+
+
+def test_a_full_disk_is_told_by_the_systems_word_whoever_writes() -> None:
+    with pytest.raises(OSError) as error:
+        arrow_on_a_full_disk(Path())
+    assert disk_trouble(error.value) == "no space left on device"
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_report_that_has_no_place_says_what_is_kept_and_how_to_make_it_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: bool
+) -> None:
+    tlog, summary = tmp_path / TLOG_FILE, tmp_path / SUMMARY_FILE
+    tlog.touch()
+
+    def full(*_: object) -> None:
+        summary.write_text('{"outcome": 1}' if whole else '{"out', encoding="utf-8")
+        arrow_on_a_full_disk(tmp_path)
+
+    monkeypatch.setattr("gcs.report.build.build_report", full)
+    with pytest.raises(GcsError, match="no space left on device") as error:
+        make_report(tlog, tmp_path, None, quiet=True)
+    said = str(error.value)
+    assert said.endswith(f"make it when there is space: gcs report {tmp_path}")
+    assert f"kept are {tlog}" in said
+    assert (str(summary) in said) == whole
+
+
+@pytest.mark.parametrize("command", ["fly hover", "sweep hover"])
+def test_a_working_folder_that_is_not_writable_is_wrong_input_and_no_option_is_blamed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("flights", "sweeps"):
+        (tmp_path / name).touch()  # as root may write everywhere
+    result = CliRunner().invoke(gcs, command.split(), prog_name="gcs")
+    assert result.exit_code == EXIT_USAGE
+    last = result.stderr.splitlines()[-1]
+    assert last.endswith("name another folder by --out")
+    assert "--out" not in last.removesuffix("by --out")
+
+
+@pytest.mark.parametrize(("number", "kind"), [(errno.EROFS, InputError), (errno.ENOSPC, GcsError)])
+def test_what_cannot_be_written_says_to_name_another(number: int, kind: type[GcsError]) -> None:
+    found = not_written(OSError(number, "wrapped by a library"), "replays/case-b")
+    assert type(found) is kind
+    assert str(found).startswith(f"replays/case-b: {os.strerror(number)}; ")
+    assert str(found).endswith("name another folder by --out")

@@ -162,7 +162,7 @@ def test_what_is_wrong_is_one_line(call: Any, says: str, capsys: pytest.CaptureF
 
 
 def test_a_report_that_cannot_be_written(flight: plumbline.Flight) -> None:
-    with pytest.raises(plumbline.Error, match=r"^/dev/null/x: Not a directory$"):
+    with pytest.raises(plumbline.Error, match=r"^/dev/null/x: Not a directory; name another folder$"):
         flight.report("/dev/null/x")
 
 

@@ -51,7 +51,9 @@ def test_plain_lines_come_at_first_every_ten_seconds_and_at_the_end(
         assert lines(capsys) == [], "too early"
         clock.now_s += 7.0
         display.add(5, 5)
-        assert lines(capsys) == ["gcs: 20 of 40 flights flown, 90 % of them completed, 50.0 flights/min, 24 s remaining"]
+        assert lines(capsys) == [
+            "gcs: 20 of 40 flights flown, 90 % of them completed, 50.0 flights/min, 24 s remaining"
+        ]
         clock.now_s += 20.0
         display.add(0, 0)
         assert lines(capsys) == [], "nothing new"

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from gcs.cli import gcs
 from gcs.recorded.column_map import MAPS, MapError, load_map
-from gcs.recorded.recording import RecordingError, read_recording
+from gcs.recorded.recording import RecordingError, is_table, read_recording
 
 MAP = """
 time = 0
@@ -94,6 +94,51 @@ def test_rows_need_a_map(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert "--columns: motion-capture, telemetry or a file" in result.stderr
     assert "no [vehicle]" in run("identify", path, "--columns", "telemetry").stderr
+
+
+@pytest.mark.parametrize("command", ["identify", "replay"])
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("README.md", b"# Plumbline\nSays, with commas, how it is used\n"),
+        ("flight.parquet", b"PAR1\x15\x04\x15," * 50),
+        ("case-b.toml", b'name = "case-b"\n'),
+        ("torn.csv.gz", gzip.compress(rows().encode())[:12]),
+        ("empty.csv", b""),
+    ],
+)
+def test_a_file_of_another_kind_is_not_asked_for_its_columns(
+    tmp_path: Path, command: str, name: str, content: bytes
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    result = run(command, path)
+    assert result.exit_code == 2
+    assert f"{path}: no recording of a flight; must be a flight's folder" in result.stderr
+    assert "--columns" not in result.stderr
+
+
+def test_a_table_with_headings_is_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "flight.csv.gz"
+    path.write_bytes(gzip.compress(b"t,x,y\n0.0,1,2\n"))
+    assert is_table(path)
+
+
+@pytest.mark.parametrize("command", ["identify", "replay"])
+def test_a_flight_is_named_by_its_folder(tmp_path: Path, command: str) -> None:
+    result = run(command, tmp_path)
+    assert result.exit_code == 2
+    assert f"{tmp_path}: holds no flight.tlog; must be a flight's folder" in result.stderr
+    (tmp_path / "flight.tlog").write_bytes(b"")
+    assert f"gcs: {tmp_path / 'flight.tlog'}: " in run(command, tmp_path).stderr
+
+
+def test_a_map_of_rows_of_numbers_is_not_for_a_telemetry_log(tmp_path: Path) -> None:
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(b"")
+    result = run("identify", path, "--columns", "motion-capture")
+    assert result.exit_code == 2
+    assert f"{path} names its columns itself: leave --columns out" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from gcs.report.compare import (
     differences,
     figures,
     in_columns,
+    labels,
     load_run,
 )
 from gcs.report.overview import overview
@@ -65,6 +66,25 @@ def called(*arguments: object) -> tuple[int, str, str]:
 def test_what_differed_is_told_and_nothing_else(runs: list[Path]) -> None:
     found = {one.name: one.values for one in differences([loaded(run) for run in runs[:2]])}
     assert found == {"law": ("plumbline", "thesis"), "seed": ("1", "2"), "SIM_WIND_E": ("default", "2")}
+
+
+def test_flights_are_called_by_what_differs(runs: list[Path]) -> None:
+    base = replace(loaded(runs[0]), name="folder-1")
+
+    def other(name: str, **keys: object) -> Run:
+        record = {key: value for key, value in keys.items() if key != "settings"}
+        meta = replace(base.meta, settings=keys.get("settings", {}))  # type: ignore[arg-type]
+        return replace(base, name=name, meta=meta, record={**base.record, **record})
+
+    slow = other("folder-3", settings={"SIM_ACT_DELAY_MS": 72.0})
+    told = labels([base, other("folder-2", law="laws/mine.py:Mine"), slow])
+    assert told == ["plumbline", "mine.py:Mine", "plumbline, SIM_ACT_DELAY_MS=72"]
+    assert labels([base, slow]) == ["default settings", "SIM_ACT_DELAY_MS=72"]
+    assert labels([base, replace(base, name="folder-2")]) == ["folder-1", "folder-2"]
+    twice = labels([base, slow, replace(slow, name="folder-2")])
+    assert twice[1:] == ["SIM_ACT_DELAY_MS=72, folder-3", "SIM_ACT_DELAY_MS=72, folder-2"]
+    many = other("x", seed=7, law="thesis", settings={f"SIM_WIND_{axis}": 1.0 for axis in "NED"})
+    assert labels([base, many])[1] == "thesis, seed 7, SIM_WIND_D=1 and 2 more"
 
 
 def test_the_best_is_the_best(runs: list[Path]) -> None:
@@ -158,6 +178,9 @@ def test_names_and_buttons_do_not_lie_over_each_other(
     folders = [tmp_path / f"case-b-20260301-10000{i}" for i in range(3)]
     for run, folder in zip(runs, folders, strict=True):
         shutil.copytree(run, folder)
+    meta = json.loads((folders[2] / "meta.json").read_text())
+    meta["settings"] = {"SIM_ACT_DELAY_MS": 72.0, "SIM_NOISE_SCALE": 2.0, "SIM_SENS_LAT_MS": 12.5}
+    (folders[2] / "meta.json").write_text(json.dumps(meta))  # a long name
     page = tmp_path / "page.html"
     assert called(*folders, "--quiet", "--out", page)[0] == 0
     browser.open(page.as_uri(), width=width)
@@ -172,6 +195,11 @@ def test_names_and_buttons_do_not_lie_over_each_other(
     (left, right, top, bottom), (other_left, other_right, other_top, other_bottom) = boxes
     assert right <= other_left or other_right <= left or bottom <= other_top or other_bottom <= top
     assert all(box[0] >= 0 and box[1] <= width for box in boxes)
+    heights = browser.run(
+        "const names = [...document.querySelectorAll('.readings dt')];"
+        "return names.map((one) => one.getBoundingClientRect().height)"
+    )
+    assert max(heights[1:]) < 1.5 * min(heights[1:]), "a name wraps"
 
 
 def test_the_command_prints_json_and_makes_the_page(runs: list[Path], tmp_path: Path) -> None:
@@ -213,7 +241,9 @@ def test_the_page_shows_all_and_runs_nothing_it_was_given(
     assert browser.run("return replay.stage.scene.crafts.size") == 3
     assert browser.run("return replay.stage.scene.tracks.size") == 3
     names = browser.run("return document.querySelector('.chart-head').textContent")
-    assert all(run.name in names for run in runs)
+    assert all(label in names for label in labels([loaded(run) for run in runs]))
+    folders = browser.run("return document.querySelector('.runs').textContent")
+    assert all(run.name in folders for run in runs)
     assert browser.run("return typeof window.hostile") == "undefined"
     assert browser.run("return document.querySelectorAll('td.best').length") > 3
     browser.listen()

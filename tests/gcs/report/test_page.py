@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -190,6 +191,43 @@ def test_nothing_stands_out_of_the_window(browser: Browser, case_b: Path, width:
     browser.open(case_b.as_uri(), width, 800, "light")
     browser.wait(READY)
     assert browser.run("return document.documentElement.scrollWidth") <= width
+
+
+def test_nothing_over_the_scene_lies_on_anything_else(page: Browser) -> None:
+    for width in (360, 500, 800, 1280):
+        page.resize(width, 800)
+        boxes = page.run(
+            """return [".scene-legend", ".cameras", ".readings", ".timeline"].map((one) => {
+                const { left, right, top, bottom } = document.querySelector(one).getBoundingClientRect();
+                return [one, left, right, top, bottom];
+            })"""
+        )
+        assert all(right > left and bottom > top for _, left, right, top, bottom in boxes)
+        over = [
+            (one[0], other[0])
+            for one, other in combinations(boxes, 2)
+            if min(one[2], other[2]) > max(one[1], other[1]) and min(one[4], other[4]) > max(one[3], other[3])
+        ]
+        assert not over, width
+
+
+def test_labels_of_an_axis_fit_beside_it(page: Browser) -> None:
+    for ticks, labels in (
+        ([0, 0.00005, 0.0001, 0.00015], ["0", "0.5·10⁻⁴", "1·10⁻⁴", "1.5·10⁻⁴"]),
+        ([0, 0.0005, 0.001], ["0", "0.0005", "0.001"]),
+        ([-0.5, 0, 0.5], ["-0.5", "0", "0.5"]),
+        ([0, 1500000], ["0", "1.5·10⁶"]),
+        ([0], ["0"]),
+    ):
+        assert page.run("return Plumbline.tickLabels(arguments[0])", ticks) == labels
+        most, place = page.run(
+            """const context = document.createElement("canvas").getContext("2d");
+            context.font = "11px system-ui, sans-serif";
+            const { size, gap } = replay.group.charts[0].plot.axes[1];
+            return [Math.max(...arguments[0].map((one) => context.measureText(one).width)), size() - gap]""",
+            labels,
+        )
+        assert most <= place
 
 
 def test_no_cable_is_drawn_to_a_load_that_was_let_go(browser: Browser, delivered: Path) -> None:

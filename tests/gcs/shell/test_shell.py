@@ -22,8 +22,9 @@ from autopilot.wire.tlog import TlogWriter
 from gcs.clients.capture import Capture
 from gcs.clients.flight import FlightClient, Progress, Stage
 from gcs.errors import GcsError, NoVehicleError
+from gcs.shell import display as display_module
 from gcs.shell import processes as processes_module
-from gcs.shell.display import FlightDisplay, say, to_reader
+from gcs.shell.display import FlightDisplay, StepDisplay, say, to_reader
 from gcs.shell.link import Address, AddressError, UdpSocket, free_port, open_address, parse_address, wait
 from gcs.shell.processes import Processes
 from gcs.shell.stopping import StopRequest
@@ -255,6 +256,19 @@ def test_items_are_counted_as_mavlink_counts_them(capsys):
     with FlightDisplay("test", quiet=False) as display:
         display.update(progress)
     assert capsys.readouterr().err == "gcs:   12.0 s  mission  item 3/6\n"
+
+
+def test_a_long_step_says_where_no_bar_can_be_that_it_works(monkeypatch, capsys):
+    now_s = [100.0]
+    monkeypatch.setattr(display_module.time, "monotonic", lambda: now_s[0])
+    with StepDisplay("fitting", long=True) as display:
+        for done, at_s in enumerate((100.2, 101.0, 105.0, 112.0), 1):
+            now_s[0] = at_s
+            display.update(done, 4)
+    assert capsys.readouterr().err == "gcs: fitting: 2 of 4\ngcs: fitting: 4 of 4\n"
+    with StepDisplay("fitting") as short:
+        short.update(1, 4)
+    assert capsys.readouterr().err == ""
 
 
 def test_an_autopilot_that_dies_in_flight_is_an_outcome(new_world, items, tmp_path):

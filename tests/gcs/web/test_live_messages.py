@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 import pytest
 
+import gcs.web
 from gcs.web import asset
 from tests.doubles.browser import Browser
 
@@ -27,3 +29,39 @@ def test_a_text_that_fits_stands_in_one_line(browser: Browser, tmp_path: Path, b
         return new Set([...range.getClientRects()].map((line) => Math.round(line.top))).size"""
     )
     assert lines == 1
+
+
+SHOWN = """
+const put = (id, text) => {
+  const box = document.getElementById(id);
+  box.textContent = text;
+  box.hidden = false;
+};
+put("mission", "Case B: a sine of growing and shrinking amplitude");
+put("phase", "mission, item 3, cable slack");
+put("about", "law plumbline · sensors lab · vehicle bebop · seed 1 · 4.2 x real time");
+put("wind", "wind 3.0 m/s");
+put("toast", arguments[0]);
+put("hint", "Click: go there · drag: turn · wheel: zoom");
+const legend = document.querySelector(".scene-legend");
+legend.style.display = "block";
+const seen = ["title", "about", "cameras", "wind", "toast", "hint"].map((id) => document.getElementById(id));
+return [...seen, legend].filter((one) => getComputedStyle(one).display !== "none").map((one) => {
+  const { left, right, top, bottom } = one.getBoundingClientRect();
+  return [one.id || one.className, left, right, top, bottom];
+});
+"""
+
+
+def test_nothing_over_the_picture_lies_on_anything_else(browser: Browser) -> None:
+    browser.open((Path(gcs.web.__file__).with_name("live.html")).as_uri())
+    browser.wait("document.querySelector('.scene-legend') !== null")
+    for width in (360, 500, 800, 1280):
+        browser.resize(width, 800)
+        boxes = browser.run(SHOWN, TEXT)
+        over = [
+            (one[0], other[0])
+            for one, other in combinations(boxes, 2)
+            if min(one[2], other[2]) > max(one[1], other[1]) and min(one[4], other[4]) > max(one[3], other[3])
+        ]
+        assert not over, width

@@ -147,7 +147,7 @@ def test_the_path_is_coloured_by_the_error_and_the_legend_tells_the_scale(page: 
     )
     assert early[2] > early[0] + 60  # blue
     assert late[0] > late[2] + 60  # vermilion
-    assert text.endswith("20 cm")
+    assert text.endswith("200 mm")
 
 
 def test_a_path_that_grows_shows_its_legend_with_the_first_error_and_widens_the_scale(page: Browser) -> None:
@@ -165,8 +165,8 @@ def test_a_path_that_grows_shows_its_legend_with_the_first_error_and_widens_the_
         scene.render();
         scene.clearTrack(1);
         tell();
-        return seen.map((text) => text.slice(-5))"""
-    ) == ["", "02 cm", "50 cm", ""]
+        return seen.map((text) => text.slice(-6))"""
+    ) == ["", "020 mm", "500 mm", ""]
     page.listen()
     assert page.errors == []
 
