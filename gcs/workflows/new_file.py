@@ -16,7 +16,6 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from gcs.errors import GcsError, InputError
-from gcs.folders import make_folder
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 _FLY_IT = re.compile(r"^\W*Fly it:\s+(\S.*)$", re.MULTILINE)
@@ -63,7 +62,10 @@ def new_file(kind: str, name: str) -> NewFile:
     path = given.with_name(stem + suffix)
     text = _template(kind + suffix).replace(f"my_name{suffix}", str(path))
     text = text.replace("my_name", stem).replace("MyName", _class_name(stem))
-    make_folder(path.parent, str(path))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)

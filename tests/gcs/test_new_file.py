@@ -102,7 +102,7 @@ def test_a_name_may_lead_into_a_folder_and_have_its_ending() -> None:
         (
             ("mission", "/dev/null/such"),
             EXIT_ERROR,
-            "/dev/null/such.toml: File exists",
+            "/dev/null/such.toml: cannot be written: File exists",
         ),
         (("aeroplane", "mine"), EXIT_USAGE, "'aeroplane' is not one of"),
     ],
