@@ -69,7 +69,7 @@ def _source(module: str, root: Path) -> Path | None:
 def _data(package: Path) -> Iterator[Path]:
     """What lies beside the code of a package, and in its folders that hold no code."""
     for path in package.iterdir():
-        if path.name.startswith("."):
+        if path.name.startswith(".") or path.name == "__pycache__":
             continue
         if path.is_file() and path.suffix not in _NO_DATA:
             yield path

@@ -63,7 +63,8 @@ class BatchDisplay(LiveBars):
         if not self.flown:
             return "flights, the first are on their way" if self.elapsed_s > _FIRST_S else "flights"
         flights_per_s = self.flown / max(self.elapsed_s, 1e-3)
-        return f"flights flown, {100.0 * self.completed / self.flown:.0f} % of them completed, {pace(flights_per_s)}"
+        share = f"{100.0 * self.completed / self.flown:.0f} % of them completed"
+        return f"flights flown, {share}, {pace(flights_per_s)}"
 
     def _line(self, running: Running) -> str:
         self._told = self.flown

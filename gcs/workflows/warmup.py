@@ -57,7 +57,7 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
         unkept = why_not_kept()
         if unkept:
             say(
-                f"what is compiled cannot be kept ({unkept}), and is compiled anew by every command; "
+                f"what is compiled cannot be kept ({unkept}), so that every command begins with it; "
                 "XDG_CACHE_HOME=FOLDER names a folder that can be written"
             )
         once = "" if unkept else ", once"

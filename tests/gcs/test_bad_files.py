@@ -189,7 +189,7 @@ def test_a_mission_is_checked_with_a_planner() -> None:
     words = ["check", "square", "--planner", "plumbline.examples.minimum_snap:MinimumSnap", "--json"]
     found = json.loads(CliRunner().invoke(gcs, words).stdout)
     assert not found["violations"]
-    assert [path["item"] for path in found["paths"]] == [2, 3, 4, 5]
+    assert [path["item"] for path in found["paths"]] == [0, 2, 3, 4, 5]
 
     Path("mine.py").write_text(planner("raise SystemExit(3)"), encoding="utf-8")
     code, line = told_of("check", "square", "--planner", "mine.py:Mine")
