@@ -43,7 +43,7 @@ def columns(tmp_path: Path) -> Path:
 
 def test_columns_are_taken_as_the_map_says(tmp_path: Path, columns: Path) -> None:
     path = tmp_path / "flight.csv.gz"
-    path.write_bytes(gzip.compress(rows().encode()))
+    path.write_bytes(gzip.compress(rows().encode(), mtime=0))
     found = read_recording(path, load_map(columns))
     assert found.name == "flight"
     assert found.time_s is not None
@@ -81,7 +81,7 @@ def test_a_broken_file_is_told_in_one_line(
 
 def test_a_torn_archive_and_a_file_that_is_not_there(tmp_path: Path, columns: Path) -> None:
     torn = tmp_path / "flight.csv.gz"
-    torn.write_bytes(gzip.compress(rows().encode())[:100])
+    torn.write_bytes(gzip.compress(rows().encode(), mtime=0)[:100])
     for path in (torn, tmp_path / "nothing.csv", tmp_path, tmp_path / "nothing.tlog"):
         with pytest.raises(RecordingError, match=str(path)):
             read_recording(path, load_map(columns))
@@ -103,7 +103,7 @@ def test_rows_need_a_map(tmp_path: Path) -> None:
         ("README.md", b"# Plumbline\nSays, with commas, how it is used\n"),
         ("flight.parquet", b"PAR1\x15\x04\x15," * 50),
         ("case-b.toml", b'name = "case-b"\n'),
-        ("torn.csv.gz", gzip.compress(rows().encode())[:12]),
+        ("torn.csv.gz", gzip.compress(rows().encode(), mtime=0)[:12]),
         ("empty.csv", b""),
     ],
 )
