@@ -61,7 +61,7 @@ from autopilot.shell.tick_loop import NOTHING, Met, TickLoop, rehearse
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
@@ -78,6 +78,12 @@ _LOG_BYTES = 32_768  # of the flight log that are stored at once
 
 
 SIMULATOR_RESTARTED = "Simulator restarted, vehicle on the ground: disarmed"
+
+
+def turned_away(datagram: bytes) -> str:
+    """What a simulator says to an autopilot that it does not serve, and what to do; else empty."""
+    said = [one.message.text for one in decode(datagram)[0] if one.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT]
+    return f"{said[-1]}; end that one, or start another sitl (--listen, --sim)" if said else ""
 
 
 class Program:
@@ -140,7 +146,7 @@ class Program:
         """Tick for ever."""
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
-        silent, lost, beaten = True, False, 0.0
+        silent, lost, beaten, refused = True, False, 0.0, ""
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         receive_from_simulator = self._socket.recv
@@ -207,6 +213,9 @@ class Program:
                 self.take_areas(areas)
                 self._ground.join(self.onboard)
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
+            elif silent and (why := turned_away(datagram)) not in ("", refused):
+                refused = why
+                self._say(f"the simulator at {shown(self._simulator)} does not serve this one: {why}")
 
     def _run_on(self, ticks: TickLoop) -> Met:
         """Fly ticks without Python, if the next are such and the ground station shares our clock."""
