@@ -29,7 +29,7 @@ from autopilot.wire.items import WireItem
 from gcs.clients import command
 from gcs.clients.connection import LINK_TIMEOUT_US, Connection
 from gcs.clients.missions import MissionUpload
-from gcs.clients.operation import Operation, Status
+from gcs.clients.operation import Operation, Result, Status
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
 
@@ -219,10 +219,10 @@ class FlightClient:
             if result is None:
                 return False
             if result.status is Status.REFUSED:
-                self._refused(row, result.text, now_us)
+                self._refused(row, result, now_us)
                 return True
             if result.status is Status.UNANSWERED:
-                self._end(Outcome("lost", result.text))
+                self._end(Outcome("lost", result.silence(self.connection.signatures.trouble)))
                 return True
             self._operations.pop(0)
             return True
@@ -242,12 +242,12 @@ class FlightClient:
             return True
         return False
 
-    def _refused(self, row: Row, text: str, now_us: int) -> None:
+    def _refused(self, row: Row, result: Result, now_us: int) -> None:
         if row.refused is row.after:  # the flight goes on without it
             self._operations.pop(0)
             return
         reasons = self.view.complaints_since(self._texts_before)
-        outcome = self._pending or Outcome("refused", "; ".join([text, *reasons]))
+        outcome = self._pending or Outcome("refused", result.refusal(reasons))
         if row.refused is Stage.OVER:
             self._end(outcome)
         else:

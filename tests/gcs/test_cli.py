@@ -339,7 +339,7 @@ def test_a_refusal_is_one_line_with_the_reason(live):
 
     vehicle.on_command_long = refuse
     line = one_line(run("disarm", "--connect", port), EXIT_ERROR)
-    assert line == "gcs: disarm: denied; Disarming denied: in the air"
+    assert line == "gcs: Disarming denied: in the air"
 
 
 def test_a_vehicle_that_stops_answering_is_one_line(live, monkeypatch):

@@ -150,7 +150,7 @@ def test_arming_refused(world, fly):
     vehicle.on_command_long = with_reason
     client, _ = fly()
     assert client.outcome.name == "refused"
-    assert client.outcome.reason == "arm: denied; Arming denied: load not on the ground"
+    assert client.outcome.reason == "Arming denied: load not on the ground"
 
 
 def test_never_ready(world, fly):
