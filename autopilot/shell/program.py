@@ -35,6 +35,8 @@ from autopilot.services.records import (
 from autopilot.shell.compiling import ONCE, OWN, autopilot_parts, ready
 from autopilot.shell.ground import AutopilotError, GroundInStep, GroundStations, listen, open_socket
 from autopilot.shell.options import (
+    EXIT_ERROR,
+    EXIT_USAGE,
     LARGEST_DATAGRAM,
     Address,
     NamedPath,
@@ -43,6 +45,7 @@ from autopilot.shell.options import (
     StopRequest,
     address_option,
     be_punctual,
+    complain,
     home_option,
     reason,
     send,
@@ -338,7 +341,7 @@ def _begin_signing(kept: Storage, key: bytes) -> None:
 
 
 def _address_or_none(text: str) -> Address | None:
-    """HOST:PORT or `none`."""
+    """PORT, HOST:PORT or `none`."""
     return None if text == "none" else address_option(text)
 
 
@@ -346,7 +349,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--sim",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     default="127.0.0.1:4560",
     show_default=True,
     help="Where the simulator listens.",
@@ -354,7 +357,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--gcs",
     type=_address_or_none,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     multiple=True,
     default=("127.0.0.1:14550",),
     show_default=True,
@@ -363,7 +366,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--api",
     type=_address_or_none,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     multiple=True,
     default=("127.0.0.1:14540",),
     show_default=True,
@@ -372,13 +375,13 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--tcp",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     help="Listen here for ground stations that connect by TCP, as 127.0.0.1:5760.",
 )
 @click.option(
     "--ground-lockstep",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     help="One ground station that shares our clock, in place of --gcs and --api.",
 )
 @click.option(
@@ -517,9 +520,12 @@ def main(
         be_punctual(real_time=not in_step)
         with StopRequest() as stop, watched_calls(not in_step) if any(own) else nullcontext():
             program.run(stop)
-    except (AutopilotError, OwnError, VehicleFileError, ParameterError, StorageError) as error:
-        print(f"autopilot: {error}", file=sys.stderr)
-        sys.exit(1)
+    except VehicleFileError as error:
+        sys.exit(complain("autopilot", EXIT_USAGE, *error.problems))
+    except (OwnError, ParameterError) as error:
+        sys.exit(complain("autopilot", EXIT_USAGE, str(error)))
+    except (AutopilotError, StorageError) as error:
+        sys.exit(complain("autopilot", EXIT_ERROR, str(error)))
     except Stop:
         pass
     finally:
