@@ -11,7 +11,10 @@ import click
 
 from autopilot.shell.compiling import ONCE, SIMULATOR
 from autopilot.shell.options import (
+    EXIT_ERROR,
+    EXIT_USAGE,
     MOST_SEED,
+    MOST_SPEED,
     Address,
     ProgramCommand,
     Stop,
@@ -19,15 +22,17 @@ from autopilot.shell.options import (
     WholeNumber,
     address_option,
     be_punctual,
+    complain,
     home_option,
     setting_option,
     shown,
 )
-from autopilot.vehicle.file import VEHICLES
+from autopilot.vehicle.file import VEHICLES, VehicleFileError
 from autopilot.wire.convert import Home
+from autopilot.wire.parameter_table import ParameterError
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing
-from sitl.sensors.shipped import PROFILES
+from sitl.sensors.shipped import PROFILES, ProfileError
 from sitl.shell.autopilots import AUTOPILOTS, PLUMBLINE, parameter_file
 from sitl.shell.link import Link
 from sitl.shell.loops import SPIN_NS, meet, run_lockstep, run_real_time
@@ -38,7 +43,8 @@ def _run_on(cpu: int) -> None:
     try:
         os.sched_setaffinity(0, {cpu})
     except (AttributeError, OSError):
-        raise ValueError(f"cannot run on core {cpu}; leave --cpu out, or name another core") from None
+        text = f"--cpu {cpu}: cannot run on this core; leave --cpu out, or name another"
+        raise click.UsageError(text) from None
 
 
 @click.command("sitl", cls=ProgramCommand, context_settings={"help_option_names": ["-h", "--help"]})
@@ -69,9 +75,9 @@ def _run_on(cpu: int) -> None:
 )
 @click.option(
     "--speed",
-    type=click.FloatRange(0.0, 1000.0, min_open=True),
+    type=click.FloatRange(0.0, MOST_SPEED, min_open=True),
     metavar="NUMBER",
-    help="Simulated seconds per second, at most.  [default: 1; with --lockstep: no limit]",
+    help="Simulated seconds per second, at most.  [default: 1]",
 )
 @click.option("--lockstep", is_flag=True, help="As fast as the autopilot answers.")
 @click.option(
@@ -82,13 +88,13 @@ def _run_on(cpu: int) -> None:
 @click.option(
     "--listen",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     help="Where to listen for autopilots.  [default: 127.0.0.1:4560; for ardupilot and betaflight :9002]",
 )
 @click.option(
     "--truth",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     default="127.0.0.1:14560",
     show_default=True,
     help="Where to send the true state, for logs and reports.",
@@ -139,8 +145,9 @@ def main(
     third-party autopilots as they want it). The world waits for the answer to every tick: on a busy machine
     its clock is slower, and nothing is lost.
     """
-    if lockstep and real_time:
-        raise click.UsageError("--lockstep and --real-time exclude each other")
+    if lockstep and (real_time or speed is not None):
+        other = "--real-time" if real_time else "--speed"
+        raise click.UsageError(f"--lockstep and {other} exclude each other")
     kind = AUTOPILOTS[interface]
     if parameters:
         if kind.run is None:
@@ -171,7 +178,6 @@ def main(
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to bring to an end
     link: Link | None = None
     factor = 1.0 if speed is None else speed
-    unlimited = lockstep and speed is None
     pacing = Pacing(factor)
     simulator: HilSimulator | None = None
     try:
@@ -205,7 +211,7 @@ def main(
             _run_on(cpu)
         # where it would wait spinning for most of the time, it would keep others from their work
         be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
-        mode = "in lockstep" if unlimited else f"at {factor:g} x real time, waiting where that is too fast"
+        mode = "in lockstep" if lockstep else f"at {factor:g} x real time, waiting where that is too fast"
         if real_time:
             mode = f"at {factor:g} x real time, waiting for nobody"
         say(
@@ -213,7 +219,7 @@ def main(
             f"waiting for {kind.awaited} on {shown(listen)}"
         )
         with StopRequest() as stop:
-            paced = None if unlimited else pacing
+            paced = None if lockstep else pacing
             if kind.run is not None:
                 kind.run(link, simulator, stop, say, paced)
                 return
@@ -230,9 +236,12 @@ def main(
                 )
             else:
                 run_lockstep(link, simulator, stop, say, paced)
+    except (VehicleFileError, ProfileError) as error:
+        sys.exit(complain("sitl", EXIT_USAGE, *error.problems))
+    except ParameterError as error:
+        sys.exit(complain("sitl", EXIT_USAGE, str(error)))
     except ValueError as error:
-        print(f"sitl: {error}", file=sys.stderr)
-        sys.exit(1)
+        sys.exit(complain("sitl", EXIT_ERROR, str(error)))
     except Stop:
         pass
     finally:

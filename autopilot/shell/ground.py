@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import time
 from collections import deque
@@ -53,7 +54,10 @@ def listen(address: Address) -> TcpServer:
     try:
         return TcpServer(address)
     except OSError as error:
-        raise AutopilotError(f"TCP clients {shown(address)}: {reason(error)}") from None
+        busy = "is another autopilot running? " if error.errno == errno.EADDRINUSE else ""
+        raise AutopilotError(
+            f"cannot listen on TCP {shown(address)}: {reason(error)}; {busy}choose another with --tcp"
+        ) from None
 
 
 def _is_loopback(host: str) -> bool:

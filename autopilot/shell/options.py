@@ -10,7 +10,7 @@ import signal
 import socket
 import struct
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TextIO, cast
@@ -24,6 +24,9 @@ Address = tuple[str, int]
 
 LARGEST_DATAGRAM = 65535
 MOST_SEED = 2**63 - 1
+EXIT_ERROR, EXIT_USAGE = 1, 2  # of the latter the fault is the command line's, or a file's that it names
+MOST_SPEED = 1000.0  # times the wall clock
+_THIS_MACHINE = "127.0.0.1"
 _PR_SET_TIMERSLACK = 29
 
 
@@ -39,6 +42,13 @@ class ProgramCommand(click.Command):
             print(f"{self.name}: {usage_text(error)}", file=sys.stderr)
             sys.exit(error.exit_code)
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def complain(program: str, exit_code: int, *lines: str) -> int:
+    """Tell why a program ends, a line for each thing that is wrong; the exit code."""
+    for line in lines:
+        print(f"{program}: {line}", file=sys.stderr)
+    return exit_code
 
 
 def usage_text(error: click.UsageError) -> str:
@@ -180,7 +190,10 @@ def datagram_socket(address: Address) -> socket.socket:
 
 
 def reason(error: OSError) -> str:
-    """What the system says of an error, in words."""
+    """What the system says of an error, in words, without what Python adds of the call (its `strerror`)."""
+    is_of_system = not isinstance(error, socket.gaierror)
+    if error.errno is not None and error.errno in errno.errorcode and is_of_system:
+        return os.strerror(error.errno).lower()
     return error.strerror.lower() if error.strerror else str(error)
 
 
@@ -207,11 +220,11 @@ def be_punctual(real_time: bool) -> None:
 
 
 def address_option(text: str) -> Address:
-    """HOST:PORT."""
-    host, _, port = text.rpartition(":")
-    if not (host and port.isdecimal() and 0 < int(port) < 65536):
-        raise click.BadParameter(f"{text!r}; must be HOST:PORT with a port of 1 ... 65535")
-    return host.strip("[]"), int(port)
+    """PORT of this machine, or HOST:PORT."""
+    host, colon, port = text.rpartition(":")
+    if not (bool(host) == bool(colon) and port.isdecimal() and 0 < int(port) < 65536):
+        raise click.BadParameter(f"{text!r}; must be PORT or HOST:PORT, with a port of 1 ... 65535")
+    return host.strip("[]") or _THIS_MACHINE, int(port)
 
 
 def home_option(text: str) -> Home:
@@ -243,3 +256,16 @@ def setting_option(text: str) -> tuple[str, float]:
         return name.strip().upper(), float(value)
     except ValueError:
         raise click.BadParameter(f"{text!r}; must be NAME=VALUE with a number") from None
+
+
+def unknown_setting(name: str, names: Iterable[str]) -> str:
+    """That it is none of these names, and what is meant: where several go on where it ends (SIM_WIND), all of
+    them, as none is nearer than the others; else as `unknown_parameter`."""
+    from autopilot.wire.parameter_names import unknown_parameter  # in case of need alone
+
+    known = sorted(names)
+    longer = [one for one in known if "_" in name and one.startswith(f"{name}_")]
+    if len(longer) < 2:
+        return unknown_parameter(name, known)
+    several = f"{', '.join(longer[:-1])} or {longer[-1]}"
+    return f"{name}: no such parameter; did you mean {several}? docs/parameters.md lists all"

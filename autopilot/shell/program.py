@@ -35,6 +35,8 @@ from autopilot.services.records import (
 from autopilot.shell.compiling import ONCE, OWN, autopilot_parts, ready
 from autopilot.shell.ground import AutopilotError, GroundInStep, GroundStations, listen, open_socket
 from autopilot.shell.options import (
+    EXIT_ERROR,
+    EXIT_USAGE,
     LARGEST_DATAGRAM,
     Address,
     NamedPath,
@@ -43,6 +45,7 @@ from autopilot.shell.options import (
     StopRequest,
     address_option,
     be_punctual,
+    complain,
     home_option,
     reason,
     send,
@@ -61,7 +64,7 @@ from autopilot.shell.tick_loop import NOTHING, Met, TickLoop, rehearse
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
-from autopilot.wire.codec import FrameWriter
+from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
@@ -78,6 +81,12 @@ _LOG_BYTES = 32_768  # of the flight log that are stored at once
 
 
 SIMULATOR_RESTARTED = "Simulator restarted, vehicle on the ground: disarmed"
+
+
+def turned_away(datagram: bytes) -> str:
+    """What a simulator says to an autopilot that it does not serve, and what to do; else empty."""
+    said = [one.message.text for one in decode(datagram)[0] if one.id == mavlink.MAVLINK_MSG_ID_STATUSTEXT]
+    return f"{said[-1]}; end that one, or start another sitl (--listen, --sim)" if said else ""
 
 
 class Program:
@@ -140,7 +149,7 @@ class Program:
         """Tick for ever."""
         set_timeout(self._socket, _GREETING_S)
         heard = time.monotonic()
-        silent, lost, beaten = True, False, 0.0
+        silent, lost, beaten, refused = True, False, 0.0, ""
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         receive_from_simulator = self._socket.recv
@@ -207,6 +216,9 @@ class Program:
                 self.take_areas(areas)
                 self._ground.join(self.onboard)
                 self.onboard.endpoint.say(mavlink.MAV_SEVERITY_CRITICAL, SIMULATOR_RESTARTED)
+            elif silent and (why := turned_away(datagram)) not in ("", refused):
+                refused = why
+                self._say(f"the simulator at {shown(self._simulator)} does not serve this one: {why}")
 
     def _run_on(self, ticks: TickLoop) -> Met:
         """Fly ticks without Python, if the next are such and the ground station shares our clock."""
@@ -329,7 +341,7 @@ def _begin_signing(kept: Storage, key: bytes) -> None:
 
 
 def _address_or_none(text: str) -> Address | None:
-    """HOST:PORT or `none`."""
+    """PORT, HOST:PORT or `none`."""
     return None if text == "none" else address_option(text)
 
 
@@ -337,7 +349,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--sim",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     default="127.0.0.1:4560",
     show_default=True,
     help="Where the simulator listens.",
@@ -345,7 +357,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--gcs",
     type=_address_or_none,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     multiple=True,
     default=("127.0.0.1:14550",),
     show_default=True,
@@ -354,7 +366,7 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--api",
     type=_address_or_none,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     multiple=True,
     default=("127.0.0.1:14540",),
     show_default=True,
@@ -363,13 +375,13 @@ def _address_or_none(text: str) -> Address | None:
 @click.option(
     "--tcp",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     help="Listen here for ground stations that connect by TCP, as 127.0.0.1:5760.",
 )
 @click.option(
     "--ground-lockstep",
     type=address_option,
-    metavar="HOST:PORT",
+    metavar="[HOST:]PORT",
     help="One ground station that shares our clock, in place of --gcs and --api.",
 )
 @click.option(
@@ -508,9 +520,12 @@ def main(
         be_punctual(real_time=not in_step)
         with StopRequest() as stop, watched_calls(not in_step) if any(own) else nullcontext():
             program.run(stop)
-    except (AutopilotError, OwnError, VehicleFileError, ParameterError, StorageError) as error:
-        print(f"autopilot: {error}", file=sys.stderr)
-        sys.exit(1)
+    except VehicleFileError as error:
+        sys.exit(complain("autopilot", EXIT_USAGE, *error.problems))
+    except (OwnError, ParameterError) as error:
+        sys.exit(complain("autopilot", EXIT_USAGE, str(error)))
+    except (AutopilotError, StorageError) as error:
+        sys.exit(complain("autopilot", EXIT_ERROR, str(error)))
     except Stop:
         pass
     finally:

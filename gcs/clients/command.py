@@ -54,7 +54,7 @@ class CommandOperation:
             return
         text = f"{self.name}: {_RESULTS.get(message.result, f'result {message.result}')}"
         accepted = message.result == mavlink.MAV_RESULT_ACCEPTED
-        self.result = Result(Status.DONE if accepted else Status.REFUSED, text)
+        self.result = Result(Status.DONE if accepted else Status.REFUSED, text, self.name)
 
     def poll(self, now_us: int) -> list[Any]:
         if self.result is not None or not self._retry.due(now_us):

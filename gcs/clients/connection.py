@@ -9,6 +9,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Sign, Signing
 from gcs.clients.datagrams import messages
 from gcs.clients.operation import GROUND, Target
+from gcs.clients.signatures import Signatures
 
 HEARTBEAT_US = 1_000_000
 LINK_TIMEOUT_US = 5_000_000
@@ -19,8 +20,8 @@ class Connection:
     """Learns the vehicle from its first heartbeat and hears no other system from then on."""
 
     def __init__(self, link_timeout_us: int = LINK_TIMEOUT_US) -> None:
-        self._signing: Signing | None = None
         self._sign: Sign | None = None
+        self.signatures = Signatures()
         self.target: Target | None = None
         self.junk_bytes = 0
         self._link_timeout_us = link_timeout_us
@@ -30,7 +31,7 @@ class Connection:
 
     def sign_with(self, signing: Signing) -> None:
         """From now on our frames are signed, and of the vehicle only signed ones are heard."""
-        self._signing = signing
+        self.signatures = Signatures(signing)
         self._sign = signing.signer(0)
 
     def receive(self, datagram: bytes, now_us: int) -> list[Received]:
@@ -39,16 +40,16 @@ class Connection:
         self.junk_bytes += junk
         ours = []
         for one in received:
-            if self._signing is not None and not self._signing.accepts(
-                one.frame, one.id, one.system, one.component
-            ):
+            if self.target is not None and one.system != self.target.system:
+                continue
+            if not self.signatures.accepts(one):
                 continue
             if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and is_vehicle(one.message):
                 if self.target is None:
                     self.target = Target(one.system, one.component)
                 if self.target == (one.system, one.component):
                     self._heard_us = now_us
-            if self.target is not None and one.system == self.target.system:
+            if self.target is not None:
                 ours.append(one)
         return ours
 

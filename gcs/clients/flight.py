@@ -29,7 +29,7 @@ from autopilot.wire.items import WireItem
 from gcs.clients import command
 from gcs.clients.connection import LINK_TIMEOUT_US, Connection
 from gcs.clients.missions import MissionUpload
-from gcs.clients.operation import Operation, Status
+from gcs.clients.operation import Operation, Result, Status
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
 
@@ -134,6 +134,11 @@ class FlightClient:
         self._was_armed = False
         self._was_airborne = False
         self._mission_over = False
+        self._by_hand = False  # somebody leads the flight through us
+        self._beat: bytes | None = None  # the last heartbeat that was watched
+        self._in_mission = False  # the vehicle has flown the mission
+        self._left_for = ""  # the mode for which it has left the mission
+        self._texts_in_mission = 0  # that came while it flew the mission
         self._item_flown = 0  # the last one in the air
         self._setpoint: tuple[int, int] | None = None  # phase and item that were watched last
         self._given_up_us: int | None = None  # the vehicle's clock at the failure
@@ -191,6 +196,7 @@ class FlightClient:
     def fly_on(self) -> None:
         """Somebody leads the flight by hand: it may take as long as it likes."""
         self._limit_s = math.inf
+        self._by_hand = True
 
     def interrupt(self, reason: str = "stopped by the user") -> None:
         """End the flight from outside, if it is not over."""
@@ -219,10 +225,10 @@ class FlightClient:
             if result is None:
                 return False
             if result.status is Status.REFUSED:
-                self._refused(row, result.text, now_us)
+                self._refused(row, result, now_us)
                 return True
             if result.status is Status.UNANSWERED:
-                self._end(Outcome("lost", result.text))
+                self._end(Outcome("lost", result.silence(self.connection.signatures.trouble)))
                 return True
             self._operations.pop(0)
             return True
@@ -242,12 +248,12 @@ class FlightClient:
             return True
         return False
 
-    def _refused(self, row: Row, text: str, now_us: int) -> None:
+    def _refused(self, row: Row, result: Result, now_us: int) -> None:
         if row.refused is row.after:  # the flight goes on without it
             self._operations.pop(0)
             return
         reasons = self.view.complaints_since(self._texts_before)
-        outcome = self._pending or Outcome("refused", "; ".join([text, *reasons]))
+        outcome = self._pending or Outcome("refused", result.refusal(reasons))
         if row.refused is Stage.OVER:
             self._end(outcome)
         else:
@@ -291,6 +297,7 @@ class FlightClient:
         """Note what one message may have told and the next may hide."""
         view = self.view
         phase = view.phase
+        self._watch_mode()
         self._was_armed = self._was_armed or bool(view.armed)
         if phase is not None and phase not in _GROUND_PHASES and not self._was_airborne:
             self._was_airborne = True
@@ -310,6 +317,26 @@ class FlightClient:
             if reason:
                 self._pending = Outcome("diverged", reason)
                 self._given_up_us = view.time_us or 0
+
+    def _watch_mode(self) -> None:
+        """Note that the vehicle has left the mission, which we never ask for, and for what."""
+        view = self.view
+        beat = view.latest.frame(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+        if beat == self._beat or not view.armed:
+            return
+        self._beat = beat
+        if view.mode in _MISSION_MODES:
+            self._in_mission, self._left_for, self._texts_in_mission = True, "", len(view.texts)
+        elif self._in_mission:
+            self._left_for = view.mode or ""
+
+    def _who_ended_it(self) -> str:
+        """What made the vehicle leave the mission: the vehicle, if it says why, or else somebody else."""
+        if not self._left_for or self._by_hand:
+            return ""
+        said = self.view.complaints_since(self._texts_in_mission)
+        what = _ORDERS.get(self._left_for, f"mode {self._left_for}")
+        return "; ".join(said) or f"{what} commanded by another ground station"
 
     def _trouble(self) -> str:
         """Why the autopilot has given up, empty while it has not."""
@@ -347,9 +374,10 @@ class FlightClient:
             return Outcome("completed")
         if self._was_airborne:
             where = f"item {self._item_flown} of {len(self.items) - 1}"
-            return Outcome(
+            ended = Outcome(
                 "interrupted", f"the vehicle was disarmed before the end of the mission, at {where}"
             )
+            return ended.because(self._who_ended_it())
         reasons = self.view.complaints_since(self._texts_armed)
         return Outcome("refused", "; ".join(["the vehicle disarmed before take-off", *reasons]))
 
@@ -383,6 +411,8 @@ class FlightClient:
 
 
 _FAILSAFE = mavlink.PLUMBLINE_PHASE_FAILSAFE
+_MISSION_MODES = ("mission", "auto")  # of PX4 and of ArduPilot
+_ORDERS = {"land": "landing", "return": "return", "rtl": "return", "hold": "hold", "guided": "hold"}
 _GROUND_PHASES = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
 _WATCHED = frozenset(
     {

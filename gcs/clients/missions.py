@@ -73,7 +73,8 @@ class MissionUpload:
             self._restart()
         else:
             where = f"item {self._next - 1}" if self._next else "the mission"
-            self.result = Result(Status.REFUSED, f"{self._name}: {where} refused: {_result_text(result)}")
+            text = f"{self._name}: {where} refused: {_result_text(result)}"
+            self.result = Result(Status.REFUSED, text, self._name)
 
     def _restart(self) -> None:
         self._restarts += 1
@@ -209,7 +210,7 @@ class MissionClear:
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ACK:
             accepted = message.type == mavlink.MAV_MISSION_ACCEPTED
             text = "clear: accepted" if accepted else f"clear: refused: {_result_text(message.type)}"
-            self.result = Result(Status.DONE if accepted else Status.REFUSED, text)
+            self.result = Result(Status.DONE if accepted else Status.REFUSED, text, "clear")
 
     def poll(self, now_us: int) -> list[Any]:
         if self.result is not None or not self._retry.due(now_us):

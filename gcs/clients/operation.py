@@ -6,9 +6,14 @@ hands it each message of the vehicle and sends what `poll` returns.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
+
+_REFUSING = ("denied", "refused", "rejected", "mission item")  # in the words of vehicles
+
+_STEM = 3  # letters, by which the vehicle's word for a thing is known as ours
 
 
 class Target(NamedTuple):
@@ -28,14 +33,36 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Result:
-    """How an operation ended; `text` is for a person."""
+    """How an operation ended; `text` is for a person.
+
+    `subject`: what was asked of the vehicle, with which its own words of a refusal begin.
+    `guess`: why no answer came, perhaps, where nothing better is known.
+    """
 
     status: Status
     text: str
+    subject: str = ""
+    guess: str = ""
 
     @property
     def done(self) -> bool:
         return self.status is Status.DONE
+
+    def refusal(self, words: Sequence[str]) -> str:
+        """A refusal in the vehicle's own words, if it has given some; what else it has said follows."""
+        own = [one for one in words if self.subject and self._refuses(one)]
+        if not own:
+            return "; ".join([self.text, *words])
+        told = "; ".join([*own, *(one for one in words if one not in own)])
+        says_what = told.lower().startswith(self.subject[:_STEM].lower())  # arm: Arming denied ...
+        return told if says_what else f"{self.subject}: {told}"
+
+    def _refuses(self, words: str) -> bool:
+        return words.startswith(self.subject) or any(one in words.lower() for one in _REFUSING)
+
+    def silence(self, trouble: str) -> str:
+        """That no answer came, and why: `trouble` that is known of the link, or else a guess."""
+        return "; ".join(filter(None, (self.text, trouble or self.guess)))
 
 
 class Operation(Protocol):

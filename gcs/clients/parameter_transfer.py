@@ -93,7 +93,7 @@ class ParameterGet:
         error = _error(message, self.name)
         if error is not None:
             self.unknown = message.error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
-            self.result = Result(Status.REFUSED, error)
+            self.result = Result(Status.REFUSED, error, self.name)
         elif _is_value(message, self.name):
             self.value = from_the_wire(message.param_value, message.param_type)
             self.result = Result(Status.DONE, f"{self.name} = {self.value:.9g}")
@@ -102,8 +102,8 @@ class ParameterGet:
         if self.result is not None or not self._retry.due(now_us):
             return []
         if self._retry.exhausted:
-            text = f"{self.name}: no answer after {self._retry.sends} tries; has the vehicle this parameter?"
-            self.result = Result(Status.UNANSWERED, text)
+            text = f"{self.name}: no answer after {self._retry.sends} tries"
+            self.result = Result(Status.UNANSWERED, text, guess="has the vehicle this parameter?")
             return []
         self._retry.asked(now_us)
         return [mavlink.MAVLink_param_request_read_message(*self._target, _name_bytes(self.name), -1)]
@@ -131,7 +131,7 @@ class ParameterSet:
         error = _error(message, self.name)
         if error is not None:
             self.unknown = message.error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
-            self.result = Result(Status.REFUSED, error)
+            self.result = Result(Status.REFUSED, error, self.name)
         elif _is_value(message, self.name):
             held = from_the_wire(message.param_value, message.param_type)
             if float32(held) == self._value:
@@ -149,7 +149,7 @@ class ParameterSet:
                 self.result = Result(Status.UNANSWERED, text)
             else:
                 text = f"{self.name} = {wanted:.9g}: the vehicle keeps {self._held:.9g}"
-                self.result = Result(Status.REFUSED, text)
+                self.result = Result(Status.REFUSED, text, self.name)
             return []
         self._retry.asked(now_us)
         return [

@@ -73,8 +73,8 @@ class Truth:
             return ""
         if not self._worlds and self._run is not None:
             return (
-                f"the simulator that the vehicle flies in is silent at {where}: it stands still (SIGSTOP, a "
-                f"debugger), has ended, or tells its truth elsewhere; {_OTHER}"
+                f"nothing comes at {where}: the vehicle's own tells its truth to gcs fly alone, or elsewhere "
+                "(--truth PORT), or stands still"
             )
         if not self._worlds:
             return f"no simulator tells its truth at {where}; {_OTHER}"

@@ -22,10 +22,15 @@ from gcs.shell.link import Address
     type=PositiveType(),
     help="Stop after so many seconds.",
 )
+@click.option("--overwrite", is_flag=True, help="Even if --out is an earlier log: it is lost.")
 @connect_option
 @truth_option
 def capture_command(
-    out: Path | None, duration_s: float | None, address: Address, truth_at: Address | None
+    out: Path | None,
+    duration_s: float | None,
+    overwrite: bool,
+    address: Address,
+    truth_at: Address | None,
 ) -> None:
     """Capture telemetry until Ctrl-C.
 
@@ -33,5 +38,5 @@ def capture_command(
     """
     from gcs.workflows.capture import capture_to
 
-    path, records = capture_to(out, address, duration_s, truth_at)
+    path, records = capture_to(out, address, duration_s, truth_at, overwrite)
     click.echo(f"{records} messages captured to {path}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from autopilot.shell.options import MOST_SEED, WholeNumber
+from autopilot.shell.options import MOST_SEED, MOST_SPEED, WholeNumber
 from gcs.commands.options import (
     OUTPUT_FOLDER,
     AddressType,
@@ -63,7 +63,7 @@ _OWN = (
 @click.option("--lockstep", is_flag=True, help="As fast as possible, and reproducible to the byte (default).")
 @click.option(
     "--speed",
-    type=PositiveType(most=100.0),
+    type=PositiveType(most=MOST_SPEED),
     help="On the wall clock, so many times as fast; other ground stations may watch on 14550 and 14540.",
 )
 @click.option(

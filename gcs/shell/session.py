@@ -76,8 +76,15 @@ class Session:
 
     def find(self) -> Target:
         """Wait for the vehicle's heartbeat."""
-        self.watch(lambda: self.view.armed is not None, self._find_s, "waiting for the vehicle")
-        if self._connection.target is None or self.view.armed is None:
+        signatures = self._connection.signatures
+        self.watch(
+            lambda: self.view.armed is not None and signatures.met, self._find_s, "waiting for the vehicle"
+        )
+        if self._connection.target is None or self.view.armed is None or not signatures.met:
+            if signatures.trouble:
+                raise NoVehicleError(
+                    f"no vehicle that can be trusted on UDP {self.address}: {signatures.trouble}"
+                )
             other = 14540 if self.address.port != 14540 else 14550
             raise NoVehicleError(
                 f"no vehicle heard on UDP {self.address} within {self._find_s:g} s; is autopilot running, "
@@ -125,10 +132,10 @@ class Session:
         if result is None:
             raise NoVehicleError(f"{label or 'the exchange'}: the vehicle fell silent")
         if result.status is Status.UNANSWERED:
-            raise NoVehicleError(result.text)
+            raise NoVehicleError(result.silence(self._connection.signatures.trouble))
         if result.status is Status.REFUSED:
             self.watch(lambda: False, REASON_S)
-            raise RefusedError("; ".join([result.text, *self.view.complaints_since(texts_before)]))
+            raise RefusedError(result.refusal(self.view.complaints_since(texts_before)))
         return result
 
     def request(self, message_id: int) -> Any:

@@ -9,7 +9,7 @@ from gcs.clients import command
 from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
 from gcs.clients.parameter_transfer import ParameterList
-from gcs.errors import NoVehicleError, RefusedError, not_written
+from gcs.errors import InputError, NoVehicleError, RefusedError, not_written
 from gcs.folders import TLOG_FILE, fresh_folder
 from gcs.shell.display import say
 from gcs.shell.link import Address, monotonic_us, unix_us
@@ -19,13 +19,20 @@ from gcs.shell.truth import TruthLink
 
 
 def capture_to(
-    out: Path | None, address: Address, duration_s: float | None, truth_at: Address | None = None
+    out: Path | None,
+    address: Address,
+    duration_s: float | None,
+    truth_at: Address | None = None,
+    overwrite: bool = False,
 ) -> tuple[Path, int]:
     """Record telemetry until `duration_s` is over or somebody asks to stop; the log and its messages' number.
 
     Without `out` the log goes to flights/capture-TIME/flight.tlog. Parameters come first.
     `truth_at`: where the simulator tells what is true; None: where `sitl` does by default.
+    InputError if `out` is an earlier log, unless `overwrite` gives it up.
     """
+    if out is not None and not overwrite:
+        _keep_earlier(out)
     with (
         TruthLink(truth_at) as world,
         Session(address) as session,
@@ -68,3 +75,9 @@ def capture_to(
             session.watch(lambda: bool(stop), duration_s, "capturing")
             capture.flush(monotonic_us())
         return path, capture.records
+
+
+def _keep_earlier(out: Path) -> None:
+    """InputError if there is a file that holds something; a pipe or a device has nothing to lose."""
+    if out.is_file() and out.stat().st_size:
+        raise InputError(f"--out {out}: holds a log already; name another, or add --overwrite")

@@ -10,11 +10,11 @@ from collections.abc import Iterable
 
 from autopilot.own.chosen import NOTHING_OWN, Own, parameters_for
 from autopilot.own.source import OwnError
+from autopilot.shell.options import unknown_setting
 from autopilot.vehicle.file import load_belief, load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import RateError, control_divider
-from autopilot.wire.parameter_names import unknown_parameter
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.errors import InputError, input_error
 from gcs.workflows.flight_options import WORLD
@@ -40,7 +40,7 @@ def check_flight_inputs(
     for name, value in given:
         table = world if name.startswith(WORLD) and name not in own else own
         if name not in table:
-            raise InputError(f"--set {unknown_parameter(name, [*own.names, *world.names])}")
+            raise InputError(f"--set {unknown_setting(name, [*own.names, *world.names])}")
         _check(table, name, value)
         table.set(name, value)
     try:

@@ -201,6 +201,9 @@ def _end(
         raise GcsError(outcome.reason or "the vehicle said nothing")
     if stop and not client.begun:
         raise StoppedError(f"stopped before the vehicle was armed; what it said is in {folder.set_aside()}")
+    if options.connect is not None and not client.begun:
+        told_by = f"what the vehicle said is in {folder.set_aside()}"
+        raise GcsError(f"{mission.name}: {outcome.name}: {outcome.reason}; {told_by}")
     folder.keep()
     if options.real_time and outcome.name != "completed":
         outcome = outcome.because(_too_slow(tlog))

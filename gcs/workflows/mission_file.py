@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from gcs.errors import input_error
+from pathlib import Path
+
+from gcs.errors import InputError, input_error
 from missions.fileformat import MissionFileError, load_mission
 from missions.model import Mission
 
@@ -12,4 +14,16 @@ def load(name_or_path: str) -> Mission:
     try:
         return load_mission(name_or_path)
     except MissionFileError as error:
+        path = Path(name_or_path)
+        if path.is_file() and _is_of_others(path):
+            raise InputError(
+                f"{path}: a file of another ground station; gcs upload {path} checks it, and brings it to a "
+                "running vehicle (docs/tools.md)"
+            ) from None
         raise input_error(error) from None
+
+
+def _is_of_others(path: Path) -> bool:
+    from gcs.formats.missions import is_foreign  # which loads much, and is asked in case of need alone
+
+    return is_foreign(path)

@@ -6,7 +6,7 @@ import fnmatch
 from collections.abc import Sequence
 from pathlib import Path
 
-from autopilot.wire.parameter_names import unknown_parameter
+from autopilot.shell.options import unknown_setting
 from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
@@ -73,7 +73,7 @@ def exchange(
     known = [] if names is None else names
     if not known:
         known += _listed(session, session.target)
-    raise RefusedError(unknown_parameter(operation.name, known))
+    raise RefusedError(unknown_setting(operation.name, known))
 
 
 def save_parameters(file: Path, address: Address) -> int:

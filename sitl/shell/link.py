@@ -9,10 +9,15 @@ import time
 from collections.abc import Callable
 
 from autopilot.shell.options import Address, datagram_socket, reason, receive, send, set_timeout, shown
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import HilSimulator
+from sitl.messages import SIMULATOR_COMPONENT, VEHICLE_SYSTEM
 
 _TAKE_OVER_S = 0.5  # of silence of the autopilot that is served, until another may take its place
 _MOST_NAMED = 8  # of the autopilots that are turned away
+_TELL_AGAIN_S = 1.0  # between two words to them
+_TEXT_LENGTH = 50  # of STATUSTEXT
 TRUTH_WINDOW_US = 20_000  # in lockstep: of truth in one datagram
 
 
@@ -44,6 +49,9 @@ class Link:
         self._turned_away: set[Address] = set()
         self._met_s: float | None = None  # when the first peer was, monotonic clock
         self.peer: Address | None = None
+        self._told_away_s = -_TELL_AGAIN_S  # when somebody was, monotonic clock
+        # a count of its own: the frames of the autopilot that is served are numbered without a gap
+        self._writer = FrameWriter(VEHICLE_SYSTEM, SIMULATOR_COMPONENT)
 
     @property
     def served_s(self) -> float:
@@ -146,10 +154,23 @@ class Link:
         if sender == self.peer and simulator.receive(datagram):
             self.heard()
             return False
-        if not (simulator.greets(datagram) and self.serves(sender)):
+        if not simulator.greets(datagram):
+            return False
+        if not self.serves(sender):
+            self._tell_turned_away(sender)
             return False
         simulator.introduce()
         return True
+
+    def _tell_turned_away(self, sender: Address) -> None:
+        """Tell an autopilot who is served in its place: not all of a flood, and none often."""
+        now_s = time.monotonic()
+        if now_s - self._told_away_s < _TELL_AGAIN_S:
+            return
+        self._told_away_s = now_s
+        text = f"Serving another autopilot: {shown(self.peer)}".encode()[:_TEXT_LENGTH]
+        severity = mavlink.MAV_SEVERITY_ERROR
+        self.send(self._writer.frame(mavlink.MAVLink_statustext_message(severity, text)), sender)
 
 
 def _truth_of(simulator: HilSimulator) -> bytes:

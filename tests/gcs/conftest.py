@@ -18,6 +18,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 
 TICK_US = 20_000
+PX4_HOLD = 0x03040000
 
 
 class ScriptedVehicle:
@@ -52,6 +53,7 @@ class ScriptedVehicle:
         self.started_us: int | None = None
         self.script: Callable[[ScriptedVehicle, float], None] | None = None
         self.phase = mavlink.PLUMBLINE_PHASE_DISARMED
+        self.custom_mode = PX4_HOLD
         self.item = 0
         self.mission_state = mavlink.MISSION_STATE_NOT_STARTED
         self.areas: dict[int, list[WireItem]] = {}  # fence and rally points by MAV_MISSION_TYPE
@@ -73,7 +75,7 @@ class ScriptedVehicle:
         armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
         self.send(
             mavlink.MAVLink_heartbeat_message(
-                mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 29 | armed, 0x03040000, 3, 3
+                mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 29 | armed, self.custom_mode, 3, 3
             )
         )
         self.out.append(

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from autopilot.trajectory.feasibility import PathReport
-from gcs.workflows.check_mission import Check, reels_too_far, remarks_on
+from gcs.errors import InputError
+from gcs.workflows.check_mission import Check, check_mission, reels_too_far, remarks_on
 from missions.model import Land, Mission, Takeoff, Winch
 
 CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
@@ -42,3 +45,12 @@ def test_a_cable_that_the_winch_does_not_make_is_found_before_the_flight(
     within = Mission("less", "Less", "", (), (Takeoff(5.0), Winch(-0.4), Land()))  # 0.7 - 0.4 rounds below
     assert list(reels_too_far(within, "bebop")) == []
     assert str(found).startswith(f"items[3] (winch): a cable of {cable_m:.2f} m; must be 0.3 ... 3 m")
+
+
+def test_a_plan_of_another_ground_station_is_told_where_it_is_checked(tmp_path: Path) -> None:
+    plan = tmp_path / "a.plan"
+    plan.write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"a file of another ground station; gcs upload .* checks it"):
+        check_mission(str(plan), "bebop", as_asked=False)
+    with pytest.raises(InputError, match=r"unknown mission|No such file|no such file"):
+        check_mission(str(tmp_path / "b.plan"), "bebop", as_asked=False)

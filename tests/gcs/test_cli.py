@@ -339,7 +339,7 @@ def test_a_refusal_is_one_line_with_the_reason(live):
 
     vehicle.on_command_long = refuse
     line = one_line(run("disarm", "--connect", port), EXIT_ERROR)
-    assert line == "gcs: disarm: denied; Disarming denied: in the air"
+    assert line == "gcs: Disarming denied: in the air"
 
 
 def test_a_vehicle_that_stops_answering_is_one_line(live, monkeypatch):
@@ -651,6 +651,35 @@ def test_capture(live, tmp_path):
     assert stamps == sorted(stamps)
     told = {one.message.param_id for _, one in records if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE}
     assert told == set(vehicle.parameters)
+
+
+def test_a_log_that_is_there_is_kept_unless_it_may_be_lost(live, tmp_path, monkeypatch):
+    _, port = live
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.0)
+    path = tmp_path / "flight.tlog"
+    path.write_bytes(b"earlier")
+    words = ["capture", "--duration", "0.1", "--out", str(path), "--connect", port]
+    line = one_line(run(*words), EXIT_USAGE)
+    assert line == f"gcs: --out {path}: holds a log already; name another, or add --overwrite"
+    assert path.read_bytes() == b"earlier"
+    assert run(*words, "--overwrite").exit_code == EXIT_DONE
+    assert list(read_tlog(path))
+
+
+def test_a_running_vehicle_that_is_armed_already_leaves_the_folder_to_the_next_flight(
+    live, tmp_path, monkeypatch
+):
+    vehicle, port = live
+    monkeypatch.setattr(session_module, "TRUTH_S", 0.0)
+    vehicle.armed = True
+    out = tmp_path / "out"
+    for _ in range(2):
+        result = run("fly", "hover", "--connect", port, "--out", str(out))
+        assert (result.exit_code, result.stdout) == (EXIT_ERROR, "")
+        told = "hover: refused: the vehicle is armed already; land and disarm it first"
+        where = f"what the vehicle said is in {out / 'unflown.tlog'}"
+        assert result.stderr.splitlines()[-1] == f"gcs: {told}; {where}"
+        assert [path.name for path in out.iterdir()] == ["unflown.tlog"]
 
 
 def test_a_flight_stopped_before_the_vehicle_was_armed_leaves_the_folder_to_the_next(

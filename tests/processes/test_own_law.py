@@ -60,5 +60,5 @@ def test_one_that_fails_is_told_and_the_report_is_made(tmp_path: Path, fault: st
 def test_the_autopilot_tells_what_is_no_law(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "autopilot", "--law", "nofile.py:Mine", "--storage", str(tmp_path)]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert result.returncode == 1
+    assert result.returncode == 2
     assert result.stderr.strip() == "autopilot: --law nofile.py: no such file"

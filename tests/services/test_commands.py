@@ -220,7 +220,8 @@ def acks(replies):
 
 
 @pytest.mark.parametrize(("command", "params", "request_", "result"), LONG, ids=lambda value: str(value)[:40])
-def test_command_long(rig, command, params, request_, result):
+def test_command_long(rig_with, items, command, params, request_, result):
+    rig = rig_with(items(6))
     replies = rig.replies(long(command, params))
     assert acks(replies) == [(command, result)]
     assert rig.asked == ([] if request_ is None else [request_])
@@ -356,6 +357,12 @@ def test_set_current_message_is_answered_by_mission_current(rig):
     (current,) = [m for m in answers if m.get_type() == "MISSION_CURRENT"]
     assert (current.seq, current.total, current.mission_state) == (5, 9, 3)
     assert rig.asked == [SetCurrent(5)]
+
+
+def test_where_no_mission_is_its_item_is_not_what_is_missing(rig):
+    """So that it is refused in the words in which its mode is."""
+    rig.replies(long(300, (0, 0)))
+    assert rig.asked == [StartMission(None)]
 
 
 def test_a_repeated_command_is_acknowledged_but_done_once(rig):

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from autopilot.shell.ground import GroundStations, listen
+from autopilot.shell.ground import AutopilotError, GroundStations, listen
 from autopilot.shell.options import StopRequest
 from autopilot.shell.storing import Storing
 from autopilot.shell.tcp_server import MAX_CLIENTS, SILENCE_US, TcpServer
@@ -23,6 +23,15 @@ from gcs.shell.link import LOOPBACK, free_port
 SLOW_S = 1e-3  # for one message: longer than there is for all
 HEARS_S = 0.1  # what was sent arrives within
 MOST_TICKS = 50  # until what had to wait for a later tick is sent
+
+
+def test_a_port_that_is_taken_is_told_in_words_with_the_way_out() -> None:
+    with socket.create_server((LOOPBACK, 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(AutopilotError) as error:
+            listen((LOOPBACK, port))
+    told = f"cannot listen on TCP {LOOPBACK}:{port}: address already in use; is another autopilot running? "
+    assert str(error.value) == told + "choose another with --tcp"
 
 
 def pings(first: int, count: int) -> bytes:

@@ -13,6 +13,7 @@ from sitl.__main__ import main as sitl
 UNKNOWN = {
     "MPC_XY_VEL_MAXX": "did you mean MPC_XY_VEL_MAX?",
     "MPC_FOO": "there are MPC_MAN_Y_MAX, ",
+    "SIM_WIND": "did you mean SIM_WIND_E, SIM_WIND_N or SIM_WIND_U?",
     "SIM_WINDE": "did you mean SIM_WIND_E?",
     "SIM_FOO": "there are SIM_ACC_NOISE, ",
     "WPNAV_SPEED": "did you mean WNC_SPEED or MIS_SPEED?",

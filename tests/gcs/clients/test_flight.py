@@ -16,6 +16,7 @@ from gcs.clients.flight import (
 )
 
 EXPECTED_S = 20.0
+PX4_MISSION, PX4_LAND = 0x04040000, 0x06040000
 
 
 def normal_flight(vehicle, t):
@@ -150,7 +151,7 @@ def test_arming_refused(world, fly):
     vehicle.on_command_long = with_reason
     client, _ = fly()
     assert client.outcome.name == "refused"
-    assert client.outcome.reason == "arm: denied; Arming denied: load not on the ground"
+    assert client.outcome.reason == "Arming denied: load not on the ground"
 
 
 def test_never_ready(world, fly):
@@ -279,6 +280,42 @@ def test_disarmed_by_somebody_else(world, fly, told_on_the_ground):
     client, _ = fly()
     assert client.outcome.name == "interrupted"
     assert "at item 1 of 3" in client.outcome.reason
+
+
+@pytest.mark.parametrize(
+    ("mode", "said", "by_hand", "told"),
+    [
+        (PX4_LAND, "", False, "landing commanded by another ground station; the vehicle was disarmed before"),
+        (PX4_LAND, "Battery low: landing", False, "Battery low: landing; the vehicle was disarmed before"),
+        (PX4_LAND, "", True, "the vehicle was disarmed before"),
+        (PX4_MISSION, "", False, "the vehicle was disarmed before"),
+    ],
+)
+def test_who_ended_the_mission_is_told(world, items, mode, said, by_hand, told):
+    client = FlightClient(items[:3] + items[-1:], EXPECTED_S)
+
+    def script(vehicle, t):
+        if t < 10.0:
+            vehicle.custom_mode = PX4_MISSION
+            normal_flight(vehicle, t)
+        elif vehicle.custom_mode != mode:
+            if said:
+                vehicle.say(said)
+            vehicle.custom_mode = mode
+            vehicle.heartbeat()
+        elif t > 12.0 and vehicle.armed:
+            vehicle.arm(False)
+
+    world.vehicle.script = script
+    if by_hand:
+        client.fly_on()
+    for _ in world.ticks(client.receive, client.poll, 40.0):
+        if client.outcome is not None:
+            break
+    assert client.outcome is not None
+    assert client.outcome.name == "interrupted"
+    assert client.outcome.reason.startswith(told)
+    assert client.outcome.reason.endswith("before the end of the mission, at item 1 of 3")
 
 
 def test_disarmed_before_take_off(world, fly):

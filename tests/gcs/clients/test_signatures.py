@@ -1,0 +1,97 @@
+"""Signing that does not match is named, with what mends it, wherever it keeps something from being done."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+from click.testing import CliRunner
+
+from autopilot.wire.codec import FrameWriter
+from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.signing import Signing, key_of_text, timestamp_of
+from gcs.cli import gcs
+from gcs.clients.connection import Connection
+from gcs.clients.flight import FlightClient
+from gcs.errors import EXIT_ERROR
+from gcs.shell import session as session_module
+from gcs.shell.link import unix_us
+
+KEY, OTHER = key_of_text("plumb"), key_of_text("bob")
+NOW = timestamp_of(1_800_000_000_000_000)
+HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, 0, 0, 3, 3)
+TEXT = mavlink.MAVLink_statustext_message(4, b"hello")
+NO_KEY = "the vehicle signs its messages, and heeds only those that are signed with its key: "
+
+
+@pytest.mark.parametrize(
+    ("theirs", "their_time", "ours", "heard", "trouble"),
+    [
+        (None, NOW, None, 2, ""),
+        (KEY, NOW, KEY, 2, ""),
+        (KEY, NOW, None, 2, "--signing-key FILE"),
+        (KEY, NOW, OTHER, 0, "another key than that of --signing-key"),
+        (None, NOW, KEY, 1, "not signed, and with --signing-key only signed messages are heard"),
+        (KEY, NOW - 10_000_000, KEY, 0, "set the clocks of both machines right"),
+    ],
+)
+def test_what_does_not_match_is_known(theirs, their_time, ours, heard, trouble):
+    sign = Signing(theirs, their_time).signer(0) if theirs else None
+    writer, connection = FrameWriter(1, 1), Connection()
+    if ours:
+        connection.sign_with(Signing(ours, NOW))
+    datagram = writer.frame(HEARTBEAT, sign) + writer.frame(TEXT, sign)
+    assert len(connection.receive(datagram, 0)) == heard
+    assert trouble in connection.signatures.trouble
+    assert bool(trouble) == bool(connection.signatures.trouble)
+
+
+def test_a_radio_that_cannot_sign_and_a_frame_said_twice_are_no_trouble():
+    connection, writer = Connection(), FrameWriter(1, 1)
+    connection.sign_with(Signing(KEY, NOW))
+    radio = FrameWriter(51, 68).frame(mavlink.MAVLink_radio_status_message(1, 1, 100, 0, 0, 0, 0))
+    connection.receive(radio, 0)
+    assert connection.signatures.trouble == ""
+    signed = writer.frame(HEARTBEAT, Signing(KEY, NOW).signer(0))
+    for _ in range(2):
+        connection.receive(signed, 0)
+    assert connection.signatures.trouble == ""
+
+
+def test_a_flight_that_is_not_answered_says_that_a_key_is_missing(world, items):
+    vehicle = world.vehicle
+    sign = Signing(KEY, NOW).signer(0)
+    vehicle.writer.frame = partial(vehicle.writer.frame, sign=sign)
+    vehicle.on_command_long = lambda message: None
+    client = FlightClient(items, 10.0)
+    for _ in world.ticks(client.receive, client.poll, 20.0):
+        if client.outcome is not None:
+            break
+    assert client.outcome is not None
+    assert client.outcome.name == "lost"
+    assert client.outcome.reason.startswith(f"interval of LOAD_SETPOINT: no answer after 5 tries; {NO_KEY}")
+
+
+@pytest.mark.parametrize(
+    ("theirs", "ours", "words", "told"),
+    [
+        (KEY, None, ["param", "get", "P001"], f"P001: no answer after 1 tries; {NO_KEY}name the file"),
+        (OTHER, KEY, ["status"], "what comes is signed with another key than that of --signing-key"),
+        (None, KEY, ["status"], "what comes is not signed, and with --signing-key only signed"),
+    ],
+)
+def test_a_command_says_what_does_not_match(live, monkeypatch, tmp_path, theirs, ours, words, told):
+    vehicle, port = live
+    if theirs:
+        sign = Signing(theirs, timestamp_of(unix_us())).signer(0)
+        vehicle.writer.frame = partial(vehicle.writer.frame, sign=sign)
+    vehicle.on_param_request_read = lambda message: None
+    monkeypatch.setattr("gcs.clients.parameter_transfer.SENDS", 1)
+    monkeypatch.setattr(session_module, "FIND_S", 0.3)
+    file = tmp_path / "key"
+    file.write_text("plumb", encoding="utf-8")
+    file.chmod(0o600)
+    key = ["--signing-key", str(file)] if ours else []
+    result = CliRunner().invoke(gcs, [*key, *words, "--connect", port], prog_name="gcs")
+    assert (result.exit_code, result.stdout) == (EXIT_ERROR, "")
+    assert told in result.stderr
