@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -111,7 +112,12 @@ def _killed_is_an_error() -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """Ctrl-C and a closed terminal are handled by the parent; a worker whose parent has gone ends."""
+    """Ctrl-C and a closed terminal are handled by the parent; a worker whose parent has gone ends.
+
+    Results are written by the parent: what is printed here, as by a law that somebody has brought, goes to
+    stderr.
+    """
+    sys.stdout = sys.stderr
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     parent = parent_process()

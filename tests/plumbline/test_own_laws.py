@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 import plumbline
 from gcs.cli import gcs
-from gcs.errors import EXIT_USAGE
+from gcs.errors import EXIT_DONE, EXIT_USAGE
 from missions.model import Delay, Land, Mission, Takeoff
 from plumbline.examples.load_pid import LoadPid
 from plumbline.laws import Asked, Now
@@ -25,6 +25,23 @@ class Fails(LoadPid):
         if now.time_s > 3.0:
             return memory, now.no_such_field
         return super().load_position(memory, now)
+"""
+
+SAYS = """
+from multiprocessing import parent_process
+
+if parent_process() is not None:
+    print("said by a worker")
+"""
+PRINTS = """
+from plumbline.examples.minimum_snap import MinimumSnap
+
+print("loading")
+
+class Prints(MinimumSnap):
+    def plan(self, route):
+        print("planning")
+        return super().plan(route)
 """
 
 
@@ -89,16 +106,28 @@ def test_one_that_there_is_not_is_told(command: str) -> None:
     words = [command, *(["hover"] if command != "warmup" else []), "--law", "nofile.py:Mine"]
     result = run(*words)
     assert result.exit_code == EXIT_USAGE
-    assert "nofile.py: no such file" in result.output
+    assert result.stderr == "gcs: --law nofile.py: no such file\n"
 
 
-def test_a_sweep_tells_laws_apart(tmp_path: Path) -> None:
+def test_what_it_prints_is_no_part_of_the_json(tmp_path: Path) -> None:
+    """Nor is anything else in the way of whoever reads stdout."""
+    path = tmp_path / "mine.py"
+    path.write_text(PRINTS)
+    result = run("check", "square", "--planner", str(path), "--json")
+    assert result.exit_code == EXIT_DONE, result.stderr
+    assert json.loads(result.stdout)["mission"] == "square"
+    assert result.stderr.startswith("loading\nplanning\n")
+    assert "planning" in run("check", "square", "--planner", str(path)).stdout  # to people as it comes
+
+
+def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """And flies each as `fly` does."""
     path = tmp_path / "mine.py"
-    path.write_text(FAILS)
+    path.write_text(f"{SAYS}{FAILS}")
     laws = (f"{__file__}:Heavier", f"{path}:Fails")
     out = tmp_path / "out"
     rows = plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True, kind="arrow").to_pylist()
+    assert capfd.readouterr() == ("", "said by a worker\n")
     assert [(row["law"], row["outcome"]) for row in rows] == [("heavier", "completed"), ("Fails", "diverged")]
     error_m = plumbline.fly("hover", law=Heavier, quiet=True).summary["load_error_max_m"]
     assert rows[0]["load_error_max_m"] == pytest.approx(error_m, rel=1e-3)
