@@ -76,6 +76,11 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
         lambda memory, now: (memory, wrench(1.0, (1.0, 2.0))),
         r"ValueError: the moment has 2 numbers; must be 3 \(test_host\.py:\d+\)",
     ),
+    "text": (lambda memory, now: (memory, force("abc")), "the force is 'abc'; must be 3 numbers"),  # type: ignore[arg-type]
+    "texts": (
+        lambda memory, now: (memory, force((0.0, 0.0, "up"))),  # type: ignore[arg-type]
+        r"the force is \(0\.0, 0\.0, 'up'\); must be 3 numbers",
+    ),
     "matrix": (
         lambda memory, now: (memory, attitude(((1.0, 0.0, 0.0),), 1.0)),
         "the attitude has 1 rows; must be 3 rows of 3 numbers",
@@ -89,7 +94,7 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
         lambda memory, now: (memory, attitude(((nan, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3), 1.0)),
         "asks for an attitude that is no number",
     ),
-    "rate": (lambda memory, now: (memory, rates(1.0, 3.0)), "the rate has 1 numbers; must be 3"),  # type: ignore[arg-type]
+    "rate": (lambda memory, now: (memory, rates(1.0, 3.0)), r"the rate is 3\.0; must be 3 numbers"),  # type: ignore[arg-type]
 }
 
 
