@@ -112,7 +112,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
     directory = options.out or default_directory(plan, sweep_origin(plan), options.fresh)
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
-    with StopRequest(STOPPING) as stop:
+    with StopRequest(f"the flights in the air are flown to their end; {STOPPING}") as stop:
         done = sweep(
             plan,
             directory,
