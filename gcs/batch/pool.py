@@ -34,11 +34,11 @@ def fly_group(fly: FlyMany[F, R], group: tuple[F, ...]) -> list[R]:
     return fly(group, time.monotonic, _is_recalled)
 
 
-_recalled: list[Any] = []  # in a worker of ours: the event that says to begin no more flights
+RECALLED: list[Any] = []  # in a worker of ours: the event that says to begin no more flights
 
 
 def _is_recalled() -> bool:
-    return any(event.is_set() for event in _recalled)
+    return any(event.is_set() for event in RECALLED)
 
 
 @runtime_checkable
@@ -148,7 +148,7 @@ def _begin_worker(recalled: Any) -> None:
     Results are written by the parent: what is printed here, as by a law that somebody has brought, goes to
     stderr.
     """
-    _recalled.append(recalled)
+    RECALLED.append(recalled)
     sys.stdout = sys.stderr
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)

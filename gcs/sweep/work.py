@@ -80,7 +80,7 @@ def fly_cases(
         members = list(cell)
         if any(work.plan.own(law)):
             with watched_calls():
-                rows += [_fly_one(work, case, clock) for case in members if not stopped()]
+                rows += [fly_one(work, case, clock) for case in members if not stopped()]
             continue
         for first in range(0, len(members), LANES):
             if stopped():
@@ -89,12 +89,12 @@ def fly_cases(
             at_once = law in work.in_lanes and len(some) >= FEWEST
             found = _fly_at_once(work, some, clock) if at_once else None
             if found is None:
-                found = [_fly_one(work, case, clock) for case in some if not stopped()]
+                found = [fly_one(work, case, clock) for case in some if not stopped()]
             rows += found
     return rows
 
 
-def _fly_one(work: Work, case: Case, clock: Clock) -> Row:
+def fly_one(work: Work, case: Case, clock: Clock) -> Row:
     """Fly one of the flights. One that cannot be flown at all has the outcome `refused`."""
     began_s = clock()
     try:

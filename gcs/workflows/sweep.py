@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from autopilot.own.chosen import NOTHING_OWN, Own
+from autopilot.own.doubts import own_doubts
 from gcs.batch.pool import dask_cluster, own_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
@@ -19,8 +20,10 @@ from gcs.sweep.plan_file import default_directory, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
+from gcs.workflows.before_flight import planner_doubts
 from gcs.workflows.flight_inputs import doubts
 from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.mission_file import load
 from gcs.workflows.warmup import warm_up
 
 STOPPING = "stopping; completed flights are stored, run the same command again to continue"
@@ -135,6 +138,9 @@ def run_sweep(options: SweepOptions) -> Sweep:
 
 def _tell_doubts(plan: SweepPlan) -> None:
     """Tell what can be flown and may not be meant; of the values of a parameter the first alone."""
+    own = [line for law in plan.laws for line in own_doubts(plan.own(law))]
+    for line in dict.fromkeys([*own, *planner_doubts(plan.planner, load(plan.mission))]):
+        say(line)
     for option, values in (
         ("--set", list(plan.settings)),
         ("--vary", [(one.name, value) for one in plan.varied for value in one.values]),

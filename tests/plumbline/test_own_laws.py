@@ -10,6 +10,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 import plumbline
+from autopilot.own.chosen import Own
+from autopilot.own.doubts import own_doubts
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
 from missions.model import Delay, Land, Mission, Takeoff
@@ -27,6 +29,7 @@ class Fails(LoadPid):
         return super().load_position(memory, now)
 """
 
+PLANNER = "plumbline.examples.minimum_snap:MinimumSnap"
 SAYS = """
 from multiprocessing import parent_process
 
@@ -118,6 +121,31 @@ def test_what_it_prints_is_no_part_of_the_json(tmp_path: Path) -> None:
     assert json.loads(result.stdout)["mission"] == "square"
     assert result.stderr.startswith("loading\nplanning\n")
     assert "planning" in run("check", "square", "--planner", str(path)).stdout  # to people as it comes
+
+
+class Misspelt(LoadPid):
+    def quad_postion(self, memory: Any, now: Now) -> tuple[Any, Asked]:
+        raise AssertionError
+
+    def position(self) -> None:
+        raise AssertionError
+
+
+def test_a_method_whose_name_is_near_to_one_that_is_called_is_told() -> None:
+    law = f"{__file__}:Misspelt"
+    assert own_doubts(Own(law)) == [
+        f"--law {law}: Misspelt.quad_postion is never called; did you mean quad_position?"
+    ]
+    shipped = Own("plumbline.examples.load_pid:LoadPid", "plumbline.examples.luenberger:Luenberger")
+    assert own_doubts(shipped._replace(planner=PLANNER)) == []
+
+
+def test_a_planner_that_is_never_asked_is_told() -> None:
+    with pytest.warns(UserWarning, match=f"^planner {PLANNER}: is never asked: mission short has no way"):
+        plumbline.fly(SHORT, planner=PLANNER, quiet=True)
+    told = "the planner is never asked: mission hover has no waypoints\n"
+    assert run("check", "hover", "--planner", PLANNER).stdout.endswith(told)
+    assert "never asked" not in run("check", "square", "--planner", PLANNER).stdout
 
 
 def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -32,7 +32,7 @@ class Threads(ThreadPoolExecutor):
 @pytest.fixture
 def recalled(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     event = threading.Event()
-    monkeypatch.setattr(pool, "_recalled", [event])
+    monkeypatch.setattr(pool, "RECALLED", [event])
     yield event
     event.set()
 
@@ -66,7 +66,7 @@ def test_a_sweep_begins_no_flight_after_it_was_stopped(monkeypatch: pytest.Monke
         flown.append(case.index)
         return {"index": case.index}
 
-    monkeypatch.setattr(work, "_fly_one", fly_one)
+    monkeypatch.setattr(work, "fly_one", fly_one)
     cases: Any = [SimpleNamespace(law="plumbline", varied=(), index=index) for index in range(20)]
     for own in ((), ("mine.py",)):
         flown.clear()
