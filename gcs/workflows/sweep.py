@@ -26,7 +26,8 @@ from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.mission_file import load
 from gcs.workflows.warmup import warm_up
 
-STOPPING = "stopping; completed flights are stored, run the same command again to continue"
+_CONTINUED = "completed flights are stored, run the same command again to continue"
+STOPPING = f"stopping; {_CONTINUED}"
 
 
 FIGURES = (  # of the record, that something can be required of
@@ -115,7 +116,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
     directory = options.out or default_directory(plan, sweep_origin(plan), options.fresh)
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
-    with StopRequest(f"the flights in the air are flown to their end; {STOPPING}") as stop:
+    with StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop:
         done = sweep(
             plan,
             directory,
