@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_INTERRUPTED, EXIT_USAGE, GcsError, disk_trouble
-from gcs.shell.display import say
+from gcs.shell.display import give_stdout_back, say
 from missions.nearest import nearest
 
 # name: (module in gcs.commands, summary)
@@ -110,6 +110,8 @@ class Gcs(click.Group):
                 raise
             say(f"{disk_trouble(error)}; nothing more can be written")
             code = EXIT_ERROR
+        finally:
+            give_stdout_back()
         sys.exit(code if isinstance(code, int) else EXIT_DONE)
 
 

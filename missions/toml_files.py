@@ -240,6 +240,8 @@ def _meant_key(key: str, owner: type[BaseModel]) -> str:
     # altitude_ft and altitude both mean altitude_m: compare what stands before the unit
     stem = key.rsplit("_", 1)[0]
     same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]
+    if "_" not in key and same:  # a word alone, as cable: the keys of a thing stand in order of weight
+        return same[0]
     return nearest(key, same, likeness=0.0) or nearest(key, known)
 
 

@@ -18,7 +18,7 @@ from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
 from missions import model
 from missions.nearest import did_you_mean
-from plumbline.arguments import file_path, positive, setting_words, text, told_in_python, whole
+from plumbline.arguments import file_path, in_python, positive, setting_words, text, told_in_python, whole
 from plumbline.frames import as_frame
 from plumbline.made_files import name_or_path
 from plumbline.missions import Mission
@@ -97,8 +97,8 @@ def fly(
 
 
 def _doubt(line: str) -> None:
-    """A setting that can be flown, but may not be meant so: a warning at the line that called `fly`."""
-    warnings.warn(f"settings: {line}", stacklevel=4)
+    """What can be flown, but may not be meant so: a warning at the line that called `fly`."""
+    warnings.warn(in_python(line), stacklevel=4)
 
 
 class Flight:

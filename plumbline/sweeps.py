@@ -115,17 +115,24 @@ def _address(scheduler: Any) -> str:
 
 
 def _run(words: list[str], quiet: bool) -> None:
-    """Run `gcs sweep`; its progress goes to our stderr, and its last word, if it fails, into the error."""
+    """Run `gcs sweep`; its progress goes to our stderr, and its last word, if it fails, into the error. So
+    does what a law prints that flies there, however quiet."""
     command = [sys.executable, "-P", "-m", "gcs", "sweep", *words, *(["--quiet"] if quiet else [])]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as program:
         assert program.stderr is not None
         said: list[str] = []
+        others: list[str] = []
         for line in program.stderr:
+            if not line.startswith(_SAYS):
+                others.append(line)
+                sys.stderr.write(line)
+                continue
             said.append(line)
             if len(said) > 1 and not quiet:
                 sys.stderr.write(said[-2])
     last = said[-1] if said else ""
-    told = said if quiet else [last]  # without progress, all that is said is what is wrong
+    # without progress, all that is said is what is wrong; a program that breaks down says it in its own way
+    told = (said if quiet else [last]) if said else others[-1:]
     if program.returncode == 0:
         if not quiet:
             sys.stderr.write(last)

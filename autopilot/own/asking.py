@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numba.extending import overload
 
 from autopilot.control.law_desk import ATTITUDE, FORCE, RATES, WRENCH, Asked
 from autopilot.geometry.compiler import INLINED
-from autopilot.geometry.linear import IDENTITY, ZERO, Vec3
+from autopilot.geometry.linear import IDENTITY, ZERO
+from autopilot.own.vectors import three_numbers
 
 
 def wrench(thrust: float, moment: Sequence[float]) -> Asked:
     """Thrust (N) along the body's upward axis and moment (N m, body), as they go to the mixer."""
-    return Asked(WRENCH, float(thrust), _vector(moment, "the moment"), IDENTITY)
+    return Asked(WRENCH, float(thrust), three_numbers(moment, "the moment"), IDENTITY)
 
 
 def force(F: Sequence[float]) -> Asked:
     """A force of the rotors (N, world): the built-in attitude loop turns the thrust axis to it, the nose as
     the reference says."""
-    return Asked(FORCE, 0.0, _vector(F, "the force"), IDENTITY)
+    return Asked(FORCE, 0.0, three_numbers(F, "the force"), IDENTITY)
 
 
 def attitude(R_d: Sequence[Sequence[float]], thrust: float) -> Asked:
@@ -29,20 +29,13 @@ def attitude(R_d: Sequence[Sequence[float]], thrust: float) -> Asked:
     (N)."""
     if len(R_d) != 3:
         raise ValueError(f"the attitude has {len(R_d)} rows; must be 3 rows of 3 numbers")
-    first, second, third = (_vector(row, "a row of the attitude") for row in R_d)
+    first, second, third = (three_numbers(row, "a row of the attitude") for row in R_d)
     return Asked(ATTITUDE, float(thrust), ZERO, (first, second, third))
 
 
 def rates(thrust: float, omega_d: Sequence[float]) -> Asked:
     """Thrust (N) and body rate (rad/s, body), which the built-in loop holds."""
-    return Asked(RATES, float(thrust), _vector(omega_d, "the rate"), IDENTITY)
-
-
-def _vector(numbers: Sequence[float], what: str) -> Vec3:
-    if np.shape(numbers) != (3,):
-        shape = " x ".join(map(str, np.shape(numbers))) or "1"
-        raise ValueError(f"{what} has {shape} numbers; must be 3")
-    return (float(numbers[0]), float(numbers[1]), float(numbers[2]))
+    return Asked(RATES, float(thrust), three_numbers(omega_d, "the rate"), IDENTITY)
 
 
 @overload(wrench, jit_options=INLINED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from inspect import signature
+from inspect import getsourcelines, signature
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -59,11 +59,24 @@ class Brought:
         return self.kind(parameters) if signature(self.kind).parameters else self.kind()
 
     def line(self, method: str) -> str:
-        """File and line of a method."""
-        found = getattr(self.kind, method)
-        code = getattr(getattr(found, "py_func", found), "__code__", None)
+        """File and line of a method; of the class, where that has the method from another file."""
+        found = getattr(self.kind, method, None)
+        found = getattr(found, "py_func", getattr(found, "__func__", found))
+        code = getattr(found, "__code__", None)
         path = self.path
-        return f"{path.name if path else self.reference}:{code.co_firstlineno if code else '?'}"
+        if path is None:
+            return f"{self.reference}:{code.co_firstlineno if code else '?'}"
+        if code is not None and Path(code.co_filename) == path:
+            return f"{path.name}:{code.co_firstlineno}"
+        try:
+            return f"{path.name}:{getsourcelines(self.kind)[1]}"
+        except (OSError, TypeError):
+            return path.name
+
+    @property
+    def making(self) -> str:
+        """File and line of what makes one."""
+        return self.line("build" if hasattr(self.kind, "build") else "__init__")
 
 
 class Named(NamedTuple):

@@ -12,7 +12,8 @@ from numba.extending import overload
 from autopilot.control.records import State
 from autopilot.estimation.desk import NO_ESTIMATE, UNTOLD, Estimate
 from autopilot.geometry.compiler import INLINED
-from autopilot.geometry.linear import Mat3, Vec3
+from autopilot.geometry.linear import Mat3
+from autopilot.own.vectors import three_numbers
 
 Numbers = Sequence[float] | np.ndarray[Any, Any]
 
@@ -37,15 +38,15 @@ def estimated(
     the standard deviations of the vehicle's position (m, each axis), which are told to ground stations.
     """
     state = State(
-        _vector(x_load, "x_load"),
-        _vector(v_load, "v_load"),
-        _vector(q_cable, "q_cable"),
-        _vector(q_cable_dot, "q_cable_dot"),
-        _vector(x_quad, "x_quad"),
-        _vector(v_quad, "v_quad"),
+        three_numbers(x_load, "x_load"),
+        three_numbers(v_load, "v_load"),
+        three_numbers(q_cable, "q_cable"),
+        three_numbers(q_cable_dot, "q_cable_dot"),
+        three_numbers(x_quad, "x_quad"),
+        three_numbers(v_quad, "v_quad"),
         _matrix(R),
-        _vector(omega_body, "omega_body"),
-        _vector(a_quad, "a_quad"),
+        three_numbers(omega_body, "omega_body"),
+        three_numbers(a_quad, "a_quad"),
     )
     return Estimate(True, state, float(tension), float(horizontal_std), float(vertical_std))
 
@@ -56,18 +57,11 @@ def no_estimate() -> Estimate:
     return NO_ESTIMATE
 
 
-def _vector(numbers: Numbers, what: str) -> Vec3:
-    if np.shape(numbers) != (3,):
-        shape = " x ".join(map(str, np.shape(numbers))) or "1"
-        raise ValueError(f"{what} has {shape} numbers; must be 3")
-    return (float(numbers[0]), float(numbers[1]), float(numbers[2]))
-
-
 def _matrix(rows: Any) -> Mat3:
     if np.shape(rows) != (3, 3):
         shape = " x ".join(map(str, np.shape(rows))) or "1"
         raise ValueError(f"R has {shape} numbers; must be 3 x 3")
-    first, second, third = (_vector(row, "a row of R") for row in rows)
+    first, second, third = (three_numbers(row, "a row of R") for row in rows)
     return (first, second, third)
 
 

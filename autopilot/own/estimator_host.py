@@ -79,7 +79,7 @@ class EstimatorHost:
                 self._function = compiled(kind, (METHOD,), memory, _DESK)[METHOD]
             pack(made, self.desk, OWN)
         except BaseException as error:
-            self.guard.fail(blamed(error, self.estimator.path))
+            self.guard.fail(blamed(error, self.estimator.path, self.estimator.making))
 
     def estimate_once(self, now: Sensed) -> None:
         """Call it as the tick calls it, and find what is wrong."""

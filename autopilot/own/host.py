@@ -72,7 +72,7 @@ class Host:
             if self._is_compiled:
                 pack(self._calling.made, self.desk, OWN)
         except BaseException as error:
-            self.guard.fail(blamed(error, self.law.path))
+            self.guard.fail(blamed(error, self.law.path, self.law.making))
 
     @property
     def _is_compiled(self) -> bool:

@@ -24,6 +24,7 @@ from missions.nearest import did_you_mean
 _OURS = Path(__file__).resolve().parents[1]
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _LONGEST = 120  # characters of an error that are told
+_LONGEST_COMPILER = 240  # and of one of the compiler, which names types before it says why
 
 
 class OwnError(ValueError):
@@ -157,8 +158,7 @@ def blamed(error: BaseException, path: Path | None, entered: str = "") -> str:
     if type(error).__module__.startswith("numba"):
         return _told_of_compiler(str(error), path)
     said = " ".join(str(error).split())
-    said = said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
-    text = f"{type(error).__name__}: {said}" if said else type(error).__name__
+    text = f"{type(error).__name__}: {_cut(said, _LONGEST)}" if said else type(error).__name__
     if isinstance(error, SyntaxError) and error.filename:
         return f"{type(error).__name__}: {error.msg} ({Path(error.filename).name}:{error.lineno})"
     frames = traceback.extract_tb(error.__traceback__)
@@ -181,9 +181,32 @@ def _of_importing(filename: str) -> bool:
 
 
 def _told_of_compiler(said: str, path: Path | None) -> str:
-    """What the compiler cannot do: its first line that says so, and the place in the file of `path`."""
+    """What the compiler cannot do and why, and the place in the file of `path`."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     why = next((line for line in lines if not line.startswith(("Failed in", ">>>", "File "))), "no reason")
-    place = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', said) if path is not None else None
-    where = f" ({path.name}:{place.group(1)})" if path is not None and place is not None else ""
-    return f"cannot be compiled: {why[:_LONGEST]}{where}"
+    call = next((line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")), "")
+    if call and why.endswith("for signature:"):
+        why = f"no implementation of {call}"
+    why = re.sub(r"(of type \w+)\(.*", r"\1", why)  # without the types of all fields
+    causes = re.findall(r"specific error:\s+(?:\w+: )?(?!Poison)(.*)", said)
+    because = "" if not causes or causes[-1] in why else f": {causes[-1]}"
+    return f"cannot be compiled: {_cut(f'{why}{because}', _LONGEST_COMPILER)}{_place_in(said, path)}"
+
+
+def _place_in(said: str, path: Path | None) -> str:
+    """Where in the file of `path` the compiler was, else the method that it compiled."""
+    if path is None:
+        return ""
+    found = re.search(rf'File "[^"]*{re.escape(path.name)}", line (\d+)', said)
+    if found:
+        return f" ({path.name}:{found.group(1)})"
+    method = re.search(r"<function (?:\w+\.)*(\w+) at ", said)
+    if method is not None and path.is_file():
+        for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+            if re.match(rf"\s*def {method.group(1)}\(", line):
+                return f" ({path.name}:{number})"
+    return f" ({path.name})"
+
+
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else text[: longest - 3] + "..."

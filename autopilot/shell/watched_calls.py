@@ -15,7 +15,8 @@ from functools import partial
 
 from autopilot.own.calls import CALL, TooSlow
 
-LONGEST_S = 5.0  # of one call
+LONGEST_S = 5.0  # of one call, on the wall clock
+_LOOKS = 10  # in that time: a call that begins after one of them lasts so much longer
 
 _WAKING = signal.SIGURG
 
@@ -44,12 +45,14 @@ def watched_calls(real_time: bool = False, longest_s: float = LONGEST_S) -> Iter
 
 
 def _watch(ended: threading.Event, stop: Callable[[], None], longest_s: float) -> None:
-    while True:
-        seen = CALL.count if CALL.going_on else -1
-        if ended.wait(longest_s):
-            return
-        if CALL.going_on and CALL.count == seen:
+    seen, looks = -1, 0
+    while not ended.wait(longest_s / _LOOKS):
+        count = CALL.count if CALL.going_on else -1
+        looks = looks + 1 if count == seen >= 0 else 0
+        seen = count
+        if looks == _LOOKS:
             stop()
+            looks = 0
 
 
 def _wake(thread: int) -> None:

@@ -83,7 +83,7 @@ def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Pa
     if times.ndim != 1 or len(times) < 2 or places.shape != (len(times), 3):
         raise ValueError(f"positions are of shape {places.shape}; must be ({times.size}, 3)")
     if not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
-        raise ValueError("times_s must rise")
+        raise ValueError("times_s must increase")
     rest = [(order, np.zeros(3)) for order in range(1, (DEGREE + 1) // 2)]
     spline = make_interp_spline(times, places, DEGREE, bc_type=(rest, rest))
     breaks = np.unique(spline.t)
@@ -121,11 +121,15 @@ def check_path(path: Path, route: Route) -> None:
         raise PlanError(f"the path has {len(table)} pieces; must be 1 ... {MOST_PIECES}")
     if not (np.isfinite(table).all() and np.isfinite(passes).all()):
         raise PlanError("the path has what is no number")
-    if table[0, 0] != 0.0 or passes[0] != 0.0:
-        raise PlanError(f"the path begins at {table[0, 0]:g} s; must be 0")
-    ends = table[:, 1] > table[:, 0]
-    if not ends.all() or (table[1:, 0] != table[:-1, 1]).any() or any(b <= a for a, b in pairwise(passes)):
-        raise PlanError("the times of the path do not rise")
+    for what, times in (("breaks_s", [*table[:, 0], table[-1, 1]]), ("passes_s", passes)):
+        for before, after in pairwise(times):
+            if after <= before:
+                told = f"{after:g} s comes after {before:g} s"
+                raise PlanError(f"the times {what} of the path must increase; {told}")
+        if times[0] != 0.0:
+            raise PlanError(f"the times {what} of the path begin at {times[0]:g} s; must begin at 0")
+    if (table[1:, 0] != table[:-1, 1]).any():
+        raise PlanError("the pieces of the path do not follow one another: each must begin where one ends")
     last_s = float(table[-1, 1])
     if abs(passes[-1] - last_s) > 1e-9 or last_s > LONGEST_S:
         raise PlanError(

@@ -47,12 +47,19 @@ class Layout(NamedTuple):
     load_radius_m: float
 
 
-def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layout) -> None:
-    """Write the file; GcsError where the libraries are not installed."""
+def require_libraries() -> None:
+    """GcsError where the libraries that write the file are not installed."""
     try:
-        from mcap_protobuf.writer import Writer
+        import mcap_protobuf.writer  # noqa: F401
     except ImportError:
         raise GcsError("flight.mcap needs more libraries: pip install 'plumbline[mcap]'") from None
+
+
+def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layout) -> None:
+    """Write the file; GcsError where the libraries are not installed."""
+    require_libraries()
+    from mcap_protobuf.writer import Writer
+
     with path.open("wb") as file, Writer(file) as log:
         messages = sorted(_messages(telemetry, samples, layout), key=lambda one: one[0])
         for time_s, topic, message in messages:

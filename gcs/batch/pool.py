@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -11,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExe
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from gcs.batch.runner import Running
 from gcs.errors import GcsError
@@ -20,7 +21,9 @@ F = TypeVar("F")
 R = TypeVar("R")
 
 Clock = Callable[[], float]  # seconds
-FlyMany = Callable[[tuple[F, ...], Clock], list[R]]  # must be picklable
+Stopped = Callable[[], bool]
+# gives the results of those that were flown before it was `Stopped`; must be picklable
+FlyMany = Callable[[tuple[F, ...], Clock, Stopped], list[R]]
 
 _AHEAD = 2  # groups waiting for each worker
 _POLL_S = 0.2
@@ -28,7 +31,34 @@ _POLL_S = 0.2
 
 def fly_group(fly: FlyMany[F, R], group: tuple[F, ...]) -> list[R]:
     """Fly some flights; what a worker runs."""
-    return fly(group, time.monotonic)
+    return fly(group, time.monotonic, _is_recalled)
+
+
+RECALLED: list[Any] = []  # in a worker of ours: the event that says to begin no more flights
+
+
+def _is_recalled() -> bool:
+    return any(event.is_set() for event in RECALLED)
+
+
+@runtime_checkable
+class Recallable(Protocol):
+    """An executor whose workers begin no more flights when it is recalled, of the groups that they have
+    begun neither."""
+
+    def recall(self) -> None: ...
+
+
+class OwnProcesses(ProcessPoolExecutor):
+    """Processes of our own. They have fetched groups that cannot be cancelled, and are told by an event."""
+
+    def __init__(self, jobs: int) -> None:
+        spawn = get_context("spawn")
+        self._recalled = spawn.Event()
+        super().__init__(jobs, mp_context=spawn, initializer=_begin_worker, initargs=(self._recalled,))
+
+    def recall(self) -> None:
+        self._recalled.set()
 
 
 class PoolCrew(Generic[F, R]):
@@ -59,7 +89,9 @@ class PoolCrew(Generic[F, R]):
         return ()
 
     def recall(self) -> Sequence[R]:
-        """Wait for what is being flown, a second or two; a second Ctrl-C does not wait."""
+        """Wait for the flights in the air, one or eight of each worker; a second Ctrl-C does not wait."""
+        if isinstance(self._executor, Recallable):
+            self._executor.recall()
         for future in self._futures:
             future.cancel()
         ended, _ = wait([future for future in self._futures if not future.cancelled()])
@@ -70,7 +102,7 @@ class PoolCrew(Generic[F, R]):
 @contextmanager
 def own_processes(jobs: int) -> Iterator[tuple[Executor, int]]:
     """`jobs` processes of our own."""
-    executor = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_begin_worker)
+    executor = OwnProcesses(jobs)
     try:
         yield executor, jobs
     finally:
@@ -110,8 +142,14 @@ def _killed_is_an_error() -> Iterator[None]:
         ) from None
 
 
-def _begin_worker() -> None:
-    """Ctrl-C and a closed terminal are handled by the parent; a worker whose parent has gone ends."""
+def _begin_worker(recalled: Any) -> None:
+    """Ctrl-C and a closed terminal are handled by the parent; a worker whose parent has gone ends.
+
+    Results are written by the parent: what is printed here, as by a law that somebody has brought, goes to
+    stderr.
+    """
+    RECALLED.append(recalled)
+    sys.stdout = sys.stderr
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     parent = parent_process()

@@ -12,7 +12,9 @@ from typing import Any, TypeVar
 import click
 
 from autopilot.shell.options import NamedPath, WholeNumber
+from gcs.errors import InputError
 from gcs.folders import check_writable
+from gcs.shell.display import keep_stdout_for_results, to_results
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -185,7 +187,7 @@ class LawType(click.ParamType):  # type: ignore[type-arg]
             try:
                 load_law(law)
             except OwnError as error:
-                self.fail(str(error), param, ctx)
+                raise _unusable(error, param) from None
         return law
 
 
@@ -205,6 +207,11 @@ def law_option(function: F) -> F:
     )
 
 
+def _unusable(error: Exception, param: click.Parameter | None) -> InputError:
+    """What is wrong with a file of somebody's own, of which the command's help says nothing."""
+    return InputError(f"{param.opts[0]} {error}" if param else str(error))
+
+
 class OwnType(click.ParamType):  # type: ignore[type-arg]
     """A class that somebody brings."""
 
@@ -219,7 +226,7 @@ class OwnType(click.ParamType):  # type: ignore[type-arg]
         try:
             self._load(str(value))
         except OwnError as error:
-            self.fail(str(error), param, ctx)
+            raise _unusable(error, param) from None
         return str(value)
 
 
@@ -288,14 +295,26 @@ def fresh_option(function: F) -> F:
 
 def json_option(function: F) -> F:
     """--json of every command with a result."""
-    return click.option("--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else.")(
-        function
-    )
+    return click.option(
+        "--json",
+        "as_json",
+        is_flag=True,
+        is_eager=True,  # before a class is loaded that somebody has brought, which may print
+        callback=_json_alone,
+        help="Print the result as JSON and nothing else.",
+    )(function)
+
+
+def _json_alone(_ctx: click.Context, _param: click.Parameter, as_json: bool) -> bool:
+    if as_json:
+        keep_stdout_for_results()
+    return as_json
 
 
 def print_json(record: Mapping[str, Any] | Sequence[Any]) -> None:
     """`record` on stdout; what JSON has no number for becomes null."""
-    click.echo(json.dumps(_plain(record), indent=2, allow_nan=False))
+    with to_results():
+        click.echo(json.dumps(_plain(record), indent=2, allow_nan=False))
 
 
 def _plain(value: Any) -> Any:

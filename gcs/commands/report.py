@@ -37,6 +37,10 @@ def report_command(
     from gcs.shell.display import say
     from gcs.workflows.report import make_common, make_mcap, print_record, report_again
 
+    if mcap:
+        from gcs.analysis.mcap import require_libraries
+
+        require_libraries()  # before the work, not after it
     record, folder = report_again(source, out, quiet or as_json)
     if as_json:
         print_json(record)

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Timer
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TextIO
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -47,13 +47,44 @@ def told_if_slow(line: str, quiet: bool = False) -> Iterator[None]:
         timer.cancel()
 
 
+_aside: list[TextIO] = []  # stdout, while `sys.stdout` is stderr
+
+
+def keep_stdout_for_results() -> None:
+    """From here on stdout is for what `to_results` and `to_reader` write: whatever else is printed in this
+    process, as by a law that somebody has brought, goes to stderr."""
+    if not _aside:
+        _aside.append(sys.stdout)
+        sys.stdout = sys.stderr
+
+
+def give_stdout_back() -> None:
+    """Whoever prints writes to stdout again."""
+    if _aside:
+        sys.stdout = _aside.pop()
+
+
+@contextmanager
+def to_results() -> Iterator[None]:
+    """Meanwhile `sys.stdout` is stdout, also where that is kept for results."""
+    if not _aside:
+        yield
+        return
+    others, sys.stdout = sys.stdout, _aside[0]
+    try:
+        yield
+    finally:
+        _aside[0], sys.stdout = sys.stdout, others
+
+
 def to_reader(write: Callable[[], None]) -> None:
     """Write to stdout by `write`. Whoever has closed it (`| head`) has read enough, and the work goes on."""
-    try:
-        write()
-        sys.stdout.flush()
-    except (BrokenPipeError, SystemExit):  # the latter of rich
-        sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115 - it is stdout from here on
+    with to_results():
+        try:
+            write()
+            sys.stdout.flush()
+        except (BrokenPipeError, SystemExit):  # the latter of rich
+            sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115 - it is stdout from here on
 
 
 def is_live() -> bool:

@@ -70,24 +70,31 @@ def _lanes_pay(plan: SweepPlan, law: str) -> bool:
     return compiled and len(plan.seeds) >= FEWEST and (enough or lanes_part(law).ready)
 
 
-def fly_cases(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row]:
-    """Fly some of the flights, up to eight of a cell at once where that is prepared."""
+def fly_cases(
+    work: Work, cases: Sequence[Case], clock: Clock, stopped: Callable[[], bool] = lambda: False
+) -> list[Row]:
+    """Fly some of the flights, up to eight of a cell at once where that is prepared; when it is `stopped`,
+    those in the air."""
     rows: list[Row] = []
     for (law, _), cell in groupby(cases, key=lambda case: (case.law, case.varied)):
         members = list(cell)
         if any(work.plan.own(law)):
             with watched_calls():
-                rows += [_fly_one(work, case, clock) for case in members]
+                rows += [fly_one(work, case, clock) for case in members if not stopped()]
             continue
         for first in range(0, len(members), LANES):
+            if stopped():
+                break
             some = members[first : first + LANES]
             at_once = law in work.in_lanes and len(some) >= FEWEST
             found = _fly_at_once(work, some, clock) if at_once else None
-            rows += [_fly_one(work, case, clock) for case in some] if found is None else found
+            if found is None:
+                found = [fly_one(work, case, clock) for case in some if not stopped()]
+            rows += found
     return rows
 
 
-def _fly_one(work: Work, case: Case, clock: Clock) -> Row:
+def fly_one(work: Work, case: Case, clock: Clock) -> Row:
     """Fly one of the flights. One that cannot be flown at all has the outcome `refused`."""
     began_s = clock()
     try:

@@ -6,7 +6,7 @@ from autopilot.vehicle.file import VEHICLES
 from gcs.shell.display import told_if_slow
 from gcs.workflows.checked import known_flyable
 from gcs.workflows.flight_options import FlightOptions, setting_of
-from missions.model import Mission
+from missions.model import Mission, Waypoint
 from sitl.sensors.shipped import PROFILES
 
 CHECKING = "checking whether the vehicle can fly it; paths that are hard to shape take a while"
@@ -14,14 +14,26 @@ CHECKING = "checking whether the vehicle can fly it; paths that are hard to shap
 
 def check_options(options: FlightOptions) -> list[str]:
     """GcsError if there is no such vehicle or sensor profile, if a parameter cannot be set so, or if what
-    somebody brings cannot fly; else a line for each setting that may not be meant so."""
+    somebody brings cannot fly; else a line for each option that may not be meant so."""
     if _as_shipped(options):
         return []
     from gcs.workflows.flight_inputs import check_flight_inputs, doubts
 
     settings = list(map(setting_of, options.settings))
     check_flight_inputs(options.vehicle, options.sensors, settings, options.own)
-    return doubts(options.vehicle, settings)
+    told = [f"--set {line}" for line in doubts(options.vehicle, settings)]
+    if any(options.own):
+        from autopilot.own.doubts import own_doubts
+
+        told += own_doubts(options.own)
+    return told
+
+
+def planner_doubts(planner: str, mission: Mission) -> list[str]:
+    """A line if a planner of somebody's own would never be asked in this mission."""
+    if not planner or any(isinstance(step, Waypoint) for step in mission.steps):
+        return []
+    return [f"--planner {planner}: is never asked: mission {mission.name} has no waypoints"]
 
 
 def _as_shipped(options: FlightOptions) -> bool:

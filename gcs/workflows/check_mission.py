@@ -17,7 +17,7 @@ from gcs.mission_items import items_of
 from gcs.workflows.checked import note_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
-from missions.model import Mission, Winch
+from missions.model import Mission, Waypoint, Winch
 
 # Share of the rotors' range that a path must leave a vehicle whose truth is not its belief: slower rotors, a
 # battery that sags and a cable off the centre take a part of it, wind another. `heavy-real` loses Case C with
@@ -107,6 +107,8 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Plan
     found = [*violations(mission, vehicle, not as_asked), *reels_too_far(mission, vehicle)]
     reports = [] if found or as_asked else path_reports(mission, vehicle, planner)
     warnings = tuple(remarks_on(reports, vehicle))
+    if planner is not None and not any(isinstance(step, Waypoint) for step in mission.steps):
+        warnings += (f"the planner is never asked: mission {mission.name} has no waypoints",)
     return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)
 
 

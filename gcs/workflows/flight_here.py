@@ -11,7 +11,7 @@ from gcs.clients.capture import FrameLog
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions, fly
 from gcs.shell.display import FlightDisplay
-from gcs.workflows.before_flight import check_mission, check_options
+from gcs.workflows.before_flight import check_mission, check_options, planner_doubts
 from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.own_flight import flight_client
 from gcs.workflows.warmup import flight_parts, warm_up
@@ -23,9 +23,9 @@ def fly_here(
 ) -> Outcome:
     """Fly as `gcs fly` does in lockstep; the log gets the same bytes. GcsError if it cannot be flown.
 
-    `doubt` is given a line for each setting that may not be meant so.
+    `doubt` is given a line for each option that may not be meant so.
     """
-    for line in check_options(options):
+    for line in (*check_options(options), *planner_doubts(options.planner, mission)):
         doubt(line)
     warm_up(flight_parts((options.law,)), options.quiet)
     check_mission(mission, options)

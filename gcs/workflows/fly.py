@@ -23,7 +23,7 @@ from gcs.folders import PAGE_FILE, SUMMARY_FILE, TLOG_FILE, fresh_folder, keep_o
 from gcs.shell.display import is_live, say
 from gcs.shell.link import Address
 from gcs.shell.stopping import StopRequest
-from gcs.workflows.before_flight import check_mission, check_options
+from gcs.workflows.before_flight import check_mission, check_options, planner_doubts
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FirmwareProgram, FlightOptions
 from gcs.workflows.mission_file import load
@@ -70,11 +70,13 @@ class Flight:
 def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> Flight:
     """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
     the report are drawn. With `view` a page shows it, and stays."""
+    doubts = []
     if options.connect is None and options.firmware is None:
-        for doubt in check_options(options):
-            if not options.quiet:
-                say(f"--set {doubt}")
+        doubts = check_options(options)
     mission = load(options.mission)
+    if not options.quiet:
+        for doubt in (*doubts, *planner_doubts(options.planner, mission)):
+            say(doubt)
     out = options.out or fresh_folder(mission.name)
     with FlightFolder(out, options.overwrite) as folder:
         if options.connect is None:

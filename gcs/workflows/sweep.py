@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from autopilot.own.chosen import NOTHING_OWN, Own
+from autopilot.own.doubts import own_doubts
 from gcs.batch.pool import dask_cluster, own_processes
 from gcs.batch.programs import cores
 from gcs.errors import EXIT_DONE, EXIT_INTERRUPTED, InputError
@@ -19,11 +20,14 @@ from gcs.sweep.plan_file import default_directory, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
+from gcs.workflows.before_flight import planner_doubts
 from gcs.workflows.flight_inputs import doubts
 from gcs.workflows.flight_options import FlightOptions, setting_of
+from gcs.workflows.mission_file import load
 from gcs.workflows.warmup import warm_up
 
-STOPPING = "stopping; completed flights are stored, run the same command again to continue"
+_CONTINUED = "completed flights are stored, run the same command again to continue"
+STOPPING = f"stopping; {_CONTINUED}"
 
 
 FIGURES = (  # of the record, that something can be required of
@@ -112,7 +116,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
     directory = options.out or default_directory(plan, sweep_origin(plan), options.fresh)
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
-    with StopRequest(STOPPING) as stop:
+    with StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop:
         done = sweep(
             plan,
             directory,
@@ -135,6 +139,9 @@ def run_sweep(options: SweepOptions) -> Sweep:
 
 def _tell_doubts(plan: SweepPlan) -> None:
     """Tell what can be flown and may not be meant; of the values of a parameter the first alone."""
+    own = [line for law in plan.laws for line in own_doubts(plan.own(law))]
+    for line in dict.fromkeys([*own, *planner_doubts(plan.planner, load(plan.mission))]):
+        say(line)
     for option, values in (
         ("--set", list(plan.settings)),
         ("--vary", [(one.name, value) for one in plan.varied for value in one.values]),

@@ -12,7 +12,7 @@ from plumbline.learning.batch import Episodes
 from plumbline.learning.options import options_of
 from plumbline.learning.ready import make_ready
 from plumbline.learning.scenario import Scenario
-from plumbline.learning.spaces import action_space, observation_space
+from plumbline.learning.spaces import action_space, checked_actions, observation_space
 from plumbline.learning.step import CRASHED, ENDED
 
 Array = NDArray[np.float32]
@@ -34,6 +34,7 @@ class LoadEnv(gymnasium.Env[Array, Array]):
         self.episodes = Episodes(self.scenario, 1, threads=1)
         self.action_space = action_space(self.scenario)
         self.observation_space = observation_space(self.scenario)
+        self._shape = (self.scenario.task.sight.actions,)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -45,7 +46,7 @@ class LoadEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Observation, reward, whether it crashed, whether the path is over; no information beside."""
-        self.episodes.step(np.reshape(action, (1, -1)))
+        self.episodes.step(checked_actions("action", action, self._shape)[None])
         end = int(self.episodes.ends[0])
         reward = float(self.episodes.rewards[0])
         return self.episodes.observations[0].copy(), reward, end == CRASHED, end == ENDED, {}

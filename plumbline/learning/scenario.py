@@ -15,12 +15,14 @@ from autopilot.guidance.layout import COLUMNS
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import LAWS, apply_settings, autopilot_parameters
 from autopilot.vehicle.rates import divider
+from autopilot.wire.parameter_names import unknown_parameter
 from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import GcsError, input_error
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.plan import simulated
 from gcs.workflows.flight_inputs import check_flight_inputs
+from gcs.workflows.flight_options import WORLD
 from gcs.workflows.mission_file import load
 from missions.model import Mission
 from missions.nearest import did_you_mean
@@ -110,8 +112,12 @@ class Scenario:
             return self.cell.truth, self.cell.settings
         table = self._simulator
         for name, value in zip(self._names, values, strict=True):
+            if name not in table and name.startswith(WORLD):
+                raise GcsError(f"randomise {unknown_parameter(name, table.names)}")
             if name not in table or name in _FIXED:
-                raise GcsError(f"randomise {name}: must be a parameter of the simulator that may change")
+                hint = "" if name in table else did_you_mean(name, table.names)
+                told = f"{hint}must be a parameter of the simulator that may change"
+                raise GcsError(f"randomise {name}: {told}")
             try:
                 table.set(name, value)
             except ParameterError as error:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
+from gcs.errors import GcsError
+from plumbline.arguments import shown
 from plumbline.learning.scenario import Scenario
 
 Array = NDArray[np.float32]
@@ -20,3 +24,20 @@ def action_space(scenario: Scenario) -> Space[Array]:
 def observation_space(scenario: Scenario) -> Space[Array]:
     """See `plumbline.learning.observations`."""
     return Box(-_FURTHEST, _FURTHEST, (scenario.size,), np.float32)
+
+
+def checked_actions(name: str, given: Any, shape: tuple[int, ...]) -> Array:
+    """The numbers of an action, or of one for each environment, of this shape; they need not lie in the space
+    and are cut to it. `Error` if they are of another shape, or no numbers."""
+    try:
+        found = np.asarray(given, np.float32)
+    except (TypeError, ValueError):
+        raise GcsError(f"{name} = {shown(given)}; must be {shape} numbers from -1 to 1") from None
+    if found.shape != shape:
+        raise GcsError(f"{name} of shape {found.shape}; must be {shape}")
+    if not np.isfinite(found).all():
+        if found.ndim > 1:
+            row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
+            name, found = f"{name}[{row}]", found[row]
+        raise GcsError(f"{name} = {shown(found.tolist())}; must be finite numbers from -1 to 1")
+    return found

@@ -17,7 +17,7 @@ from plumbline.learning.batch import Episodes
 from plumbline.learning.options import options_of
 from plumbline.learning.ready import make_ready
 from plumbline.learning.scenario import Scenario
-from plumbline.learning.spaces import action_space, observation_space
+from plumbline.learning.spaces import action_space, checked_actions, observation_space
 from plumbline.learning.step import CRASHED, ENDED
 
 Array = NDArray[np.float32]
@@ -57,6 +57,7 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         self.single_observation_space = observation_space(self.scenario)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._shape = (num_envs, self.scenario.task.sight.actions)
         self._limit = max_episode_steps
         self._steps = np.zeros(num_envs, np.int64)
         self._over = np.zeros(num_envs, np.bool_)  # episodes that have ended and were not begun anew
@@ -88,6 +89,7 @@ class LoadVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         if self.autoreset_mode == AutoresetMode.DISABLED and self._over.any():
             raise GcsError("an episode is over; reset it with options={'reset_mask': ...}")
         begun = self._over.copy()
+        actions = checked_actions("actions", actions, self._shape)
         episodes.step(actions, np.flatnonzero(~begun) if begun.any() else None)
         self._steps += 1
         rewards = np.where(begun, 0.0, episodes.rewards)

@@ -37,6 +37,7 @@ RECORDS = "autopilot.control.records"  # what the laws speak of: vehicle, state,
 OWN = (  # what somebody brings, by its name
     "autopilot.own.brought",
     "autopilot.own.chosen",
+    "autopilot.own.doubts",
     "autopilot.own.estimator",
     "autopilot.own.law",
     "autopilot.own.planner",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import signal
 import threading
 import time
@@ -16,12 +17,15 @@ from autopilot.control.law_desk import Asked, Now
 from autopilot.own.asking import attitude, force, rates, wrench
 from autopilot.own.calls import CALL
 from autopilot.own.compiled import is_compiled, kernel
+from autopilot.own.estimator import estimator_of
 from autopilot.own.law import law_of
+from autopilot.own.planner import planner_of
 from autopilot.own.source import OwnError
-from autopilot.own.trial import TICKS, try_out
+from autopilot.own.trial import TICKS, try_estimator, try_out, try_planner
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
+from plumbline.learning.law import PolicyLaw
 
 VALUES = autopilot_parameters(load_vehicle("bebop")).values()
 UPWARD = force((0.0, 0.0, 4.9))
@@ -72,6 +76,11 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
         lambda memory, now: (memory, wrench(1.0, (1.0, 2.0))),
         r"ValueError: the moment has 2 numbers; must be 3 \(test_host\.py:\d+\)",
     ),
+    "text": (lambda memory, now: (memory, force("abc")), "the force is 'abc'; must be 3 numbers"),  # type: ignore[arg-type]
+    "texts": (
+        lambda memory, now: (memory, force((0.0, 0.0, "up"))),  # type: ignore[arg-type]
+        r"the force is \(0\.0, 0\.0, 'up'\); must be 3 numbers",
+    ),
     "matrix": (
         lambda memory, now: (memory, attitude(((1.0, 0.0, 0.0),), 1.0)),
         "the attitude has 1 rows; must be 3 rows of 3 numbers",
@@ -85,7 +94,7 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
         lambda memory, now: (memory, attitude(((nan, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3), 1.0)),
         "asks for an attitude that is no number",
     ),
-    "rate": (lambda memory, now: (memory, rates(1.0, 3.0)), "the rate has 1 numbers; must be 3"),  # type: ignore[arg-type]
+    "rate": (lambda memory, now: (memory, rates(1.0, 3.0)), r"the rate is 3\.0; must be 3 numbers"),  # type: ignore[arg-type]
 }
 
 
@@ -104,6 +113,41 @@ def test_a_method_with_an_argument_too_few_is_named_with_its_place() -> None:
     told = r"TypeError: .*load_position\(\) takes 2 positional argume.* \(test_host\.py:\d+\)$"
     with pytest.raises(OwnError, match=told):
         tried(Own)
+
+
+class Unmakable:
+    def __init__(self, one: Any, two: Any) -> None:
+        raise AssertionError
+
+    load_position = estimate = plan = __init__
+
+
+class ReadsNothing(PolicyLaw):
+    file = "no such.npz"
+
+
+def test_so_is_one_of_an_estimator_or_a_planner_or_of_what_makes_them() -> None:
+    class Own:
+        def estimate(self, now: Any) -> Any:
+            raise AssertionError
+
+        def plan(self) -> Any:
+            raise AssertionError
+
+    here = r"\(test_host\.py:\d+\)$"
+    for kind in (Own, Unmakable):
+        with pytest.raises(OwnError, match=rf"Estimator \w+ failed: TypeError: .* argument.* {here}"):
+            try_estimator(estimator_of(kind, "mine.py:Own"), VALUES)
+        with pytest.raises(OwnError, match=rf"Planner \w+ failed: TypeError: .* argument.* {here}"):
+            try_planner(planner_of(kind, "mine.py:Own"), VALUES)
+    with pytest.raises(OwnError, match=rf"TypeError: .* argument.* {here}"):
+        tried(Unmakable)
+
+
+def test_what_fails_in_what_it_is_made_of_is_told_with_the_line_of_the_class() -> None:
+    line = inspect.getsourcelines(ReadsNothing)[1]
+    with pytest.raises(OwnError, match=rf"no such\.npz: No such file.* \(test_host\.py:{line}\)$"):
+        tried(ReadsNothing)
 
 
 def test_a_law_that_cannot_be_made_is_told() -> None:
@@ -267,5 +311,22 @@ def test_what_cannot_be_compiled_is_told_with_its_line() -> None:
         def load_position(self, memory: Any, now: Now) -> Any:
             return memory, now.no_such_field  # type: ignore[attr-defined]
 
-    with pytest.raises(OwnError, match=r"Law Uncompiled failed: cannot be compiled: .*\(test_host\.py:\d+\)"):
+    told = r"cannot be compiled: Unknown attribute 'no_such_field' of type Now \(test_host\.py:\d+\)$"
+    with pytest.raises(OwnError, match=rf"Law Uncompiled failed: {told}"):
+        tried(Uncompiled)
+
+
+@needs_compiler
+def test_and_with_the_reason_that_follows_what_it_was_of() -> None:
+    class Uncompiled(Gain):
+        @classmethod
+        def build(cls, parameters: Any) -> Uncompiled:
+            return cls(1.0)
+
+        @kernel
+        def load_position(self, memory: Any, now: Now) -> Any:
+            return memory, len(now.time_s)  # type: ignore[arg-type]
+
+    told = r"cannot be compiled: no implementation of len\(float64\) \(test_host\.py:\d+\)$"
+    with pytest.raises(OwnError, match=told):
         tried(Uncompiled)

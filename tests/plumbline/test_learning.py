@@ -178,6 +178,8 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "reward": ({"reward": {"speed": 1.0}}, "reward: there is no 'speed'"),
     "range": ({"randomise": {"SIM_WIND_E": (2.0, -2.0)}}, "must be \\(least, greatest\\)"),
     "belief": ({"randomise": {"VEH_LOAD_MASS": (0.1, 0.2)}}, "must be a parameter of the simulator"),
+    "typo": ({"randomise": {"SIM_LOAD_MAS": (0.1, 0.2)}}, r"SIM_LOAD_MAS: .* did you mean SIM_LOAD_MASS\?"),
+    "group": ({"randomise": {"SMI_WIND_E": (0.1, 0.2)}}, r"SMI_WIND_E: did you mean SIM_WIND_E\?"),
     "value": ({"randomise": {"SIM_ACT_DELAY_MS": (0.0, 900.0)}}, "SIM_ACT_DELAY_MS = 900.0 ms; must be"),
     "setting": ({"settings": {"SIM_WIND": 1.0}}, "SIM_WIND: no such parameter"),
     "vehicle": ({"vehicle": "zeppelin"}, "zeppelin"),
@@ -185,6 +187,30 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "mission": ({"mission": UP_AND_DOWN}, "mission up: there is no path of the load"),
     "start": ({"start_m": 3.0}, "start_m = 3.0"),
 }
+
+
+WRONG_ACTIONS = {
+    "three": (np.zeros(3), r"action of shape \(3,\); must be \(4,\)"),
+    "number": (0.0, r"action of shape \(\); must be \(4,\)"),
+    "text": ("up", r"action = 'up'; must be \(4,\) numbers"),
+    "nan": (np.array([0.0, np.nan, 0.0, 0.0]), r"action = .*nan.*; must be finite numbers from -1 to 1"),
+    "inf": ([0.0, 0.0, np.inf, 0.0], "must be finite numbers from -1 to 1"),
+}
+
+
+def test_an_action_that_is_none_is_refused() -> None:
+    env = gymnasium.make(HOVER, disable_env_checker=True)
+    env.reset(seed=1)
+    for action, told in WRONG_ACTIONS.values():
+        with pytest.raises(plumbline.Error, match=told):
+            env.step(action)
+    assert env.step(np.array([9.0, 0.0, 0.0, 0.0]))[4] == {}  # cut to 1
+    envs = gymnasium.make_vec(HOVER, 2)
+    envs.reset(seed=1)
+    with pytest.raises(plumbline.Error, match=r"actions of shape \(4,\); must be \(2, 4\)"):
+        envs.step(np.zeros(4))
+    with pytest.raises(plumbline.Error, match=r"actions\[1\] = .*nan"):
+        envs.step(np.array([[0.0] * 4, [0.0, 0.0, 0.0, np.nan]]))
 
 
 @pytest.mark.parametrize(("options", "told"), BAD.values(), ids=BAD)

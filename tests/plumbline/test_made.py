@@ -133,6 +133,10 @@ WRONG: dict[str, tuple[Any, str]] = {
     "vehicle": (lambda: Vehicle(name="mine"), "mine: quad_mass_kg is missing (mass of the vehicle"),
     "vehicle's name": (lambda: Vehicle.load("bepop"), "did you mean bebop?"),
     "vehicle's key": (lambda: Vehicle.load("bebop").replace(arm=1.0), "bebop: arm: unknown key; write arm_m"),
+    "vehicle's thing": (
+        lambda: Vehicle.load("bebop").replace(cable=1.0),
+        "cable: unknown key; write cable_length_m",
+    ),
     "vehicle's value": (lambda: Vehicle.load("bebop").replace(load_mass_kg=-1), "load_mass_kg = -1; must be"),
     "sensors": (lambda: Sensors.load("lab").replace(imu=None), "Sensors: imu is missing"),
     "sensor's value": (lambda: Sensors.load("lab").replace(mocap={"rate_hz": 0}), "mocap.rate_hz = 0; must"),

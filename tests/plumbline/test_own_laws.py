@@ -10,8 +10,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 import plumbline
+from autopilot.own.chosen import Own
+from autopilot.own.doubts import own_doubts
 from gcs.cli import gcs
-from gcs.errors import EXIT_USAGE
+from gcs.errors import EXIT_DONE, EXIT_USAGE
 from missions.model import Delay, Land, Mission, Takeoff
 from plumbline.examples.load_pid import LoadPid
 from plumbline.laws import Asked, Now
@@ -25,6 +27,24 @@ class Fails(LoadPid):
         if now.time_s > 3.0:
             return memory, now.no_such_field
         return super().load_position(memory, now)
+"""
+
+PLANNER = "plumbline.examples.minimum_snap:MinimumSnap"
+SAYS = """
+from multiprocessing import parent_process
+
+if parent_process() is not None:
+    print("said by a worker")
+"""
+PRINTS = """
+from plumbline.examples.minimum_snap import MinimumSnap
+
+print("loading")
+
+class Prints(MinimumSnap):
+    def plan(self, route):
+        print("planning")
+        return super().plan(route)
 """
 
 
@@ -89,16 +109,53 @@ def test_one_that_there_is_not_is_told(command: str) -> None:
     words = [command, *(["hover"] if command != "warmup" else []), "--law", "nofile.py:Mine"]
     result = run(*words)
     assert result.exit_code == EXIT_USAGE
-    assert "nofile.py: no such file" in result.output
+    assert result.stderr == "gcs: --law nofile.py: no such file\n"
 
 
-def test_a_sweep_tells_laws_apart(tmp_path: Path) -> None:
+def test_what_it_prints_is_no_part_of_the_json(tmp_path: Path) -> None:
+    """Nor is anything else in the way of whoever reads stdout."""
+    path = tmp_path / "mine.py"
+    path.write_text(PRINTS)
+    result = run("check", "square", "--planner", str(path), "--json")
+    assert result.exit_code == EXIT_DONE, result.stderr
+    assert json.loads(result.stdout)["mission"] == "square"
+    assert result.stderr.startswith("loading\nplanning\n")
+    assert "planning" in run("check", "square", "--planner", str(path)).stdout  # to people as it comes
+
+
+class Misspelt(LoadPid):
+    def quad_postion(self, memory: Any, now: Now) -> tuple[Any, Asked]:
+        raise AssertionError
+
+    def position(self) -> None:
+        raise AssertionError
+
+
+def test_a_method_whose_name_is_near_to_one_that_is_called_is_told() -> None:
+    law = f"{__file__}:Misspelt"
+    assert own_doubts(Own(law)) == [
+        f"--law {law}: Misspelt.quad_postion is never called; did you mean quad_position?"
+    ]
+    shipped = Own("plumbline.examples.load_pid:LoadPid", "plumbline.examples.luenberger:Luenberger")
+    assert own_doubts(shipped._replace(planner=PLANNER)) == []
+
+
+def test_a_planner_that_is_never_asked_is_told() -> None:
+    with pytest.warns(UserWarning, match=f"^planner {PLANNER}: is never asked: mission short has no way"):
+        plumbline.fly(SHORT, planner=PLANNER, quiet=True)
+    told = "the planner is never asked: mission hover has no waypoints\n"
+    assert run("check", "hover", "--planner", PLANNER).stdout.endswith(told)
+    assert "never asked" not in run("check", "square", "--planner", PLANNER).stdout
+
+
+def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """And flies each as `fly` does."""
     path = tmp_path / "mine.py"
-    path.write_text(FAILS)
+    path.write_text(f"{SAYS}{FAILS}")
     laws = (f"{__file__}:Heavier", f"{path}:Fails")
     out = tmp_path / "out"
     rows = plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True, kind="arrow").to_pylist()
+    assert capfd.readouterr() == ("", "said by a worker\n")
     assert [(row["law"], row["outcome"]) for row in rows] == [("heavier", "completed"), ("Fails", "diverged")]
     error_m = plumbline.fly("hover", law=Heavier, quiet=True).summary["load_error_max_m"]
     assert rows[0]["load_error_max_m"] == pytest.approx(error_m, rel=1e-3)

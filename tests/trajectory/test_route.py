@@ -106,9 +106,11 @@ def jumping(path: Path) -> Path:
 WRONG = {
     "times": (lambda p: p._replace(passes_s=(0.0, 2.0, 4.0)), r"passes_s are 3 times; must be 2"),
     "number": (with_table((0, 5), np.nan), "what is no number"),
-    "begin": (with_table((0, 0), 0.5), r"begins at 0\.5 s; must be 0"),
+    "begin": (with_table((0, 0), 0.5), r"breaks_s of the path begin at 0\.5 s; must begin at 0"),
+    "late": (lambda p: p._replace(passes_s=(0.5, 4.0)), r"passes_s of the path begin at 0\.5 s"),
     "end": (lambda p: p._replace(passes_s=(0.0, 3.0)), "ends at 4 s and passes its last point at 3 s"),
-    "order": (with_table((0, 1), -1.0), "do not rise"),
+    "order": (with_table((0, 1), -1.0), r"breaks_s of the path must increase; -1 s comes after 0 s"),
+    "reversed": (lambda p: p._replace(passes_s=(4.0, 0.0)), r"passes_s .* increase; 0 s comes after 4 s"),
     "rest": (with_table((0, 3), 0.1), r"begins or ends with a velocity of 0\.1 m/s; must be at rest"),
     "jump": (jumping, r"position of the path jumps by 0\.01 m at 2\.00 s"),
     "beside": (with_table((0, 2), 0.1), r"passes point 0 0\.10 m beside it"),
@@ -130,5 +132,5 @@ def test_shapes_that_do_not_fit_are_told() -> None:
         polynomials([0.0, 1.0], np.zeros((2, 4, 3)), [0.0, 1.0])
     with pytest.raises(ValueError, match=r"positions are of shape \(2, 2\); must be \(2, 3\)"):
         samples([0.0, 1.0], np.zeros((2, 2)), [0.0, 1.0])
-    with pytest.raises(ValueError, match="times_s must rise"):
+    with pytest.raises(ValueError, match="times_s must increase"):
         samples([1.0, 1.0], np.zeros((2, 3)), [0.0, 1.0])

@@ -1,0 +1,27 @@
+"""Three numbers, as the methods that somebody has brought give them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from autopilot.geometry.linear import Vec3
+
+_LONGEST_SHOWN = 60  # characters
+
+
+def three_numbers(numbers: Any, what: str) -> Vec3:
+    """Three numbers of a tuple, a list or an array. ValueError, which names `what` they are, if it has not
+    these."""
+    try:
+        shape = np.shape(numbers)
+        if shape == (3,):
+            return (float(numbers[0]), float(numbers[1]), float(numbers[2]))
+    except (TypeError, ValueError):
+        shape = ()
+    if shape:
+        raise ValueError(f"{what} has {' x '.join(map(str, shape))} numbers; must be 3")
+    text = repr(numbers)
+    text = text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
+    raise ValueError(f"{what} is {text}; must be 3 numbers")

@@ -1,0 +1,76 @@
+"""Who asks a sweep to stop waits for the flights in the air, and for no others."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from gcs.batch import pool
+from gcs.batch.pool import PoolCrew
+from gcs.batch.runner import fly_all
+from gcs.sweep import work
+
+GROUPS = [tuple(range(first, first + 16)) for first in range(0, 160, 16)]
+
+
+class Threads(ThreadPoolExecutor):
+    """In place of processes."""
+
+    def __init__(self, recalled: threading.Event) -> None:
+        super().__init__(1)
+        self._event = recalled
+
+    def recall(self) -> None:
+        self._event.set()
+
+
+@pytest.fixture
+def recalled(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    event = threading.Event()
+    monkeypatch.setattr(pool, "RECALLED", [event])
+    yield event
+    event.set()
+
+
+def test_groups_and_flights_that_have_not_begun_are_recalled(recalled: threading.Event) -> None:
+    in_the_air = threading.Event()
+
+    def fly(group: tuple[int, ...], clock: Any, stopped: Any) -> list[int]:
+        flown = []
+        for flight in group:
+            if stopped():
+                break
+            if flight == 2:
+                in_the_air.set()
+                assert recalled.wait(60.0)
+            flown.append(flight)
+        return flown
+
+    stored: list[int] = []
+    with Threads(recalled) as executor:
+        crew: PoolCrew[int, int] = PoolCrew(executor, 1, fly)
+        whole = fly_all(GROUPS, crew, stored.extend, lambda *_: None, in_the_air.is_set)
+    assert not whole
+    assert stored == [0, 1, 2]
+
+
+def test_a_sweep_begins_no_flight_after_it_was_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown: list[int] = []
+
+    def fly_one(_: object, case: Any, clock: object) -> Any:
+        flown.append(case.index)
+        return {"index": case.index}
+
+    monkeypatch.setattr(work, "fly_one", fly_one)
+    cases: Any = [SimpleNamespace(law="plumbline", varied=(), index=index) for index in range(20)]
+    for own in ((), ("mine.py",)):
+        flown.clear()
+        plan = SimpleNamespace(own=lambda _law, own=own: own)
+        prepared: Any = SimpleNamespace(plan=plan, in_lanes=frozenset())
+        rows = work.fly_cases(prepared, cases, lambda: 0.0, lambda: len(flown) == 11)
+        assert [row["index"] for row in rows] == flown == list(range(11))
