@@ -118,7 +118,6 @@ def test_version():
         (["fly"], "MISSION"),
         (["flyy"], "flyy"),
         (["fly", "hover", "--sped", "1"], "--sped"),
-        (["fly", "hover", "--law", "magic"], "thesis"),
         (["fly", "hover", "--seed", "-1"], "--seed"),
         (["fly", "hover", "--seed", "one"], "--seed"),
         (["fly", "hover", "--speed", "0"], "--speed"),
@@ -146,6 +145,11 @@ def test_wrong_usage_is_one_line_and_code_2(arguments, part):
     line = one_line(run(*arguments), EXIT_USAGE)
     assert part in line
     assert "--help" in line
+
+
+def test_a_law_that_there_is_not_is_one_line_with_those_that_there_are():
+    line = one_line(run("fly", "hover", "--law", "magic"), EXIT_USAGE)
+    assert "must be thesis, lqr, plumbline, or a file as my_law.py:MyLaw" in line
 
 
 # ---- known errors
