@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from autopilot.services.ftp import Op, Packet, payload_of
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import encode_mission
 from benchmarks.hostile import order, ports_of

@@ -44,7 +44,7 @@ from autopilot.supervisor.state import Phase
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import encode_mission
 from autopilot.wire.signing import Signing, timestamp_of

@@ -44,7 +44,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import plumbline
 from autopilot.vehicle.model import Vehicle
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
 from gcs.analysis.telemetry import load_telemetry

@@ -17,7 +17,7 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import apply_settings
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, TruthQueue, ground_turn

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import MissionItemError, WireItem, encode_mission, step_of
 from gcs.errors import InputError
 from missions.model import KINDS, Mission

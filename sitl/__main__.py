@@ -28,7 +28,7 @@ from autopilot.shell.options import (
     shown,
 )
 from autopilot.vehicle.file import VEHICLES, VehicleFileError
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.parameter_table import ParameterError
 from sitl.hil import HilSimulator
 from sitl.pacing import Pacing

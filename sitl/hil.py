@@ -19,10 +19,12 @@ from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.vehicle.battery import open_voltage
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.layout import PLUS, Layout
-from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.battery import BatteryReading, battery_status_message
+from autopilot.wire.convert.flight import wind_state_message
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.simulator import padded, read_hil_actuator_controls
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.simulator_frames import Answer, answer_in
@@ -246,7 +248,7 @@ class HilSimulator:
             if one.system != VEHICLE_SYSTEM:
                 continue
             if one.message.get_msgId() == mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS:
-                said = convert.read_hil_actuator_controls(one.message)
+                said = read_hil_actuator_controls(one.message)
                 self._take(said.time_us, said.forces, said.armed, said.gripper_open, said.reel_rate)
             else:
                 aside.append(one.message)
@@ -431,7 +433,7 @@ class HilSimulator:
         messages: list[Any] = []
         if wind_due:
             self._gust_told = core.pulse
-            messages.append(convert.wind_state_message(now_us, core.settings.wind, core.pulse))
+            messages.append(wind_state_message(now_us, core.settings.wind, core.pulse))
         if snapped:
             speed = core.snap_speed
             messages.append(mavlink.MAVLink_cable_snap_message(now_us, speed, self._snap_mass() * speed))
@@ -443,7 +445,7 @@ class HilSimulator:
         """Which run of the world this is, and what an autopilot finds that starts now."""
         core = self.core
         reeled_m = core.cable_length - core.truth.cable_length
-        forces = convert.padded(self._command)
+        forces = padded(self._command)
         return mavlink.MAVLink_sim_boot_message(
             core.now_us,
             self._boot_id,
@@ -464,9 +466,7 @@ class HilSimulator:
         drive, supply = self.core.truth.drive, self.core.world.supply
         left = max(0.0, drive.charge - supply.used_as / drive.capacity_as)
         voltage = supply.voltage if self.core.tick_count else drive.cells * open_voltage(drive.charge)
-        return convert.battery_status_message(
-            convert.BatteryReading(voltage, supply.current, supply.used_as / 3.6, left)
-        )
+        return battery_status_message(BatteryReading(voltage, supply.current, supply.used_as / 3.6, left))
 
     def _status(self) -> object:
         pacing, state = self.pacing, self.core.state

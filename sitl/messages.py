@@ -10,8 +10,8 @@ from autopilot.geometry.linear import ZERO, Vec3, apply_transposed, norm, sub
 from autopilot.geometry.packed import Row, pack, unpack
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.wire.compiled import Bytes, Origin, put_frame
-from autopilot.wire.convert import Home
 from autopilot.wire.convert.flight import load_state_values, rotor_state_values
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import (
     ACCEL,
     GYRO,

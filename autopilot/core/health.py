@@ -27,7 +27,7 @@ from autopilot.vehicle.battery import (
     work_of,
 )
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.wire.convert import ACCEL, GYRO, MAG, PRESSURE
+from autopilot.wire.convert.simulator import ACCEL, GYRO, MAG, PRESSURE
 
 _FRESH_US = 500_000  # a sensor is healthy while its last word is no older
 _MEAN_HZ, _SQUARE_HZ = 5.0, 2.0

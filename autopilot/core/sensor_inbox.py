@@ -41,14 +41,14 @@ from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack, packed, unpack, width
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.compiled import PAYLOAD_ROOM, Bytes, frame_end, holds, taken
-from autopilot.wire.convert import (
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.simulator import (
     ACCEL,
     GYRO,
     MAG,
     PRESSURE,
     HilGps,
     HilSensor,
-    Home,
     load_sensor_in,
     odometry_in,
     read_hil_gps,

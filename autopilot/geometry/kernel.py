@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from numba.core import caching, config, event
+from numba.extending import register_jitable
 
 from autopilot.geometry.compiler import Kernel
+from autopilot.geometry.jitable import register_with
 from autopilot.geometry.machine_code import CHOSEN_BY_USER, ROOT, folder_of, sources_hash
 
 _LONGEST_S = 600.0  # that another process is waited for; then we compile what it does not deliver
@@ -151,6 +153,7 @@ class _Failures(event.Listener):
 
 
 event.register("numba:compile", _Failures())
+register_with(register_jitable)
 
 
 def kernel(function: Callable[P, T]) -> Callable[P, T]:

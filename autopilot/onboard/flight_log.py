@@ -17,7 +17,7 @@ from autopilot.onboard.log_topics import FAST, SLOW, Numbers, Sample
 from autopilot.services.files import LOG_ENDING, LOG_FOLDER, Path
 from autopilot.services.streams import NEVER_US
 from autopilot.wire import ulog
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.ulog import UlogWriter
 

@@ -22,7 +22,7 @@ from autopilot.onboard.log_topics import FAST, Column, Derived, Sample
 from autopilot.services.instant import Instant
 from autopilot.vehicle.layout import MOST
 from autopilot.wire.compiled import Bytes
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.ulog import RECORD_HEAD, UlogWriter
 
 _STOP, _FULL = 1000.0, 2000.0  # actuator_outputs, us

@@ -18,8 +18,8 @@ from autopilot.geometry.so3 import Quat
 from autopilot.services import identity
 from autopilot.services.snapshot import Snapshot
 from autopilot.vehicle.layout import MOST
-from autopilot.wire.convert import Forces
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
+from autopilot.wire.convert.simulator import Forces
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.ulog import Topic
 

@@ -72,7 +72,8 @@ from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.vehicle.rates import RateError, control_divider
 from autopilot.wire.codec import FrameWriter, layout_of
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
-from autopilot.wire.convert import Home, read_battery_status
+from autopilot.wire.convert.battery import read_battery_status
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_from, located_steps, unflown

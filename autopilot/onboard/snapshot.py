@@ -40,7 +40,9 @@ from autopilot.supervisor.state import (
 )
 from autopilot.supervisor.watches.fence import limited
 from autopilot.vehicle.parameters import AutopilotParameters
-from autopilot.wire.convert import BatteryReading, HilGps, Home
+from autopilot.wire.convert.battery import BatteryReading
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.simulator import HilGps
 from autopilot.wire.dialect import plumbline as mavlink
 
 FRESH_S = 0.5  # a tracker is healthy while its last reading is no older

@@ -21,7 +21,7 @@ from autopilot.vehicle.layout import MOST
 from autopilot.vehicle.parameters import AutopilotParameters
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.ulog import UlogWriter
 
 

@@ -47,7 +47,7 @@ from autopilot.services.requests import (
     Terminate,
     Winch,
 )
-from autopilot.wire.convert import Home, enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import turn_nose
 from autopilot.wire.parameter_table import decimal_from_float32

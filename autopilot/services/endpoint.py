@@ -88,7 +88,7 @@ from autopilot.services.telemetry import (
 from autopilot.services.timesync import answer_ping, answer_timesync
 from autopilot.services.virtual_files import information_message, made_files, metadata_message
 from autopilot.wire.codec import FrameWriter, Received, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterTable

@@ -11,7 +11,7 @@ from typing import Any
 
 from autopilot.services.identity import Identity
 from autopilot.services.snapshot import Snapshot
-from autopilot.wire.convert import saturated
+from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.dialect import plumbline as mavlink
 
 _GROUP = 4  # of a message

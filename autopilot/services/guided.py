@@ -14,7 +14,7 @@ from autopilot.geometry.frames import enu_from_ned, flu_from_frd
 from autopilot.geometry.linear import Vec3
 from autopilot.services.records import Decide, Output, Peer, Say, Verdict
 from autopilot.services.requests import FollowAttitude, FollowRates, FollowSetpoint, FollowStick
-from autopilot.wire.convert import Home, enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
 COMPLAIN_US = 5_000_000

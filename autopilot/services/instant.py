@@ -13,7 +13,6 @@ from numba.extending import register_jitable
 
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.so3 import Quat
-from autopilot.wire.convert import ROTOR_FMAX, Home
 from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.flight import (
     cascade_errors_values,
@@ -21,8 +20,9 @@ from autopilot.wire.convert.flight import (
     load_state_values,
     rotor_state_values,
 )
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.scaling import saturated
-from autopilot.wire.convert.simulator import Forces
+from autopilot.wire.convert.simulator import ROTOR_FMAX, Forces
 from autopilot.wire.convert.telemetry import (
     altitude_values,
     attitude_quaternion_values,

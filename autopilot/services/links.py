@@ -11,7 +11,7 @@ from autopilot.services.records import Source
 from autopilot.services.stream_frames import StreamFrames
 from autopilot.services.streams import Streams
 from autopilot.wire.codec import FrameWriter, split
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Sign
 

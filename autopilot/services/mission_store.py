@@ -12,7 +12,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import MissionItemError, WireItem, located_steps
 
 MAX_ITEMS = 2000

@@ -39,7 +39,7 @@ from autopilot.services.records import (
 )
 from autopilot.services.requests import ReplaceMission, Reposition
 from autopilot.services.streams import NEVER_US
-from autopilot.wire.convert import Home, enu_from_geodetic, geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import LocatedStep, MissionItemError, WireItem, located_steps

@@ -14,8 +14,9 @@ from autopilot.services.identity import Identity
 from autopilot.services.instant import attitude_quaternion_of, pulses_of
 from autopilot.services.snapshot import Sensed, Snapshot
 from autopilot.wire.codec import layout_of
-from autopilot.wire.convert import boot_ms, saturated
 from autopilot.wire.convert.axes import frd_from_flu, ned_from_enu
+from autopilot.wire.convert.scaling import saturated
+from autopilot.wire.convert.telemetry import boot_ms
 from autopilot.wire.dialect import plumbline as mavlink
 
 _HIGHRES_IMU = layout_of(mavlink.MAVLink_highres_imu_message)

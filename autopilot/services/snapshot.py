@@ -12,7 +12,8 @@ from typing import NamedTuple
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row
 from autopilot.geometry.so3 import Quat
-from autopilot.wire.convert import NO_FORCES, Forces, Home
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.simulator import NO_FORCES, Forces
 from autopilot.wire.dialect import plumbline as mavlink
 
 _UNKNOWN: Vec3 = (math.nan, math.nan, math.nan)

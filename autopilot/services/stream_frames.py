@@ -38,7 +38,8 @@ from autopilot.services.instant import (
 )
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.compiled import FRAME_ROOM, PAYLOAD_ROOM, Bytes, Origin, put_frame, wire_record
-from autopilot.wire.convert import Home, boot_ms
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.telemetry import boot_ms
 from autopilot.wire.dialect import plumbline as mavlink
 
 ATTITUDE = wire_record(mavlink.MAVLink_attitude_message, __name__)

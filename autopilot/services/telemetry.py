@@ -61,22 +61,24 @@ from autopilot.services.sensor_streams import (
 from autopilot.services.snapshot import GEOFENCE, PREARM, Snapshot
 from autopilot.services.streams import OFF
 from autopilot.wire.codec import layout_of
-from autopilot.wire.convert import (
+from autopilot.wire.convert.axes import ned_from_enu
+from autopilot.wire.convert.battery import (
     BatteryReading,
     battery_ca,
     battery_mv,
     battery_percent,
     battery_status_message,
+)
+from autopilot.wire.convert.flight import filter_state_message
+from autopilot.wire.convert.scaling import uint16
+from autopilot.wire.convert.telemetry import (
     boot_ms,
-    filter_state_message,
     global_position_int_message,
     gps_global_origin_message,
     gps_raw_int_message,
     home_position_message,
-    uint16,
     winch_status_message,
 )
-from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 
 Builder = Callable[[Snapshot, Identity], tuple[Any, ...]]

@@ -17,7 +17,7 @@ from typing import Any, TextIO, cast
 
 import click
 
-from autopilot.wire.convert import Home, home_from_text
+from autopilot.wire.convert.geodesy import Home, home_from_text
 from autopilot.wire.signing import NoKeyError, key_of_text
 
 Address = tuple[str, int]

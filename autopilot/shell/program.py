@@ -65,7 +65,7 @@ from autopilot.shell.watched_calls import watched_calls
 from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from autopilot.wire.parameter_table import ParameterError

@@ -19,7 +19,7 @@ from autopilot.services.mission_store import (
 )
 from autopilot.shell.sd_card import DirectoryCard
 from autopilot.shell.whole_file import DamagedError, keep_copy, remove, seal, unseal, write_whole
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import MissionItemError, WireItem

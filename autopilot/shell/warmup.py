@@ -20,7 +20,7 @@ def main(part: str, law: str) -> None:
     from autopilot.services.identity import identity_of
     from autopilot.shell.tick_loop import rehearse
     from autopilot.vehicle.file import load_vehicle
-    from autopilot.wire.convert import Home
+    from autopilot.wire.convert.geodesy import Home
 
     named = REFERENCE if law == OWN else law
     own = Own(own_law(named))

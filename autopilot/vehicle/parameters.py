@@ -105,7 +105,7 @@ def _with_law(parameter: Parameter, law: str) -> Parameter:
 
 def vehicle_values(belief: Vehicle) -> dict[str, float]:
     """The numbers of the vehicle by the names that `from_vehicle` and `proportional_to` use."""
-    from autopilot.wire.convert import ROTOR_FMAX
+    from autopilot.wire.convert.simulator import ROTOR_FMAX
 
     # where there is no limit the parameters keep the forces of Table 4-1 and the mixer ignores them
     rotor_min, rotor_max = (belief.rotor_min_n, belief.rotor_max_n) if belief.limited else (0.0, ROTOR_FMAX)

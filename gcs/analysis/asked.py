@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from autopilot.wire.codec import Received
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.records import WireItem
 from autopilot.wire.parameter_encoding import from_the_wire

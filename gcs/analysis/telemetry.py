@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.wire.codec import Received
-from autopilot.wire.convert import Home
-from autopilot.wire.convert.geodesy import enu_from_geodetic, geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.asked import ASKED, VEHICLE_SYSTEM, Asked
 from gcs.analysis.axes import Floats, enu_from_ned, flu_from_frd, quat_enu_flu_from_ned_frd

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from autopilot.geometry.linear import ZERO, Vec3
-from autopilot.wire.convert import Home
-from autopilot.wire.convert.geodesy import geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from autopilot.wire.items.records import FRAME_MISSION, FRAME_RELATIVE

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from autopilot.wire.codec import Field, Received
-from autopilot.wire.convert.flight import rotor_forces
+from autopilot.wire.convert.rotor_forces import rotor_forces
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.modes import mode_name
 

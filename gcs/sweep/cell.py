@@ -17,7 +17,7 @@ from autopilot.vehicle.file import load_belief, load_vehicle
 from autopilot.vehicle.layout import Layout
 from autopilot.vehicle.parameters import apply_settings
 from autopilot.vehicle.rates import control_divider
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, encode_mission
 from gcs.clients.flight import TIME_FACTOR, TIME_MARGIN_S
 from gcs.closed_loop import Conditions

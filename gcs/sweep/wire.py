@@ -28,8 +28,7 @@ from autopilot.geometry.kernel import kernel
 from autopilot.geometry.lanes import if_above, single
 from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, pack
-from autopilot.wire.convert import Home
-from autopilot.wire.convert.geodesy import EARTH_RADIUS_M
+from autopilot.wire.convert.geodesy import EARTH_RADIUS_M, Home
 from autopilot.wire.convert.scaling import saturated
 from autopilot.wire.convert.simulator import REEL_MAX, ROTOR_FMAX
 from sitl.messages import SPEEDS_US, rotor_speed

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
-from autopilot.wire.convert import Home
 from autopilot.wire.convert.axes import ned_from_enu
-from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 

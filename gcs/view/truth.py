@@ -7,9 +7,8 @@ from collections import deque
 from typing import Any
 
 from autopilot.wire.codec import Received
-from autopilot.wire.convert import Home
 from autopilot.wire.convert.axes import ned_from_enu
-from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 
 Place = tuple[float, float, float]  # NED, m

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from autopilot.wire.codec import Received
-from autopilot.wire.convert import Home
 from autopilot.wire.convert.axes import ned_from_enu
-from autopilot.wire.convert.flight import rotor_forces
-from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
+from autopilot.wire.convert.rotor_forces import rotor_forces
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_encoding import from_the_wire
 from autopilot.wire.parameter_table import decimal_from_float32

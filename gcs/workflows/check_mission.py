@@ -10,7 +10,7 @@ from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, cable_trouble, timeline
 from autopilot.vehicle.file import belief_of, load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
 from gcs.mission_items import items_of

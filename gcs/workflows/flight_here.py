@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from autopilot.own.law import law_number
 from autopilot.shell.watched_calls import watched_calls
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import FrameLog
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions, fly

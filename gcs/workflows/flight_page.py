@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.own.law import name_of
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import Capture
 from gcs.clients.datagrams import messages
 from gcs.clients.flight import FlightClient

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from autopilot.trajectory.timeline import expected_duration_s
 from autopilot.vehicle.file import load_vehicle
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.firmware_flight import FIRMWARES, Firmware, FirmwareFlight

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.connection import LINK_TIMEOUT_US
 from gcs.clients.flight import FlightClient

@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 
 from autopilot.geometry.linear import Vec3, add, norm, sub
-from autopilot.wire.convert import Home
-from autopilot.wire.convert.geodesy import enu_from_geodetic, geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items.limits import FARTHEST_M
 from gcs.clients import command

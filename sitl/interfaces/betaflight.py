@@ -11,8 +11,7 @@ from struct import Struct
 from autopilot.geometry.frames import frd_from_flu, quat_ned_frd_from_enu_flu
 from autopilot.geometry.linear import Vec3
 from autopilot.geometry.so3 import Quat
-from autopilot.wire.convert import Home
-from autopilot.wire.convert.geodesy import geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from sitl.hil import HilSimulator
 from sitl.messages import pressure_pa
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from autopilot.wire.convert import Home, enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.tlog import read_tlog
 

@@ -25,11 +25,11 @@ from autopilot.estimation.records import (
 )
 from autopilot.geometry.packed import unpack
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import (
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.simulator import (
     MAG,
     PRESSURE,
     HilGps,
-    Home,
     hil_gps_message,
     hil_sensor_message,
     load_sensor_message,

@@ -34,7 +34,7 @@ import plumbline
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import encode_mission
 from gcs.cli import gcs
 from gcs.clients.flight import Outcome

@@ -17,7 +17,7 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.requests.verdicts import ACCEPTED as ACCEPTANCE
 from autopilot.supervisor.state import Flight, Phase
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, encode_steps
 from gcs.closed_loop import Conditions, build_onboard, build_simulator

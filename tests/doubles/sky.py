@@ -20,7 +20,7 @@ from autopilot.supervisor.settings import Settings, settings_from
 from autopilot.supervisor.state import IN_AIR, Flight, MissionPlan, Phase, View
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import encode_steps, located_steps
 from missions.model import Step
 

@@ -9,7 +9,7 @@ import pytest
 from autopilot.geometry.linear import norm
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.supervisor.state import Phase
-from autopilot.wire.convert import Home, geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard
 from missions.model import Delay, Land, Takeoff, Waypoint

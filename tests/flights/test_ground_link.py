@@ -17,7 +17,7 @@ from autopilot.services.snapshot import Snapshot
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from gcs.clients.missions import MissionDownload, MissionUpload

@@ -12,7 +12,7 @@ from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.guidance.heading import heading_of, turn
 from autopilot.supervisor.state import Phase, setpoint
-from autopilot.wire.convert import Home, geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import WireItem
 from missions.model import Land, Takeoff, Waypoint

@@ -7,7 +7,7 @@ import math
 from autopilot.onboard.onboard import plan_of
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Phase
-from autopilot.wire.convert import Home, geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import WireItem, located_steps
 from tests.doubles.craft import Craft

@@ -11,7 +11,7 @@ import pytest
 
 from autopilot.own.chosen import Own
 from autopilot.supervisor.state import Phase
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard
 from missions.fileformat import load_mission

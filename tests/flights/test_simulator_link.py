@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
 
 TICKS = 400

@@ -8,7 +8,7 @@ import pytest
 
 from autopilot.onboard.onboard import Onboard
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.operation import GROUND
 from gcs.closed_loop import Conditions, build_onboard, build_simulator

@@ -11,7 +11,7 @@ import pytest
 
 from autopilot.shell.options import signing_key_option
 from autopilot.vehicle.file import load_vehicle
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import encode_mission
 from autopilot.wire.parameter_table import parse_text
 from gcs.formats.missions import read_foreign, write_foreign

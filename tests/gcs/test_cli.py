@@ -16,7 +16,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from autopilot.wire.convert import Home, enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from autopilot.wire.tlog import read_tlog

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import decode_items, encode_mission
 from gcs.errors import InputError
 from gcs.mission_items import items_of

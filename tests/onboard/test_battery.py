@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from autopilot.wire.codec import decode
-from autopilot.wire.convert import Home, read_battery_status
+from autopilot.wire.convert.battery import read_battery_status
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.closed_loop import Conditions, build_onboard, build_simulator
 

@@ -21,7 +21,7 @@ from autopilot.services.identity import Identity
 from autopilot.services.instant import Instant
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.tlog import TlogWriter
 from gcs import closed_loop
 from missions.fileformat import load_mission

@@ -14,8 +14,8 @@ from autopilot.onboard.onboard import Onboard
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Phase
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home, hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
-from autopilot.wire.convert.geodesy import geodetic_from_enu
+from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
+from autopilot.wire.convert.simulator import hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.closed_loop import Conditions, build_onboard

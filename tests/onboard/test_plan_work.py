@@ -9,7 +9,7 @@ from autopilot.supervisor.state import Phase
 from autopilot.trajectory.prepare import PENDING, Prepared
 from autopilot.trajectory.shaping import Shaped
 from autopilot.trajectory.waypoint_path import Passage
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from gcs.clients.missions import MissionUpload

@@ -14,7 +14,7 @@ from autopilot.services.mission_store import StoredMission
 from autopilot.services.records import Event, Verdict
 from autopilot.services.snapshot import Snapshot
 from autopilot.wire.codec import FrameWriter, Received, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, encode_steps
 from autopilot.wire.parameter_table import Parameter, ParameterTable

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from autopilot.services.mission_store import deserialise_items, serialise
 from autopilot.services.records import AreasChanged, MissionChanged
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import Disc, Polygon, read_fence, read_rally
 from autopilot.wire.items import MissionItemError, WireItem

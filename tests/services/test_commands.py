@@ -36,7 +36,7 @@ from autopilot.services.requests import (
     TurnNose,
     Winch,
 )
-from autopilot.wire.convert import geodetic_from_enu
+from autopilot.wire.convert.geodesy import geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import Parameter
 

@@ -22,7 +22,7 @@ from autopilot.services.statustext import CHUNK
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import STREAMS
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.parameter_table import Parameter, ParameterTable
 

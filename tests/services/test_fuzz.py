@@ -17,7 +17,7 @@ from autopilot.services.records import (
     Verdict,
 )
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import MissionItemError, WireItem, encode_steps, located_steps

@@ -20,7 +20,7 @@ from autopilot.services.requests import (
     Pause,
     Reposition,
 )
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 
 HOME = Home()

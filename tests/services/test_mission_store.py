@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.services.mission_store import CorruptMission, StoredMission, deserialise, serialise
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem
 
 HOME = Home()

@@ -13,7 +13,7 @@ from autopilot.services.mission_store import MAX_ITEMS
 from autopilot.services.missions import ASK_US, ECHO_US, ECHOES, INT_ASKS, LATE_US, MAX_ASKS
 from autopilot.services.records import MissionChanged, Verdict
 from autopilot.services.requests import ReplaceMission
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.items import WireItem, located_steps
 

@@ -8,7 +8,7 @@ import pytest
 
 from autopilot.services.snapshot import Sensed, Sortie
 from autopilot.services.telemetry import GROUPS
-from autopilot.wire.convert import padded
+from autopilot.wire.convert.simulator import padded
 from autopilot.wire.dialect import plumbline as m
 from tests.doubles.streams import sent
 

@@ -12,7 +12,7 @@ from autopilot.services.records import SigningChanged, Verdict
 from autopilot.services.requests import ChangeSigningKey
 from autopilot.services.signing import AHEAD
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
 from autopilot.wire.signing import Signing, timestamp_of
 

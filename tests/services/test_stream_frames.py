@@ -20,7 +20,7 @@ from autopilot.services.stream_frames import BITS, StreamFrames
 from autopilot.services.telemetry import STREAMS
 from autopilot.vehicle.layout import FEWEST, MOST
 from autopilot.wire.codec import FrameWriter, decode, split
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing
 from tests.services.conftest import make_table

@@ -12,7 +12,8 @@ from autopilot.services.snapshot import ACCEL, GEOFENCE, GYRO, MAG, PREARM, GpsF
 from autopilot.services.streams import OFF
 from autopilot.services.telemetry import LOAD_STREAMS, LOAD_SYSTEM, PROGRAM_INTERVALS_US, STREAMS
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home, padded
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.simulator import padded
 from autopilot.wire.dialect import plumbline as mavlink
 
 ALL = STREAMS | LOAD_STREAMS

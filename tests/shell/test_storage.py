@@ -21,7 +21,7 @@ from autopilot.shell.storage import (
 from autopilot.shell.whole_file import seal
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_steps
 from autopilot.wire.parameter_table import ParameterTable

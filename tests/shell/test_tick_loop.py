@@ -17,7 +17,7 @@ from autopilot.shell.machine_sockets import SUPPORTED
 from autopilot.shell.options import set_timeout
 from autopilot.shell.tick_loop import TickLoop
 from autopilot.trajectory.timeline import expected_duration_s
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import encode_mission
 from gcs.clients.flight import FlightClient
 from gcs.clients.lockstep import LockstepTurns

@@ -15,7 +15,7 @@ from autopilot.shell.storage import Storage
 from autopilot.shell.whole_file import DamagedError, keep_copy, seal, unseal, write_whole
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, encode_steps
 from missions.fileformat import load_mission

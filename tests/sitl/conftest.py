@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import pytest
 
 from autopilot.geometry.packed import unpack
-from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded
 from sitl.hil import HilSimulator
 from sitl.plant.step import initial_state
 from sitl.sensors.files import load_profile, parse_profile
@@ -106,9 +106,7 @@ class Answerer:
         self.writer = FrameWriter(system, 1)
 
     def answer(self, time_us: int, forces: Forces | None = None, armed: bool = True) -> bytes:
-        message = convert.hil_actuator_controls_message(
-            time_us, convert.padded(forces or self.forces), armed, True
-        )
+        message = hil_actuator_controls_message(time_us, padded(forces or self.forces), armed, True)
         return self.writer.frame(message)
 
     def fly(self, simulator: HilSimulator, ticks: int) -> list[bytes]:

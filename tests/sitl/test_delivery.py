@@ -9,7 +9,7 @@ import pytest
 
 from autopilot.core.sensor_inbox import SensorInbox
 from autopilot.estimation.inbox import KIND, POSE, SHOWS, age_of, new_inbox
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from sitl.hil import HilSimulator
 
 SIGMAS = 4.0  # suspicious distance of a statistic from its expectation, in its own standard errors

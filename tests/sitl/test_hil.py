@@ -8,9 +8,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.battery import read_battery_status
+from autopilot.wire.convert.flight import read_load_state, read_rotor_state, read_wind_state
+from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.simulator import (
+    ACCEL,
+    GYRO,
+    MAG,
+    PRESSURE,
+    hil_actuator_controls_message,
+    padded,
+    read_hil_gps,
+    read_hil_state_quaternion,
+    read_load_sensor,
+    read_odometry,
+    speed_rpm,
+)
 from autopilot.wire.dialect import plumbline as mavlink
 from sitl.hil import COMMAND_TIMEOUT_US, HilSimulator, PacingFigures
 from sitl.messages import pressure_pa
@@ -56,12 +70,12 @@ def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     answerer((1.3, 1.31, 1.32, 1.33)).fly(simulator, 200)
     odometry, load, speeds, inertial = messages(simulator.sensor_datagram())
     state = simulator.core.state
-    pose = convert.read_odometry(odometry)
+    pose = read_odometry(odometry)
     assert pose.position == pytest.approx(state.x_quad, abs=FLOAT32_M)
     assert pose.velocity == pytest.approx(state.v_quad, abs=FLOAT32_M)
     assert pose.omega_body == pytest.approx(state.omega_body, abs=FLOAT32_M)
     assert pose.position_std == pytest.approx(1e-4)  # stated although there is none
-    tracked = convert.read_load_sensor(load)
+    tracked = read_load_sensor(load)
     assert tracked.position == pytest.approx(state.x_load, abs=FLOAT32_M)
     assert tracked.velocity == pytest.approx(state.v_load, abs=FLOAT32_M)
     assert tracked.direction_body is None
@@ -69,10 +83,10 @@ def test_ideal_sends_everything_at_every_tick(answerer, messages) -> None:
     assert odometry.time_usec == load.time_usec == speeds.time_usec == simulator.now_us
     greatest = simulator.core.truth.rotor_max
     assert speeds.index == 0
-    told = [convert.simulator.speed_rpm(force, greatest) for force in simulator.core.rotor_force]
+    told = [speed_rpm(force, greatest) for force in simulator.core.rotor_force]
     assert speeds.rpm == told
     assert len(set(speeds.rpm)) == 4  # of one rotor each
-    assert inertial.fields_updated == convert.ACCEL | convert.GYRO
+    assert inertial.fields_updated == ACCEL | GYRO
 
 
 def test_lab_sends_poses_without_velocities(answerer, messages) -> None:
@@ -84,8 +98,8 @@ def test_lab_sends_poses_without_velocities(answerer, messages) -> None:
     assert [m.time_usec for m in poses] == [m.time_usec for m in loads] == list(range(0, 992_001, 5000))
     assert all(isnan(m.velocity_covariance[0]) and isnan(m.vx) for m in poses)
     assert {m.fields for m in loads} == {mavlink.PLUMBLINE_LOAD_POSITION}
-    assert convert.read_odometry(poses[0]).position_std == pytest.approx(1e-3)
-    assert convert.read_odometry(poses[0]).attitude_std == pytest.approx(7e-4)
+    assert read_odometry(poses[0]).position_std == pytest.approx(1e-3)
+    assert read_odometry(poses[0]).attitude_std == pytest.approx(7e-4)
 
 
 @pytest.mark.parametrize(
@@ -101,15 +115,15 @@ def test_outdoor_profiles(sensors: str, fix: int, rate: int, latency_us: int, an
     assert [m.time_usec for m in fixes] == list(range(0, 2_000_000 - latency_us, 1_000_000 // rate))
     assert {m.fix_type for m in fixes} == {fix}
     assert all(m.eph > 0 and m.epv > 0 for m in fixes)
-    assert convert.read_hil_gps(fixes[0], home).position == pytest.approx((0.0, 0.0, 0.0), abs=10.0)
+    assert read_hil_gps(fixes[0], home).position == pytest.approx((0.0, 0.0, 0.0), abs=10.0)
     bearings = [m for m in got if m.get_type() == "LOAD_SENSOR"]
     assert {(m.fields, m.sensor_id) for m in bearings} == {(mavlink.PLUMBLINE_LOAD_DIRECTION, 1)}
     assert bearings[-1].dz > 0.5
     inertial = [m for m in got if m.get_type() == "HIL_SENSOR"]
-    fresh = [m for m in inertial if m.fields_updated & convert.PRESSURE]
+    fresh = [m for m in inertial if m.fields_updated & PRESSURE]
     assert len(fresh) == 100
     assert fresh[0].abs_pressure * 100.0 == pytest.approx(pressure_pa(500.0), abs=30.0)
-    assert len([m for m in inertial if m.fields_updated & convert.MAG]) == 100
+    assert len([m for m in inertial if m.fields_updated & MAG]) == 100
     assert "ODOMETRY" not in names(got)
 
 
@@ -137,19 +151,15 @@ def test_truth_is_the_truth(answerer, messages) -> None:
     answerer((1.45, 1.45, 1.45, 2.5)).fly(simulator, 100)
     vehicle, load, rotors, _, status = messages(simulator.truth_datagram())
     state = simulator.core.state
-    got = convert.read_load_state(load)
+    got = read_load_state(load)
     assert got.source == mavlink.PLUMBLINE_SOURCE_TRUTH
     assert got.x_load == pytest.approx(state.x_load, abs=FLOAT32_M)
     assert got.taut == bool(state.taut)
     # distance and direction give the vehicle's position without HIL_STATE_QUATERNION's 11 mm steps
     rebuilt = [x - got.distance * q for x, q in zip(got.x_load, got.q_cable, strict=True)]
     assert rebuilt == pytest.approx(state.x_quad, abs=4.0 * FLOAT32_M)
-    assert convert.read_hil_state_quaternion(vehicle, Home()).position == pytest.approx(
-        state.x_quad, abs=0.01
-    )
-    assert convert.read_rotor_state(rotors).forces[:4] == pytest.approx(
-        simulator.core.rotor_force, abs=FLOAT32_M
-    )
+    assert read_hil_state_quaternion(vehicle, Home()).position == pytest.approx(state.x_quad, abs=0.01)
+    assert read_rotor_state(rotors).forces[:4] == pytest.approx(simulator.core.rotor_force, abs=FLOAT32_M)
     assert (rotors.saturated, rotors.force_max) == (0b1000, pytest.approx(1.96))
     assert status.time_usec == simulator.now_us
     assert (status.vehicle_on_ground, status.load_on_ground) == (
@@ -202,9 +212,7 @@ def test_rubbish_is_harmless(noise: bytes, place: int, value: int) -> None:
     simulator = HilSimulator.build()
     before = simulator.sensor_datagram()
     frame = bytearray(
-        FrameWriter(1, 1).frame(
-            convert.hil_actuator_controls_message(0, convert.padded((1.0,) * 4), True, True)
-        )
+        FrameWriter(1, 1).frame(hil_actuator_controls_message(0, padded((1.0,) * 4), True, True))
     )
     frame[place % len(frame)] ^= value or 1
     for datagram in (noise, bytes(frame), bytes(frame[:place]), noise + bytes(frame)):
@@ -279,7 +287,7 @@ def told_winds(simulator: HilSimulator, answerer, messages, ticks: int) -> list[
     for datagram in answerer().fly(simulator, ticks):
         for message in messages(datagram):
             if message.get_type() == "WIND_STATE":
-                winds.append(tuple(convert.read_wind_state(message)))
+                winds.append(tuple(read_wind_state(message)))
     return winds
 
 
@@ -447,7 +455,7 @@ def test_a_battery_is_told_five_times_a_second(answerer, messages) -> None:
     told = []
     for tick in range(260):
         got = [x for x in messages(simulator.sensor_datagram()) if x.get_type() == "BATTERY_STATUS"]
-        told += [(tick, convert.read_battery_status(x)) for x in got]
+        told += [(tick, read_battery_status(x)) for x in got]
         answerer((1.2,) * 4).fly(simulator, 1)
     assert [tick for tick, _ in told] == [0, 50, 100, 150, 200, 250]
     supply = simulator.core.world.supply

@@ -11,7 +11,7 @@ from numba import config
 
 from autopilot.shell.machine_sockets import SUPPORTED
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import hil_actuator_controls_message, padded
+from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded
 from gcs.shell.link import LOOPBACK, free_port
 from sitl.hil import STATUS_PERIOD_US, HilSimulator
 from sitl.shell.link import TRUTH_WINDOW_US, Link

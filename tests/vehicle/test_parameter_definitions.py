@@ -20,7 +20,7 @@ from autopilot.vehicle.parameters import (
     definitions,
     vehicle_values,
 )
-from autopilot.wire.convert import ROTOR_FMAX
+from autopilot.wire.convert.simulator import ROTOR_FMAX
 from sitl.vehicles.sim_parameters import definitions as sim_definitions
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import CHAIN_KEYS, load_truth

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot.wire.convert import BatteryReading, battery_status_message, read_battery_status
+from autopilot.wire.convert.battery import BatteryReading, battery_status_message, read_battery_status
 from autopilot.wire.dialect import plumbline as mavlink
 
 

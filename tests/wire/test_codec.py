@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.wire import convert
 from autopilot.wire.codec import LONGEST_FRAME, FrameWriter, Received, decode
+from autopilot.wire.convert.simulator import ACCEL, GYRO, hil_sensor_message
 from autopilot.wire.dialect import plumbline as mavlink
 
 CLASSES = sorted(mavlink.mavlink_map.values(), key=lambda message_type: message_type.msgname)
@@ -20,7 +20,7 @@ SAMPLES = 12  # random messages of each class
 HEARTBEAT = FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3))
 VECTOR = (1.0, 2.0, 3.0)
 SENSOR = FrameWriter(1, 26).frame(
-    convert.hil_sensor_message(4000, VECTOR, VECTOR, VECTOR, 1e5, 12.0, 20.0, convert.ACCEL | convert.GYRO)
+    hil_sensor_message(4000, VECTOR, VECTOR, VECTOR, 1e5, 12.0, 20.0, ACCEL | GYRO)
 )
 
 Sample = Callable[[Any, np.random.Generator], Any]

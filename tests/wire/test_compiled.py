@@ -24,7 +24,7 @@ from autopilot.wire.compiled import (
     taken,
     wire_record,
 )
-from autopilot.wire.convert import hil_actuator_controls_message, read_hil_actuator_controls
+from autopilot.wire.convert.simulator import hil_actuator_controls_message, read_hil_actuator_controls
 from autopilot.wire.dialect import plumbline as mavlink
 
 KINDS = (

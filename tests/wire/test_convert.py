@@ -15,12 +15,75 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from autopilot.geometry.so3 import Quat
-from autopilot.wire import convert
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.flight import (
+    CascadeErrors,
+    LoadSetpoint,
+    LoadState,
+    RotorState,
+    WindState,
+    cascade_errors_message,
+    load_setpoint_message,
+    load_state_message,
+    read_cascade_errors,
+    read_load_setpoint,
+    read_load_state,
+    read_rotor_state,
+    read_wind_state,
+    rotor_state_message,
+    wind_state_message,
+)
+from autopilot.wire.convert.geodesy import (
+    EARTH_RADIUS_M,
+    Home,
+    enu_from_geodetic,
+    geodetic_from_enu,
+    home_from_text,
+)
+from autopilot.wire.convert.scaling import int16
+from autopilot.wire.convert.simulator import (
+    NO_FORCES,
+    HilActuatorControls,
+    HilGps,
+    HilSensor,
+    HilStateQuaternion,
+    LoadSensor,
+    Odometry,
+    hil_actuator_controls_message,
+    hil_gps_message,
+    hil_sensor_message,
+    hil_state_quaternion_message,
+    load_sensor_message,
+    odometry_message,
+    padded,
+    read_hil_actuator_controls,
+    read_hil_gps,
+    read_hil_sensor,
+    read_hil_state_quaternion,
+    read_load_sensor,
+    read_odometry,
+)
+from autopilot.wire.convert.telemetry import (
+    altitude_message,
+    attitude_message,
+    attitude_quaternion_message,
+    attitude_target_message,
+    euler_ned_frd,
+    global_position_int_message,
+    gps_global_origin_message,
+    gps_raw_int_message,
+    heading_cdeg,
+    home_position_message,
+    local_position_ned_message,
+    position_target_local_ned_message,
+    read_attitude_quaternion,
+    read_local_position_ned,
+    vfr_hud_message,
+    winch_status_message,
+)
 
 FLOAT32 = 2.0**-23  # relative spacing of float32
-DEG_E7_M = convert.EARTH_RADIUS_M * math.pi / 180.0 * 1e-7  # m northwards of one unit of latitude
+DEG_E7_M = EARTH_RADIUS_M * math.pi / 180.0 * 1e-7  # m northwards of one unit of latitude
 HOME = Home()
 NAN = math.nan
 NED_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
@@ -86,7 +149,7 @@ def assert_close(got: Any, sent: Any, absolute: float = 1e-6, relative: float = 
 RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[Any], Any]]] = {
     "hil_sensor": (
         st.builds(
-            convert.HilSensor,
+            HilSensor,
             times,
             vectors,
             vectors,
@@ -97,12 +160,12 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.integers(0, 0x1FFF),
             st.integers(0, 255),
         ),
-        convert.hil_sensor_message,
-        convert.read_hil_sensor,
+        hil_sensor_message,
+        read_hil_sensor,
     ),
     "load_sensor": (
         st.builds(
-            convert.LoadSensor,
+            LoadSensor,
             times,
             st.none() | vectors,
             st.none() | vectors,
@@ -112,12 +175,12 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             positive,
             st.integers(0, 2),
         ),
-        convert.load_sensor_message,
-        convert.read_load_sensor,
+        load_sensor_message,
+        read_load_sensor,
     ),
     "hil_actuator_controls": (
         st.builds(
-            convert.HilActuatorControls,
+            HilActuatorControls,
             times,
             st.tuples(*(numbers,) * 14),
             st.booleans(),
@@ -125,12 +188,12 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.booleans(),
             numbers,
         ),
-        convert.hil_actuator_controls_message,
-        convert.read_hil_actuator_controls,
+        hil_actuator_controls_message,
+        read_hil_actuator_controls,
     ),
     "load_state": (
         st.builds(
-            convert.LoadState,
+            LoadState,
             times,
             st.integers(0, 2),
             vectors,
@@ -142,12 +205,12 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.booleans(),
             st.integers(0, 65535),
         ),
-        convert.load_state_message,
-        convert.read_load_state,
+        load_state_message,
+        read_load_state,
     ),
     "load_setpoint": (
         st.builds(
-            convert.LoadSetpoint,
+            LoadSetpoint,
             times,
             st.integers(0, 9),
             st.integers(0, 4),
@@ -161,12 +224,12 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             vectors,
             vectors,
         ),
-        convert.load_setpoint_message,
-        convert.read_load_setpoint,
+        load_setpoint_message,
+        read_load_setpoint,
     ),
     "cascade_errors": (
         st.builds(
-            convert.CascadeErrors,
+            CascadeErrors,
             times,
             st.integers(0, 4),
             *[vectors] * 6,
@@ -175,12 +238,12 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             numbers,
             vectors,
         ),
-        convert.cascade_errors_message,
-        convert.read_cascade_errors,
+        cascade_errors_message,
+        read_cascade_errors,
     ),
     "rotor_state": (
         st.builds(
-            convert.RotorState,
+            RotorState,
             times,
             st.integers(0, 2),
             st.tuples(*(numbers,) * 14),
@@ -189,13 +252,13 @@ RECORDS: dict[str, tuple[st.SearchStrategy[Any], Callable[..., Any], Callable[[A
             st.integers(0, 2**14 - 1),
             st.integers(4, 14),
         ),
-        convert.rotor_state_message,
-        convert.read_rotor_state,
+        rotor_state_message,
+        read_rotor_state,
     ),
     "wind state": (
-        st.builds(convert.WindState, times, vectors, vectors),
-        convert.wind_state_message,
-        convert.read_wind_state,
+        st.builds(WindState, times, vectors, vectors),
+        wind_state_message,
+        read_wind_state,
     ),
 }
 
@@ -217,17 +280,17 @@ def test_a_record_comes_back(name: str, data: st.DataObject) -> None:
 )
 @quick
 def test_odometry_comes_back(fields: Any) -> None:
-    sent = convert.Odometry(*fields)
+    sent = Odometry(*fields)
     if sent.velocity is None:
         sent = sent._replace(velocity_std=NAN)
     # a quaternion that is half a turn away may come back with the other sign
-    got = convert.read_odometry(over_the_wire(convert.odometry_message(*fields)))
+    got = read_odometry(over_the_wire(odometry_message(*fields)))
     got = got._replace(quat_wxyz=same_side(got.quat_wxyz, sent.quat_wxyz))
     assert_close(got, sent)
 
 
 def test_the_covariance_of_odometry_is_diagonal_and_in_its_place() -> None:
-    message = convert.odometry_message(1, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), None, None, 0.1, 0.2, 0.3)
+    message = odometry_message(1, (1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0), None, None, 0.1, 0.2, 0.3)
     triangle = np.zeros((6, 6))
     triangle[np.triu_indices(6)] = message.pose_covariance
     assert np.array_equal(triangle, np.diag(triangle.diagonal()))
@@ -244,8 +307,8 @@ def test_the_covariance_of_odometry_is_diagonal_and_in_its_place() -> None:
 )
 @quick
 def test_hil_gps_comes_back_on_its_lattice(fields: Any) -> None:
-    sent = convert.HilGps(*fields)
-    got = convert.read_hil_gps(over_the_wire(convert.hil_gps_message(*fields, home=HOME)), HOME)
+    sent = HilGps(*fields)
+    got = read_hil_gps(over_the_wire(hil_gps_message(*fields, home=HOME)), HOME)
     assert_close(got, sent, absolute=0.5 * 0.01 + 0.1 * DEG_E7_M + 1e-9)  # half of the coarsest step
 
 
@@ -256,9 +319,9 @@ def test_hil_gps_comes_back_on_its_lattice(fields: Any) -> None:
 )
 @quick
 def test_the_true_state_comes_back_on_its_lattice(fields: Any) -> None:
-    sent = convert.HilStateQuaternion(*fields)
-    message = over_the_wire(convert.hil_state_quaternion_message(*fields, home=HOME))
-    got = convert.read_hil_state_quaternion(message, HOME)
+    sent = HilStateQuaternion(*fields)
+    message = over_the_wire(hil_state_quaternion_message(*fields, home=HOME))
+    got = read_hil_state_quaternion(message, HOME)
     got = got._replace(quat_wxyz=same_side(got.quat_wxyz, sent.quat_wxyz))
     assert_close(got, sent, absolute=0.5 * DEG_E7_M + 1e-9)
 
@@ -266,7 +329,7 @@ def test_the_true_state_comes_back_on_its_lattice(fields: Any) -> None:
 @given(quats, vectors, vectors)
 @quick
 def test_axes_and_attitude_against_matrices(quat: Any, position: Any, rate: Any) -> None:
-    message = convert.odometry_message(0, position, quat, position, rate, 1.0, 1.0, 1.0)
+    message = odometry_message(0, position, quat, position, rate, 1.0, 1.0, 1.0)
     assert (message.x, message.y, message.z) == tuple(NED_ENU @ position)
     assert (message.vx, message.vy, message.vz) == tuple(NED_ENU @ position)
     assert (message.rollspeed, message.pitchspeed, message.yawspeed) == tuple(FRD_FLU @ rate)
@@ -282,7 +345,7 @@ def test_axes_and_attitude_against_matrices(quat: Any, position: Any, rate: Any)
 def test_euler_angles_against_scipy(quat: Any) -> None:
     w, x, y, z = quat
     R = NED_ENU @ Rotation.from_quat([x, y, z, w]).as_matrix() @ FRD_FLU
-    roll, pitch, yaw = convert.euler_ned_frd(quat)
+    roll, pitch, yaw = euler_ned_frd(quat)
     # ill conditioned near a pitch of 90 degrees: the rotation is compared, not the angles
     assert Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix() == pytest.approx(R, abs=1e-7)
 
@@ -292,40 +355,38 @@ def test_euler_angles_against_scipy(quat: Any) -> None:
 )
 def test_headings_a_pilot_would_name(yaw_enu_deg: float, heading_deg: float) -> None:
     half = math.radians(yaw_enu_deg) / 2.0
-    assert convert.heading_cdeg((math.cos(half), 0.0, 0.0, math.sin(half))) == heading_deg * 100.0
+    assert heading_cdeg((math.cos(half), 0.0, 0.0, math.sin(half))) == heading_deg * 100.0
 
 
 def test_a_vehicle_that_pitches_down_and_flies_east() -> None:
     # nose east, 10 degrees nose down: FLU pitch is positive nose down
     half = math.radians(10.0) / 2.0
     quat = (math.cos(half), 0.0, math.sin(half), 0.0)
-    attitude = named(convert.attitude_message(5_000, quat, (0.1, 0.2, 0.3)))
+    attitude = named(attitude_message(5_000, quat, (0.1, 0.2, 0.3)))
     assert (attitude.roll, attitude.pitch, attitude.yaw) == pytest.approx(
         (0.0, math.radians(-10.0), math.radians(90.0)), abs=1e-15
     )
     assert (attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed) == (0.1, -0.2, -0.3)
     assert attitude.time_boot_ms == 5
-    local = named(convert.local_position_ned_message(0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
+    local = named(local_position_ned_message(0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)))
     assert (local.x, local.y, local.z, local.vx, local.vy, local.vz) == (2.0, 1.0, -3.0, 5.0, 4.0, -6.0)
-    hud = named(convert.vfr_hud_message((3.0, 0.0, 4.0), quat, 7.0, 0.55, Home(0.0, 0.0, 100.0)))
+    hud = named(vfr_hud_message((3.0, 0.0, 4.0), quat, 7.0, 0.55, Home(0.0, 0.0, 100.0)))
     assert (hud.groundspeed, hud.airspeed, hud.climb, hud.alt, hud.heading, hud.throttle) == (
         3.0, 5.0, 4.0, 107.0, 90, 55,
     )  # fmt: skip
-    place = named(convert.global_position_int_message(0, (0.0, 0.0, 3.0), (1.0, 2.0, 3.0), quat, HOME))
+    place = named(global_position_int_message(0, (0.0, 0.0, 3.0), (1.0, 2.0, 3.0), quat, HOME))
     assert (place.relative_alt, place.vx, place.vy, place.vz, place.hdg) == (3000, 200, 100, -300, 9000)
 
 
 @given(quats, vectors, st.integers(0, 2**40))
 @quick
 def test_telemetry_comes_back(quat: Any, vector: Any, now_us: int) -> None:
-    attitude = convert.attitude_quaternion_message(now_us, quat, vector)
-    got = convert.read_attitude_quaternion(over_the_wire(attitude))
+    attitude = attitude_quaternion_message(now_us, quat, vector)
+    got = read_attitude_quaternion(over_the_wire(attitude))
     assert abs(np.dot(got.quat_wxyz, quat)) == pytest.approx(1.0, abs=FLOAT32)
     assert got.omega_body == pytest.approx(vector, rel=FLOAT32)
     assert got.boot_ms == now_us // 1000 % 2**32
-    local = convert.read_local_position_ned(
-        over_the_wire(convert.local_position_ned_message(now_us, vector, vector))
-    )
+    local = read_local_position_ned(over_the_wire(local_position_ned_message(now_us, vector, vector)))
     assert local.position == local.velocity == pytest.approx(vector, rel=FLOAT32)
 
 
@@ -338,34 +399,34 @@ SKEW = (NAN, NAN, NAN, NAN)
 @pytest.mark.parametrize(("v", "quat"), [(WILD, UPRIGHT), (WILD_NAN, UPRIGHT), (WILD, SKEW)])
 def test_no_state_however_wild_raises(v: Any, quat: Any) -> None:
     messages = [
-        convert.hil_sensor_message(0, v, v, v, v[0], v[0], v[0], 0),
-        convert.odometry_message(0, v, quat, v, v, v[0], v[0], v[0]),
-        convert.load_sensor_message(0, v, v, v, v[0], v[0], v[0]),
-        convert.hil_gps_message(0, 3, v, v, v[0], v[0], 10, home=HOME),
-        convert.hil_state_quaternion_message(0, quat, v, v, v, v[0], v, home=HOME),
-        convert.hil_actuator_controls_message(0, (v[0],) * 14, True, True),
-        convert.load_state_message(0, 0, v, v, v, v, v[0], v[0], True, 10**9),
-        convert.load_setpoint_message(0, 0, 0, 10**9, v, v, v, v, v[0], v[0], v, v),
-        convert.cascade_errors_message(0, 0, v, v, v, v, v, v, v[0], v[0], v[0], v),
-        convert.rotor_state_message(0, 0, (v[0],) * 14, v[0], v[0], 0),
-        convert.wind_state_message(0, v, v),
-        convert.attitude_message(0, quat, v),
-        convert.attitude_quaternion_message(0, quat, v),
-        convert.local_position_ned_message(0, v, v),
-        convert.global_position_int_message(0, v, v, quat, HOME),
-        convert.gps_raw_int_message(0, 3, v, v, v[0], v[0], 10, HOME),
-        convert.altitude_message(0, v[0], HOME),
-        convert.vfr_hud_message(v, quat, v[0], v[0], HOME),
-        convert.home_position_message(0, v, HOME),
-        convert.gps_global_origin_message(0, HOME),
-        convert.position_target_local_ned_message(0, v, v, v),
-        convert.attitude_target_message(0, quat, v, v[0]),
-        convert.winch_status_message(0, v[0], v[0]),
+        hil_sensor_message(0, v, v, v, v[0], v[0], v[0], 0),
+        odometry_message(0, v, quat, v, v, v[0], v[0], v[0]),
+        load_sensor_message(0, v, v, v, v[0], v[0], v[0]),
+        hil_gps_message(0, 3, v, v, v[0], v[0], 10, home=HOME),
+        hil_state_quaternion_message(0, quat, v, v, v, v[0], v, home=HOME),
+        hil_actuator_controls_message(0, (v[0],) * 14, True, True),
+        load_state_message(0, 0, v, v, v, v, v[0], v[0], True, 10**9),
+        load_setpoint_message(0, 0, 0, 10**9, v, v, v, v, v[0], v[0], v, v),
+        cascade_errors_message(0, 0, v, v, v, v, v, v, v[0], v[0], v[0], v),
+        rotor_state_message(0, 0, (v[0],) * 14, v[0], v[0], 0),
+        wind_state_message(0, v, v),
+        attitude_message(0, quat, v),
+        attitude_quaternion_message(0, quat, v),
+        local_position_ned_message(0, v, v),
+        global_position_int_message(0, v, v, quat, HOME),
+        gps_raw_int_message(0, 3, v, v, v[0], v[0], 10, HOME),
+        altitude_message(0, v[0], HOME),
+        vfr_hud_message(v, quat, v[0], v[0], HOME),
+        home_position_message(0, v, HOME),
+        gps_global_origin_message(0, HOME),
+        position_target_local_ned_message(0, v, v, v),
+        attitude_target_message(0, quat, v, v[0]),
+        winch_status_message(0, v[0], v[0]),
     ]
     for message in messages:
         over_the_wire(message)
-    assert convert.read_hil_gps(over_the_wire(messages[3]), HOME).satellites == 10
-    convert.read_odometry(over_the_wire(messages[1]))
+    assert read_hil_gps(over_the_wire(messages[3]), HOME).satellites == 10
+    read_odometry(over_the_wire(messages[1]))
 
 
 @pytest.mark.parametrize(
@@ -373,8 +434,8 @@ def test_no_state_however_wild_raises(v: Any, quat: Any) -> None:
     [(0.4, 0), (0.6, 1), (-0.6, -1), (1e9, 32767), (-1e9, -32768), (math.inf, 32767), (NAN, 0)],
 )
 def test_integers_round_and_saturate(value: float, expected: int) -> None:
-    assert convert.int16(value) == expected
-    struct.pack("<h", convert.int16(value))
+    assert int16(value) == expected
+    struct.pack("<h", int16(value))
 
 
 HOMES = [
@@ -392,26 +453,26 @@ HOMES = [
 )
 @quick
 def test_geodetic_coordinates_are_restored_exactly(home: Home, north: int, east: int, up: int) -> None:
-    latitude, longitude, altitude = convert.geodetic_from_enu((0.0, 0.0, 0.0), home)
+    latitude, longitude, altitude = geodetic_from_enu((0.0, 0.0, 0.0), home)
     turn = 3_600_000_000
     longitude = (longitude + east + turn // 2) % turn - turn // 2
     latitude, altitude = latitude + north, altitude + up
-    position = convert.enu_from_geodetic(latitude, longitude, altitude, home)
-    assert convert.geodetic_from_enu(position, home) == (latitude, longitude, altitude)
+    position = enu_from_geodetic(latitude, longitude, altitude, home)
+    assert geodetic_from_enu(position, home) == (latitude, longitude, altitude)
 
 
 @pytest.mark.parametrize("home", HOMES)
 @given(st.tuples(numbers, numbers, numbers))
 @quick
 def test_positions_are_restored_to_half_a_step(home: Home, position: Any) -> None:
-    back = convert.enu_from_geodetic(*convert.geodetic_from_enu(position, home), home)
+    back = enu_from_geodetic(*geodetic_from_enu(position, home), home)
     # half a step, and the rounding of degrees in float64 (1e-14 of 180 degrees is 0.2 micrometres)
     assert back[:2] == pytest.approx(position[:2], abs=0.5 * DEG_E7_M + 1e-6)
     assert back[2] == pytest.approx(position[2], abs=0.5e-3 + 1e-9)
 
 
 def test_north_and_east_are_where_a_map_has_them() -> None:
-    latitude, longitude, _ = convert.geodetic_from_enu((1000.0, 2000.0, 0.0), HOME)
+    latitude, longitude, _ = geodetic_from_enu((1000.0, 2000.0, 0.0), HOME)
     # 1 degree of latitude is 111.3 km, of longitude that times the cosine of the latitude
     assert latitude * 1e-7 - HOME.latitude_deg == pytest.approx(2.0 / 111.3, rel=1e-3)
     assert longitude * 1e-7 - HOME.longitude_deg == pytest.approx(
@@ -420,13 +481,13 @@ def test_north_and_east_are_where_a_map_has_them() -> None:
 
 
 def test_home_from_text() -> None:
-    assert convert.home_from_text("47.4, 8.5,488") == Home(47.4, 8.5, 488.0)
+    assert home_from_text("47.4, 8.5,488") == Home(47.4, 8.5, 488.0)
 
 
 @pytest.mark.parametrize("text", ["", "1,2", "1,2,3,4", "a,2,3", "91,0,0", "0,181,0", "nan,0,0", "0,0,1e9"])
 def test_a_home_that_is_nowhere_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="home"):
-        convert.home_from_text(text)
+        home_from_text(text)
 
 
 V = (1.0, 2.0, 3.0)
@@ -435,11 +496,11 @@ FRD = [1.0, -2.0, -3.0]
 CENTI_NED = [200, 100, -300]
 ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
     (
-        convert.hil_sensor_message(0, V, V, V, 101325.0, 0.0, 0.0, 0),
+        hil_sensor_message(0, V, V, V, 101325.0, 0.0, 0.0, 0),
         {"xacc yacc zacc": FRD, "xgyro ygyro zgyro": FRD, "xmag ymag zmag": FRD, "abs_pressure": [1013.25]},
     ),
     (
-        convert.odometry_message(0, V, UPRIGHT, V, V, 1.0, 1.0, 1.0),
+        odometry_message(0, V, UPRIGHT, V, V, 1.0, 1.0, 1.0),
         {
             "x y z": NED,
             "vx vy vz": NED,
@@ -448,19 +509,19 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        convert.load_sensor_message(0, V, V, V, 1.0, 1.0, 1.0),
+        load_sensor_message(0, V, V, V, 1.0, 1.0, 1.0),
         {"x y z": NED, "vx vy vz": NED, "dx dy dz": FRD, "fields": [7]},
     ),
     (
-        convert.hil_gps_message(0, 3, V, V, 1.0, 2.0, 9, home=HOME),
+        hil_gps_message(0, 3, V, V, 1.0, 2.0, 9, home=HOME),
         {"vn ve vd": CENTI_NED, "eph epv": [100, 200], "alt": [3000], "cog": [2657]},
     ),
     (
-        convert.hil_state_quaternion_message(0, UPRIGHT, V, V, V, 1.0, (0.0, 0.0, 9.80665), home=HOME),
+        hil_state_quaternion_message(0, UPRIGHT, V, V, V, 1.0, (0.0, 0.0, 9.80665), home=HOME),
         {"rollspeed pitchspeed yawspeed": FRD, "vx vy vz": CENTI_NED, "xacc yacc zacc": [0, 0, -1000]},
     ),
     (
-        convert.load_state_message(0, 1, V, V, V, V, 4.0, 5.0, True, 6),
+        load_state_message(0, 1, V, V, V, V, 4.0, 5.0, True, 6),
         {
             "x y z": NED,
             "vx vy vz": NED,
@@ -470,7 +531,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        convert.load_setpoint_message(0, 5, 3, 7, V, V, V, V, 1.0, 2.0, V, V),
+        load_setpoint_message(0, 5, 3, 7, V, V, V, V, 1.0, 2.0, V, V),
         {
             "x y z": NED,
             "vx vy vz": NED,
@@ -482,7 +543,7 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        convert.cascade_errors_message(0, 3, V, V, V, V, V, V, 0.1, 0.2, 4.0, V),
+        cascade_errors_message(0, 3, V, V, V, V, V, V, 0.1, 0.2, 4.0, V),
         {
             **{name: [tuple(NED)] for name in ("e_x", "e_v", "e_q", "e_q_dot")},
             **{name: [tuple(FRD)] for name in ("e_r", "e_omega", "moment")},
@@ -490,16 +551,16 @@ ON_THE_WIRE: list[tuple[Any, dict[str, list[Any]]]] = [
         },
     ),
     (
-        convert.rotor_state_message(0, 2, convert.padded((1.0, 2.0, 3.0, 4.0)), 0.0, math.inf, 9),
+        rotor_state_message(0, 2, padded((1.0, 2.0, 3.0, 4.0)), 0.0, math.inf, 9),
         {"force": [(1.0, 2.0, 3.0, 4.0)], "force_min force_max saturated source": [0.0, math.inf, 9, 2]},
     ),
-    (convert.wind_state_message(0, V, V), {"wind": [tuple(NED)], "gust": [tuple(NED)]}),
+    (wind_state_message(0, V, V), {"wind": [tuple(NED)], "gust": [tuple(NED)]}),
     (
-        convert.position_target_local_ned_message(0, V, V, V),
+        position_target_local_ned_message(0, V, V, V),
         {"x y z": NED, "vx vy vz": NED, "afx afy afz": NED, "type_mask": [0xC00]},
     ),
     (
-        convert.attitude_target_message(0, UPRIGHT, V, 0.5),
+        attitude_target_message(0, UPRIGHT, V, 0.5),
         {"body_roll_rate body_pitch_rate body_yaw_rate thrust": [*FRD, 0.5]},
     ),
 ]
@@ -513,10 +574,8 @@ def test_every_field_has_its_axis_and_its_sign(message: Any, expected: dict[str,
 
 
 def test_full_scale_of_the_actuators() -> None:
-    message = convert.hil_actuator_controls_message(
-        4000, convert.padded((0.0, 0.98, 1.96, 3.92, 0.49)), True, True
-    )
+    message = hil_actuator_controls_message(4000, padded((0.0, 0.98, 1.96, 3.92, 0.49)), True, True)
     assert message.controls[:7] == [0.0, 0.5, 1.0, 2.0, 0.0, 0.0, 0.25]
     assert len(message.controls) == 16
     assert (message.time_usec, message.mode & 128, message.flags & 1) == (4000, 128, 1)
-    assert convert.hil_actuator_controls_message(0, convert.NO_FORCES, False, False).mode & 128 == 0
+    assert hil_actuator_controls_message(0, NO_FORCES, False, False).mode & 128 == 0

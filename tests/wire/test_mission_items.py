@@ -14,7 +14,7 @@ from autopilot.geometry.frames import ned_from_enu
 from autopilot.geometry.linear import norm
 from autopilot.trajectory.signals import evaluate, signal_table
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import EARTH_RADIUS_M, Home, geodetic_from_enu
+from autopilot.wire.convert.geodesy import EARTH_RADIUS_M, Home, geodetic_from_enu
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import (
     LocatedStep,

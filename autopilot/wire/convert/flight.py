@@ -292,12 +292,6 @@ def rotor_state_message(*record: Any) -> Fields:
     return _ROTOR_STATE, rotor_state_values(*record)
 
 
-def rotor_forces(m: Any) -> tuple[float, ...]:
-    """The forces of a ROTOR_STATE, N, one of each rotor that there is."""
-    forces: tuple[float, ...] = (*m.force, *m.more_force)
-    return forces[: m.rotors or 4]
-
-
 def read_rotor_state(m: Any) -> RotorState:
     """Inverse of `rotor_state_message`."""
     forces = padded((*m.force, *m.more_force))

@@ -8,12 +8,13 @@ they differ by its half step (5.6 mm northwards, less eastwards, 0.5 mm in heigh
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from numba.extending import register_jitable
-
-from autopilot.geometry.linear import Vec3
+from autopilot.geometry.jitable import jitable
 from autopilot.wire.convert.scaling import int32, saturated
+
+if TYPE_CHECKING:
+    from autopilot.geometry.linear import Vec3
 
 EARTH_RADIUS_M = 6378137.0
 _METRES_PER_DEGREE = EARTH_RADIUS_M * math.pi / 180.0
@@ -45,7 +46,7 @@ def home_from_text(text: str) -> Home:
     return Home(latitude, longitude, altitude)
 
 
-@register_jitable
+@jitable
 def enu_from_geodetic(latitude_degE7: int, longitude_degE7: int, altitude_mm: int, home: Home) -> Vec3:
     """Position in m (east, north, up) of home, from degrees * 1e7 and mm above mean sea level."""
     around = longitude_degE7 - round(home.longitude_deg / _DEG_E7)
@@ -59,7 +60,7 @@ def enu_from_geodetic(latitude_degE7: int, longitude_degE7: int, altitude_mm: in
     )
 
 
-@register_jitable
+@jitable
 def geodetic_from_enu(position: Vec3, home: Home) -> tuple[int, int, int]:
     """(latitude, longitude) in degrees * 1e7 and altitude in mm above mean sea level, saturated to int32."""
     east_deg = position[0] / (_METRES_PER_DEGREE * math.cos(math.radians(home.latitude_deg)))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from numba.extending import register_jitable
+from autopilot.geometry.jitable import jitable
 
 
-@register_jitable
+@jitable
 def saturated(value: float, low: int, high: int) -> int:
     """The integer nearest to `value` within `low` ... `high`; 0, or the limit nearest to it, for NaN."""
     if value >= high:
@@ -19,25 +19,25 @@ def saturated(value: float, low: int, high: int) -> int:
     return round(value)
 
 
-@register_jitable
+@jitable
 def int16(value: float) -> int:
     """`value` in an int16_t."""
     return saturated(value, -0x8000, 0x7FFF)
 
 
-@register_jitable
+@jitable
 def uint16(value: float) -> int:
     """`value` in a uint16_t."""
     return saturated(value, 0, 0xFFFF)
 
 
-@register_jitable
+@jitable
 def int32(value: float) -> int:
     """`value` in an int32_t."""
     return saturated(value, -0x8000_0000, 0x7FFF_FFFF)
 
 
-@register_jitable
+@jitable
 def course_cdeg(north: float, east: float) -> int:
     """Course over ground in 0 ... 35999 hundredths of a degree; 65535 (unknown) below 0.1 m/s."""
     speed = math.hypot(north, east)

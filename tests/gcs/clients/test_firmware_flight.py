@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from autopilot.wire.codec import FrameWriter, decode
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.firmware_flight import ARDUPILOT, FirmwareFlight
 from gcs.clients.firmware_mission import firmware_items

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from autopilot.wire.convert import Home
-from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.firmware_mission import FirmwareMissionError, firmware_items
 from missions import fileformat

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavwp
 
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, encode_mission
 from autopilot.wire.parameter_table import parse_text

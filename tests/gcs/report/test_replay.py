@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import encode_mission
 from gcs.analysis.axes import Floats
 from gcs.analysis.record import FlightMeta, flight_record

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.wire.codec import FrameWriter
-from autopilot.wire.convert import Home
-from autopilot.wire.convert.geodesy import enu_from_geodetic
+from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem
 from gcs.view.controls import SLIDERS

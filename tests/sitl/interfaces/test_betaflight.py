@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from autopilot.geometry.so3 import Quat, quat_multiply
 from autopilot.vehicle.file import load_vehicle
-from autopilot.wire.convert import Home
+from autopilot.wire.convert.geodesy import Home
 from sitl.hil import HilSimulator
 from sitl.interfaces.betaflight import RATE_HZ, Exchange, read_motors, state_packet
 from sitl.interfaces.frame import frame_of

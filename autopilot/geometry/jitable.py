@@ -1,0 +1,30 @@
+"""Plain functions that kernels may call, marked without numba: who calls them as they are need not load it.
+
+numba takes half a second to import, which is most of what a command like `gcs status` would take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_marked: list[Callable[..., Any]] = []  # until numba is there
+_register: list[Callable[[Any], Any]] = []  # numba's own mark, from then on
+
+
+def jitable(function: F) -> F:
+    """Mark a function that kernels may call; it stays a plain one."""
+    if _register:
+        _register[0](function)
+    else:
+        _marked.append(function)
+    return function
+
+
+def register_with(register: Callable[[Any], Any]) -> None:
+    """Hand all that were marked, and will be, to numba's `register_jitable`."""
+    _register[:] = [register]
+    while _marked:
+        register(_marked.pop())

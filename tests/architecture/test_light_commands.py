@@ -1,0 +1,26 @@
+"""Commands that only speak to a vehicle load no numba, which takes longer than all else that they do."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+COMMANDS = ("status", "control", "param", "capture", "report", "compare", "new", "warmup", "view", "recorded")
+WORKFLOWS = ("status", "parameters", "readiness", "warmup")
+MODULES = [*(f"gcs.commands.{name}" for name in COMMANDS), *(f"gcs.workflows.{name}" for name in WORKFLOWS)]
+
+
+@pytest.fixture(scope="module")
+def loads_numba() -> dict[str, bool]:
+    """Of each module, imported in this order in one process, whether numba is there by then."""
+    loads = "import_module(name); print(name, 'numba' in sys.modules)"
+    program = f"import sys; from importlib import import_module\nfor name in {MODULES!r}: {loads}"
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return {name: heavy == "True" for name, heavy in map(str.split, told.stdout.splitlines())}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_command_that_only_speaks_loads_no_compiler(loads_numba: dict[str, bool], module: str) -> None:
+    assert not loads_numba[module]
