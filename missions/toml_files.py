@@ -100,6 +100,9 @@ class TomlFiles:
         if not (given and (path.exists() or path.suffix or given != path.name)):  # a word, and no path
             shipped = f"{self._hint(given)}shipped: {', '.join(self.names())}"
             raise self.error([f"unknown {self.kind} {given!r}; {shipped}; or the path of a file"])
+        if path.suffix == ".py" and path.is_file():
+            takes = "--law, --estimator and --planner take classes of Python files"
+            raise self.error([f"{given}: is a Python file; a {self.kind} file is TOML ({takes})"])
         try:
             return TomlText(path.stem, given, text_of(path))
         except TextFileError as error:

@@ -26,6 +26,7 @@ from autopilot.wire.parameter_table import ParameterError, ParameterTable
 from gcs.closed_loop import Conditions
 from gcs.errors import EXIT_USAGE, GcsError
 from missions.fileformat import load_mission
+from missions.toml_files import FileError
 from sitl.sensors.files import load_profile
 from sitl.settings import settings_of
 from sitl.vehicles.sim_parameters import sim_parameters
@@ -219,7 +220,7 @@ def make_plan(
         load_mission(mission)
         load_profile(sensors)
     except ValueError as error:
-        raise PlanError(str(error)) from None
+        raise PlanError(*_lines(error)) from None
     plan = SweepPlan(
         mission,
         vehicle,
@@ -259,6 +260,11 @@ def _try(vehicle: str, own: Own, settings: Mapping[str, float]) -> None:
         raise PlanError(str(error)) from None
 
 
+def _lines(error: ValueError) -> tuple[str, ...]:
+    """One for each mistake in a file."""
+    return error.problems if isinstance(error, FileError) else (str(error),)
+
+
 def _check_values(
     vehicle: str, own: Own, values: Sequence[tuple[str, float]], settings: Mapping[str, float]
 ) -> None:
@@ -267,7 +273,7 @@ def _check_values(
         world = sim_parameters(load_truth(vehicle))
         table = parameters_for(load_belief(vehicle), own)
     except ValueError as error:
-        raise PlanError(str(error)) from None
+        raise PlanError(*_lines(error)) from None
     for name, value in values:
         if name == "SIM_LOSS_PCT":
             raise PlanError(

@@ -21,6 +21,13 @@ KINDS: tuple[tuple[TomlFiles, Callable[[Path], Any]], ...] = (
 )
 
 
+def test_a_python_file_is_told_where_it_belongs(tmp_path: Path) -> None:
+    law = tmp_path / "law.py"
+    law.touch()
+    with pytest.raises(FileError, match=r"law\.py: is a Python file; a mission file is TOML \(--law, "):
+        load_mission(law)
+
+
 @pytest.mark.parametrize(("wanted", "load"), KINDS, ids=lambda one: getattr(one, "kind", ""))
 def test_the_shipped_files_of_the_other_kinds_are_told_as_what_they_are(
     tmp_path: Path, wanted: TomlFiles, load: Callable[[Path], Any]

@@ -158,3 +158,11 @@ def test_sweeps_without_a_name_do_not_get_into_each_others_way(
     changed = origin(plan, code="changed")
     assert default_directory(plan, changed, fresh=False) == Path("sweeps") / f"{stem}-3"
     assert default_directory(plan, changed, fresh=True) == Path("sweeps") / stem
+
+
+def test_each_mistake_in_a_file_is_a_line(tmp_path: Path) -> None:
+    mission = tmp_path / "mission.toml"
+    mission.write_text('titel = "T"\n[[items]]\ntype = "takeof"\n', encoding="utf-8")
+    with pytest.raises(PlanError) as told:
+        make_plan(str(mission), "bebop", "lab", ["thesis"], [1], [], {}, 0)
+    assert len(told.value.lines) == 2
