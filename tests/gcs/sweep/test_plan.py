@@ -162,7 +162,7 @@ def test_sweeps_without_a_name_do_not_get_into_each_others_way(
 
 def test_each_mistake_in_a_file_is_a_line(tmp_path: Path) -> None:
     mission = tmp_path / "mission.toml"
-    mission.write_text('titel = "T"\n[[items]]\ntype = "takeof"\n', encoding="utf-8")
+    mission.write_text('titel = "T"\ncolour = 1\n[[items]]\ntype = "land"\n', encoding="utf-8")
     with pytest.raises(PlanError) as told:
         make_plan(str(mission), "bebop", "lab", ["thesis"], [1], [], {}, 0)
     assert len(told.value.lines) == 2
