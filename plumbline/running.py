@@ -20,7 +20,7 @@ from typing import TypeVar
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import KEY_BYTES
 from gcs.clients import command
-from gcs.clients.modes import MODES, change_mode
+from gcs.clients.modes import ALIASES, MODES, change_mode
 from gcs.clients.operation import Operation
 from gcs.clients.parameter_transfer import ParameterGet, ParameterSet
 from gcs.errors import GcsError, NoVehicleError, RefusedError
@@ -206,8 +206,8 @@ class RunningVehicle:
 
     def mode(self, name: str) -> None:
         """Change the flight mode, in plain words: hold, mission, return, land ..."""
-        if text("mode", name, "hold") not in MODES:
-            hint = did_you_mean(name, MODES)
+        if text("mode", name, "hold") not in (*MODES, *ALIASES):
+            hint = did_you_mean(name, (*MODES, *ALIASES))
             known = ", ".join(MODES)
             raise GcsError(f"mode {name!r}: there is none; {hint}must be one of {known}")
         self._command(lambda session: change_mode(session.target, name, session.view.latest["HEARTBEAT"]))

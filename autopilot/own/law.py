@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from autopilot.own.brought import Brought, named
 from autopilot.own.source import OwnError, found_class
 from autopilot.vehicle.parameters import LAWS, OWN_LAW
+from missions.nearest import did_you_mean
 
 GROUP = "plumbline.laws"  # of entry points
 MODES = ("load_position", "quad_position", "load_attitude", "quad_attitude")
@@ -45,7 +46,9 @@ def law_of(kind: type, reference: str) -> OwnLaw:
     modes = tuple(mode for mode in MODES if callable(getattr(kind, mode, None)))
     if not modes:
         told = f"{reference}: {kind.__name__}"
-        raise OwnError(f"{told} has no method that flies; must have one of {', '.join(MODES)}")
+        hints = (did_you_mean(name, MODES) for name in dir(kind) if not name.startswith("_"))
+        hint = next(filter(None, hints), "")
+        raise OwnError(f"{told} has no method that flies; {hint}must have one of {', '.join(MODES)}")
     return OwnLaw(*named(kind, reference, LAWS), modes)
 
 

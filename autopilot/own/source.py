@@ -23,6 +23,7 @@ from missions.nearest import did_you_mean
 
 _OURS = Path(__file__).resolve().parents[1]
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _LONGEST = 120  # characters of an error that are told
 _LONGEST_COMPILER = 240  # and of one of the compiler, which names types before it says why
 
@@ -47,11 +48,10 @@ def found_class(
     else:
         return _of_entry_point(reference, group, what, shipped)
     if not name:
-        own = [
-            one
-            for one in vars(module).values()
-            if isinstance(one, type) and one.__module__ == module.__name__ and suits(one)
-        ]
+        every = [one for one in vars(module).values() if isinstance(one, type)]
+        there = [one for one in every if one.__module__ == module.__name__]
+        # of a single class that does not suit it is told what it lacks
+        own = [one for one in there if suits(one)] or (there if len(there) == 1 else [])
         if len(own) == 1:
             return own[0]
         named = f"has {', '.join(one.__name__ for one in own)}; name one" if own else f"has no {what}"
@@ -59,8 +59,8 @@ def found_class(
     found = getattr(module, name, None)
     if not isinstance(found, type):
         classes = [one.__name__ for one in vars(module).values() if isinstance(one, type) and suits(one)]
-        there = f"; there is {', '.join(classes)}" if classes else ""
-        raise OwnError(f"{told}: has no class {name}{there}")
+        known = f"; there is {', '.join(classes)}" if classes else ""
+        raise OwnError(f"{told}: has no class {name}{known}")
     return found
 
 
@@ -182,6 +182,7 @@ def _of_importing(filename: str) -> bool:
 
 def _told_of_compiler(said: str, path: Path | None) -> str:
     """What the compiler cannot do and why, and the place in the file of `path`."""
+    said = _COLOURS.sub("", said)  # numba's errors have them where colorama is installed
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     why = next((line for line in lines if not line.startswith(("Failed in", ">>>", "File "))), "no reason")
     call = next((line.removeprefix(">>> ") for line in lines if line.startswith(">>> ")), "")

@@ -40,6 +40,8 @@ _PX4: dict[str, tuple[int, int]] = {
     **{name: (_AUTO, sub) for sub, name in _AUTO_MODES.items() if name in _FLOWN},
 }
 MODES = tuple(sorted(_PX4))
+# as clients of ArduPilot, and PX4's own names in MAVLink, call some of them
+ALIASES = {"auto": "mission", "guided": "hold", "loiter": "hold", "poshold": "position", "rtl": "return"}
 _COPTER_MODES = {
     0: "stabilize",
     1: "acro",
@@ -67,7 +69,11 @@ def mode_name(heartbeat: Any) -> str:
 
 
 def change_mode(target: Target, name: str, heartbeat: Any) -> CommandOperation:
-    """Change to one of `MODES`, of the vehicle that has sent this HEARTBEAT; InputError if it has no such."""
+    """Change to one of `MODES` or `ALIASES`, of the vehicle that has sent this HEARTBEAT.
+
+    InputError if it has no such mode.
+    """
+    name = ALIASES.get(name, name)
     armed = bool(heartbeat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
     if heartbeat.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA:
         return command.set_mode(target, name, *_PX4[name], armed)

@@ -8,7 +8,7 @@ from math import isnan
 import click
 
 from gcs.clients import command
-from gcs.clients.modes import MODES, change_mode
+from gcs.clients.modes import ALIASES, MODES, change_mode
 from gcs.clients.operation import Operation
 from gcs.commands.options import FiniteType, OptionalArgument, PositiveType, connect_option
 from gcs.shell.link import Address
@@ -143,13 +143,13 @@ def land_command(address: Address) -> None:
 
 
 @click.command("mode")
-@click.argument("name", metavar="MODE", type=click.Choice(MODES, case_sensitive=False))
+@click.argument("name", metavar="MODE", type=click.Choice((*MODES, *ALIASES), case_sensitive=False))
 @connect_option
 def mode_command(name: str, address: Address) -> None:
     """Change the flight mode.
 
-    MODE is one that the vehicle has, in PX4's words: hold, land, mission, offboard, position, return or
-    takeoff. With ArduPilot's identity (MAV_IDENTITY 1) these are GUIDED, LAND, AUTO, POSHOLD and RTL; it has
-    no offboard and takeoff.
+    MODE is one that the vehicle has: hold, land, mission, offboard, position, return or takeoff; guided,
+    loiter (both hold), auto (mission), poshold and rtl are understood too. With ArduPilot's identity
+    (MAV_IDENTITY 1) there is no offboard and takeoff.
     """
     _send(address, lambda session: change_mode(session.target, name, session.view.latest["HEARTBEAT"]))

@@ -306,7 +306,8 @@ def json_option(function: F) -> F:
 
 
 def _json_alone(_ctx: click.Context, _param: click.Parameter, as_json: bool) -> bool:
-    if as_json:
+    # what a law prints that a sweep flies in this process comes from flights of which nobody reads
+    if as_json or _ctx.info_name == "sweep":
         keep_stdout_for_results()
     return as_json
 

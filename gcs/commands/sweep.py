@@ -25,7 +25,7 @@ from gcs.commands.options import (
     vehicle_option,
 )
 from gcs.errors import EXIT_REQUIRED
-from gcs.shell.display import say
+from gcs.shell.display import say, to_results
 
 
 @click.command("sweep")
@@ -159,12 +159,12 @@ def sweep_command(
         done = sweep.done
         flew = f", {pace(done.flights_per_s)}" if done.flown else ""
         say(f"{mission}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{flew}")
-        if not quiet:
-            for one in sweep.flights:
+        with to_results():
+            for one in () if quiet else sweep.flights:
                 click.echo(
                     f"{one['law']}, {one['kind']} (flight {one['index']}, {one['told']}): {one['command']}"
                 )
-        click.echo(f"report: {sweep.page}")
+            click.echo(f"report: {sweep.page}")
     outcome = COMPLETED if sweep.done.whole else "interrupted"
     met = conclude(run, junit, outcome, sweep.done.wall_s, judge(requirements, sweep.record))
     return sweep.exit_code if met or not sweep.done.whole else EXIT_REQUIRED

@@ -34,6 +34,7 @@ class Flights:
     index: NDArray[np.int64]  # (n,) of the sweep
     seed: NDArray[np.int64]  # (n,)
     reference: str  # of the law, as it was named
+    reason: tuple[str, ...] = ()  # of those that were not completed
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,8 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
     def values(column: str, kind: type) -> NDArray[Any]:
         return np.array(table.column(column).to_pylist(), dtype=kind)
 
-    law, outcome, phase = (values(column, object) for column in ("law", "outcome", "lost_phase"))
+    texts = ("law", "outcome", "lost_phase", "reason")
+    law, outcome, phase, reason = (values(column, object) for column in texts)
     error = values("load_error_max_m", float)
     index, seed = values("index", int), values("seed", int)
     varied = {v.name: values(v.name, float) for v in plan.varied}
@@ -89,6 +91,7 @@ def flights_of(table: pyarrow.Table, plan: SweepPlan) -> list[Flights]:
                 index[rows],
                 seed[rows],
                 reference,
+                tuple(reason[rows].tolist()),
             )
         )
     return found

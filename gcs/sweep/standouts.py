@@ -29,6 +29,7 @@ class Standout:
     varied: dict[str, float]
     outcome: str
     error_m: float  # NaN where there is none
+    reason: str = ""  # of one that was not completed
 
     @property
     def name(self) -> str:
@@ -39,7 +40,7 @@ class Standout:
     def told(self) -> str:
         """What is seen there, in a few words."""
         if self.kind == "lost":
-            return self.outcome
+            return f"{self.outcome}: {self.reason}" if self.reason else self.outcome
         return f"load error {1e3 * self.error_m:.1f} mm"
 
 
@@ -75,6 +76,7 @@ def _standout(flights: Flights, kind: str, row: int) -> Standout:
         varied={name: float(values[row]) for name, values in flights.values.items()},
         outcome=flights.outcome[row],
         error_m=float(flights.error_m[row]),
+        reason=flights.reason[row] if flights.reason else "",
     )
 
 

@@ -76,6 +76,10 @@ WRONG = {
     "mine.py:Other": (FINE, r"^mine\.py: has no class Other; there is Fine$"),
     "mine.py:force": (FINE, r"^mine\.py: has no class force; there is Fine$"),
     "mine.py": ("x = 1", r"^mine\.py: has no control law, as mine\.py:MyLaw$"),
+    "./mine.py": (
+        "class Near:\n    def load_postion(self, memory, now): ...",
+        r"^\./mine\.py: Near has no method that flies; did you mean load_position\? must have one of ",
+    ),
     "mine.py:": (
         FINE + FINE.replace("Fine", "Two"),
         r"^mine\.py: has Fine, Two; name one, as mine\.py:Fine$",

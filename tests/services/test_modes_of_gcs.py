@@ -19,7 +19,7 @@ from autopilot.services.identity import (
 )
 from autopilot.services.requests import SetMode
 from autopilot.wire.dialect import plumbline as mavlink
-from gcs.clients.modes import MODES, change_mode, mode_name
+from gcs.clients.modes import ALIASES, MODES, change_mode, mode_name
 from gcs.clients.operation import Target
 from gcs.errors import InputError
 
@@ -56,3 +56,13 @@ def test_a_mode_that_is_asked_for_is_heard_and_named(rig_with, flavour, name):
     mode = flavour.mode(asked.main, asked.sub)
     words = COPTER if flavour is ARDUPILOT else {name: name for name in MODES}
     assert mode_name(heartbeat(flavour, mode.custom_mode)) == words[name]
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS.values(), ids=lambda flavour: flavour.name)
+@pytest.mark.parametrize("alias", ALIASES)
+def test_a_mode_may_be_called_as_others_call_it(rig_with, flavour, alias):
+    rig = rig_with(identity=Identity(flavour=flavour))
+    for message in change_mode(Target(1, 1), alias, heartbeat(flavour)).poll(0):
+        rig.send(message)
+    (asked,) = rig.asked
+    assert (asked.main, asked.sub) == MEANT[ALIASES[alias]]
