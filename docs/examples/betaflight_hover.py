@@ -18,8 +18,9 @@ from math import acos, atan, copysign, cos, degrees, dist, hypot, sin, sqrt
 from typing import NamedTuple
 
 from autopilot.wire.codec import decode
-from autopilot.wire.convert.flight import LoadState, read_load_state, rotor_forces
+from autopilot.wire.convert.flight import LoadState, read_load_state
 from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.convert.rotor_forces import rotor_forces
 from autopilot.wire.convert.simulator import HilStateQuaternion, read_hil_state_quaternion
 from autopilot.wire.convert.telemetry import euler_ned_frd
 from sitl.shell.autopilots import parameter_file

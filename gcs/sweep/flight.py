@@ -125,6 +125,7 @@ class SweptFlight:
         self.trace = np.zeros((0, TRACE_COLUMNS)) if trace is None else trace
         self.arm_us, self.start_us = boarding.arm_us, boarding.start_us
         self.flown = Flown()
+        self._warned: list[str] = []  # by the vehicle as it left the mission, and since
         self.airborne_us = -1
         self.mission_us = 0
         self.begun = False  # the first tick is over
@@ -253,8 +254,12 @@ class SweptFlight:
     # ---- how it ends
 
     def _hear(self, texts: tuple[tuple[int, str], ...], phase: Phase) -> None:
+        if phase == Phase.MISSION:
+            self._warned.clear()
         for severity, text in texts:
             self.flown.texts.append(text)
+            if severity <= mavlink.MAV_SEVERITY_WARNING:
+                self._warned.append(text)
             if severity <= mavlink.MAV_SEVERITY_CRITICAL and self.airborne_us >= 0:
                 self.flown.outcome, self.flown.reason = "diverged", text
                 self.flown.lost_phase = phase.name.lower()
@@ -279,7 +284,8 @@ class SweptFlight:
             return
         where = f"item {self.item} of {self.cell.items - 1}"
         self.flown.outcome = "interrupted"
-        self.flown.reason = f"the vehicle was disarmed before the end of the mission, at {where}"
+        ended = f"the vehicle was disarmed before the end of the mission, at {where}"
+        self.flown.reason = "; ".join([*dict.fromkeys(self._warned), ended])
 
     def conclude(self) -> Flown:
         """What became of the flight."""

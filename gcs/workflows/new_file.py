@@ -14,7 +14,9 @@ from importlib.machinery import PathFinder
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from sysconfig import get_path
 
+from autopilot.geometry.machine_code import ROOT
 from gcs.errors import GcsError, InputError
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
@@ -30,12 +32,11 @@ class NewFile:
 
 
 def _is_taken(module: str) -> bool:
-    """Whether scripts beside the file would import it in place of what they mean; what lies in the present
-    folder already is not meant."""
+    """Whether scripts beside the file would import it in place of what they mean: a module of Python, of a
+    library that is installed, or of ours."""
     if module in sys.stdlib_module_names:
         return True
-    elsewhere = [place for place in sys.path if Path(place or ".").resolve() != Path.cwd()]
-    return PathFinder.find_spec(module, elsewhere) is not None
+    return PathFinder.find_spec(module, [*map(get_path, ("purelib", "platlib")), str(ROOT)]) is not None
 
 
 def kinds() -> tuple[str, ...]:
