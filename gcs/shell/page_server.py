@@ -30,6 +30,7 @@ from websockets.http11 import Request, Response
 from gcs.errors import GcsError
 from gcs.shell.link import PAGE_PORT
 
+_WHOLE_ADDRESS = ": open the whole address that gcs has printed, which holds a key"
 SOCKET = "socket"  # the web socket's place beside the page
 REPORT = "report"  # and that of the folder with the report
 _MOST_BYTES = 4096  # of one request of a page
@@ -219,7 +220,8 @@ def _found(body: bytes, suffix: str, policy: str) -> Response:
 
 
 def _refused(status: http.HTTPStatus) -> Response:
-    body = f"{status.phrase}\n".encode()
+    hint = "" if status is not http.HTTPStatus.FORBIDDEN else _WHOLE_ADDRESS
+    body = f"{status.phrase}{hint}\n".encode()
     headers = _headers("default-src 'none'")
     headers["Content-Type"] = "text/plain; charset=utf-8"
     headers["Content-Length"] = str(len(body))

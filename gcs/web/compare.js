@@ -84,7 +84,9 @@
     paint();
     const grid = gridOf(flights), first = flights[0];
     const bands = first.phases.map((phase) => ({ ...phase, from: phase.from - first.begin, to: phase.to - first.begin }));
-    const worst = first.worst && { time: first.worst.time - first.begin };
+    // of all flights, by the clock that begins with the mission
+    const farthest = flights.filter((flight) => flight.worst).sort((a, b) => b.worst.error_m - a.worst.error_m)[0];
+    const worst = farthest && { time: farthest.worst.time - farthest.begin };
     const transport = new Plumbline.Transport(byId("transport"), {
       span: [grid[0], grid[grid.length - 1]], start: 0, bands, marks: [], worst });
     const group = new Plumbline.ChartGroup();
