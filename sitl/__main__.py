@@ -77,7 +77,7 @@ def _run_on(cpu: int) -> None:
     "--speed",
     type=click.FloatRange(0.0, MOST_SPEED, min_open=True),
     metavar="NUMBER",
-    help="Simulated seconds per second, at most.  [default: 1]",
+    help="Simulated seconds per second, at most.  [default: 1; with --lockstep: no limit]",
 )
 @click.option("--lockstep", is_flag=True, help="As fast as the autopilot answers.")
 @click.option(
@@ -145,9 +145,8 @@ def main(
     third-party autopilots as they want it). The world waits for the answer to every tick: on a busy machine
     its clock is slower, and nothing is lost.
     """
-    if lockstep and (real_time or speed is not None):
-        other = "--real-time" if real_time else "--speed"
-        raise click.UsageError(f"--lockstep and {other} exclude each other")
+    if lockstep and real_time:
+        raise click.UsageError("--lockstep and --real-time exclude each other")
     kind = AUTOPILOTS[interface]
     if parameters:
         if kind.run is None:

@@ -36,7 +36,7 @@ def invoke(tmp_path: Path):
         (sitl, ["--vehicle", "nothing"], "unknown vehicle 'nothing'; shipped: "),
         (sitl, ["--set", "SIM_RATE_HZ=300"], "SIM_RATE_HZ = 300 Hz; a tick must be "),
         (sitl, ["--set", "SIM_DROP_PCT=300"], "SIM_DROP_PCT = 300.0 %; must be "),
-        (sitl, ["--speed", "2", "--lockstep"], "--lockstep and --speed exclude each other"),
+        (sitl, ["--real-time", "--lockstep"], "--lockstep and --real-time exclude each other"),
         (autopilot, ["--vehicle", "nothing"], "unknown vehicle 'nothing'; shipped: "),
         (autopilot, ["--law", "nothing"], "--law 'nothing': no control law of that name; "),
         (autopilot, ["--set", "NGC_KX=1e9"], "NGC_KX = 1000000000.0"),
