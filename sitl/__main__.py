@@ -177,6 +177,7 @@ def main(
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loops run, there is nothing to bring to an end
     link: Link | None = None
     factor = 1.0 if speed is None else speed
+    unlimited = lockstep and speed is None
     pacing = Pacing(factor)
     simulator: HilSimulator | None = None
     try:
@@ -210,7 +211,7 @@ def main(
             _run_on(cpu)
         # where it would wait spinning for most of the time, it would keep others from their work
         be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
-        mode = "in lockstep" if lockstep else f"at {factor:g} x real time, waiting where that is too fast"
+        mode = "in lockstep" if unlimited else f"at {factor:g} x real time, waiting where that is too fast"
         if real_time:
             mode = f"at {factor:g} x real time, waiting for nobody"
         say(
@@ -218,7 +219,7 @@ def main(
             f"waiting for {kind.awaited} on {shown(listen)}"
         )
         with StopRequest() as stop:
-            paced = None if lockstep else pacing
+            paced = None if unlimited else pacing
             if kind.run is not None:
                 kind.run(link, simulator, stop, say, paced)
                 return
