@@ -503,11 +503,8 @@ class _Done(NamedTuple):
 class CommandService:
     """Commands in, COMMAND_ACK out; what happens is decided by the `decide` given with each message."""
 
-    def __init__(
-        self, home: Home, identity: Identity, has_mission: Callable[[], bool] = lambda: True
-    ) -> None:
+    def __init__(self, home: Home, identity: Identity) -> None:
         self.context = Context(home, identity.flavour, identity.rotors)
-        self._has_mission = has_mission
         self._done: dict[tuple[Peer, int], _Done] = {}
         self._last: tuple[Peer, int] | None = None
 
@@ -563,8 +560,6 @@ class CommandService:
         request = parser(call, self.context)
         if isinstance(request, Verdict):
             return _answer(call.command, request, peer)
-        if isinstance(request, StartMission) and not self._has_mission():
-            request = StartMission(None)  # it is the mission that is missing, whichever item was named
         outputs = self._conclude(repr(call), call.command, request, peer, now_us, decide)
         if isinstance(request, SetCurrent):
             outputs.append(Announce(None, (mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,)))

@@ -154,7 +154,7 @@ class VehicleEndpoint:
         self._reached, self._reached_left = 0, 0  # the last item of a mission that is over, to be said again
         self._reached_us: int | None = None
         self._parameters = ParameterService(parameters, identity.parameter_encoding)
-        self._commands = CommandService(home, identity, lambda: bool(self._missions.mission.items))
+        self._commands = CommandService(home, identity)
         self._components = ComponentService(self._commands)
         self._guided = GuidedService(home, identity.system)
         made = made_files(identity, parameters, lambda: self._missions.mission)

@@ -359,12 +359,6 @@ def test_set_current_message_is_answered_by_mission_current(rig):
     assert rig.asked == [SetCurrent(5)]
 
 
-def test_where_no_mission_is_its_item_is_not_what_is_missing(rig):
-    """So that it is refused in the words in which its mode is."""
-    rig.replies(long(300, (0, 0)))
-    assert rig.asked == [StartMission(None)]
-
-
 def test_a_repeated_command_is_acknowledged_but_done_once(rig):
     rig.replies(long(22, (NAN,) * 7))
     rig.verdict = lambda request: Verdict(DENIED, "already flying")

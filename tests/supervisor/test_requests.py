@@ -224,6 +224,16 @@ def test_arming_and_choosing_what_to_fly_come_in_either_order(what: Any, ask_fir
     assert sky.flight.mission.takeoff_altitude_m == 2.0
 
 
+@pytest.mark.parametrize("first", [None, 0, 3])
+def test_where_no_mission_is_its_item_is_not_what_is_missing(first: int | None) -> None:
+    """A start is refused in the words in which the mode is, whichever item it names."""
+    flight = Flight(phase=Phase.ARMED)
+    start = decide(flight, R.StartMission(first), view(), SETTINGS)
+    assert start == decide(flight, R.SetMode(identity.AUTO, identity.AUTO_MISSION), view(), SETTINGS)
+    after, verdict = start
+    assert (after, verdict.result, verdict.text) == (flight, DENIED, "Mission denied: there is none")
+
+
 def test_a_mission_that_is_gone_is_not_begun_by_arming() -> None:
     chosen, _ = decide(Flight(mission=MissionProgress(plan=PLAN)), R.StartMission(None), view(), SETTINGS)
     gone = replace(chosen, mission=replace(chosen.mission, plan=MissionPlan()))

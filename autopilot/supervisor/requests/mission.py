@@ -64,7 +64,7 @@ def _waiting(flight: Flight, view: View, settings: Settings) -> Flight:
 def start_mission(flight: Flight, request: StartMission, view: View, settings: Settings) -> Decision:
     """Fly the mission, from an item on or from the present one."""
     before = flight
-    if request.first is not None:
+    if request.first is not None and flight.mission.plan.items:  # else the mission is missed, not the item
         flight, verdict = set_current(flight, SetCurrent(request.first), view, settings)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
             return before, verdict
