@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from autopilot.geometry.linear import Vec3
-
-_LONGEST_SHOWN = 60  # characters
+from autopilot.own.guard import shown
 
 
 def three_numbers(numbers: Any, what: str) -> Vec3:
@@ -22,6 +21,4 @@ def three_numbers(numbers: Any, what: str) -> Vec3:
         shape = ()
     if shape:
         raise ValueError(f"{what} has {' x '.join(map(str, shape))} numbers; must be 3")
-    text = repr(numbers)
-    text = text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
-    raise ValueError(f"{what} is {text}; must be 3 numbers")
+    raise ValueError(f"{what} is {shown(numbers)}; must be 3 numbers")

@@ -111,7 +111,7 @@ class MissionService:
 
     def __init__(self, home: Home, mission: StoredMission, home_is_item: bool = False) -> None:
         self.home = home
-        self._home_is_item = home_is_item
+        self._item_of_home = (_home_item(home),) if home_is_item else ()
         self.mission = mission
         self.areas: dict[int, tuple[WireItem, ...]] = dict.fromkeys(_AREAS, ())
         self._upload: _Upload | None = None
@@ -247,8 +247,8 @@ class MissionService:
     def _complete(self, upload: _Upload, now_us: int, decide: Decide) -> list[Output]:
         """All items are here: check them as a whole, and only then replace the mission."""
         items, kind = tuple(upload.items), upload.kind
-        if self._home_is_item and kind == _MISSION and items[0].command == mavlink.MAV_CMD_NAV_WAYPOINT:
-            items = (_home_item(self.home), *items[1:])
+        if self._item_of_home and kind == _MISSION and items[0].command == mavlink.MAV_CMD_NAV_WAYPOINT:
+            items = (*self._item_of_home, *items[1:])
         try:
             if kind in _AREAS:
                 _READERS[kind](items, self.home)
@@ -379,7 +379,7 @@ class MissionService:
     def _items_of(self, kind: int) -> tuple[WireItem, ...]:
         """All items of a kind; none of a kind that does not exist."""
         if kind == _MISSION:
-            return self.mission.items or ((_home_item(self.home),) if self._home_is_item else ())
+            return self.mission.items or self._item_of_home
         return self.areas.get(kind, ())
 
     def receive_request_int(self, message: Any, peer: Peer, now_us: int, decide: Decide) -> list[Output]:

@@ -300,33 +300,34 @@ def test_a_compiled_law_that_asks_for_nothing_is_told() -> None:
         tried(Compiled)
 
 
-@needs_compiler
-def test_what_cannot_be_compiled_is_told_with_its_line() -> None:
+def law_compiled_from(method: Any) -> type:
     class Uncompiled(Gain):
         @classmethod
         def build(cls, parameters: Any) -> Uncompiled:
             return cls(1.0)
 
-        @kernel
-        def load_position(self, memory: Any, now: Now) -> Any:
-            return memory, now.no_such_field  # type: ignore[attr-defined]
+        load_position = method
+
+    return Uncompiled
+
+
+@needs_compiler
+def test_what_cannot_be_compiled_is_told_with_its_line() -> None:
+    @kernel
+    def load_position(self: Any, memory: Any, now: Now) -> Any:
+        return memory, now.no_such_field  # type: ignore[attr-defined]
 
     told = r"cannot be compiled: Unknown attribute 'no_such_field' of type Now \(test_host\.py:\d+\)$"
     with pytest.raises(OwnError, match=rf"Law Uncompiled failed: {told}"):
-        tried(Uncompiled)
+        tried(law_compiled_from(load_position))
 
 
 @needs_compiler
 def test_and_with_the_reason_that_follows_what_it_was_of() -> None:
-    class Uncompiled(Gain):
-        @classmethod
-        def build(cls, parameters: Any) -> Uncompiled:
-            return cls(1.0)
-
-        @kernel
-        def load_position(self, memory: Any, now: Now) -> Any:
-            return memory, len(now.time_s)  # type: ignore[arg-type]
+    @kernel
+    def load_position(self: Any, memory: Any, now: Now) -> Any:
+        return memory, len(now.time_s)  # type: ignore[arg-type]
 
     told = r"cannot be compiled: no implementation of len\(float64\) \(test_host\.py:\d+\)$"
     with pytest.raises(OwnError, match=told):
-        tried(Uncompiled)
+        tried(law_compiled_from(load_position))
