@@ -27,7 +27,7 @@ _MISPLACED = {
     "factors": "not a key of the file; write [[items.terms.factors]] behind its [[items.terms]]",
 }
 
-MISSIONS = TomlFiles("mission", "missions", error=MissionFileError)
+MISSIONS = TomlFiles("mission", MissionFileError)
 
 
 def shipped() -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """TOML files that a pydantic schema describes: which are shipped, how one is read, and what is wrong with it.
 
-Missions, vehicles and sensor profiles are such files. This module knows of each but a key by which it is
-told, so that every room may use it.
+Missions, vehicles and sensor profiles are such files. This module knows of each but where the shipped ones
+are and a key by which a file is told, so that every room may use it.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ _LONGEST_SHOWN = 40  # characters of a value
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 # a key that each file of a kind has, and those of no other kind: files of the wrong kind are told by it
 _MARKS = {"items": "mission", "quad_mass_kg": "vehicle", "imu": "sensors"}
+_SHIPPED_IN = {"mission": "missions", "vehicle": "autopilot.vehicle.vehicles", "sensors": "sitl.sensors"}
 _NUMBER_WITH_UNIT = re.compile(
     r"\s*(\w+)\s*=\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[A-Za-z%/][\w%/^*]*\s*(?:#.*)?$"
 )
@@ -73,17 +74,16 @@ class TomlText:
 
 @dataclass(frozen=True)
 class TomlFiles:
-    """One kind of file. The names of the shipped ones are those of the files in `folder` of `package`."""
+    """One kind of file, with the shipped ones in the folder of `package`: where they are, unless they are of
+    a kind that everybody knows."""
 
     kind: str  # as messages call it
-    package: str
-    folder: str = ""
     error: type[FileError] = FileError
+    package: str = ""
 
     def names(self) -> tuple[str, ...]:
         """Names that may be given in place of a path, sorted."""
-        entries = (entry.name for entry in self._folder().iterdir())
-        return tuple(sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX)))
+        return _names(self._package)
 
     def choice(self) -> str:
         """What an option that names such a file may be, for its help: `bebop, heavy, thesis or a file`."""
@@ -93,9 +93,8 @@ class TomlFiles:
         """The text of a shipped name or of a file; else an error that lists the names."""
         given = str(name_or_path)
         if given in self.names():
-            text = self._folder().joinpath(given + _SUFFIX).read_text(encoding="utf-8")
-            parts = (*self.package.split("."), self.folder, given + _SUFFIX)
-            return TomlText(given, "/".join(filter(None, parts)), text)
+            text = _folder(self._package).joinpath(given + _SUFFIX).read_text(encoding="utf-8")
+            return TomlText(given, "/".join((*self._package.split("."), given + _SUFFIX)), text)
         path = Path(given)
         if not (given and (path.exists() or path.suffix or given != path.name)):  # a word, and no path
             shipped = f"{self._hint(given)}shipped: {', '.join(self.names())}"
@@ -130,11 +129,26 @@ class TomlFiles:
             raise self.error(problems(error, spec, where)) from None
 
     def _hint(self, given: str) -> str:
+        for kind, package in _SHIPPED_IN.items():
+            if kind != self.kind and given in _names(package):
+                return f"{given} is one of the shipped {kind.removesuffix('s')}s; "
         beside = given + _SUFFIX
         return f"did you mean {beside}? " if Path(beside).is_file() else did_you_mean(given, self.names())
 
-    def _folder(self) -> Traversable:
-        return files(self.package).joinpath(self.folder) if self.folder else files(self.package)
+    @property
+    def _package(self) -> str:
+        return self.package or _SHIPPED_IN[self.kind]
+
+
+def _names(package: str) -> tuple[str, ...]:
+    entries = (entry.name for entry in _folder(package).iterdir())
+    return tuple(sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX)))
+
+
+def _folder(package: str) -> Traversable:
+    """Of a package, or of a folder in one that holds no code."""
+    owner, _, folder = package.rpartition(".")
+    return files(owner).joinpath(folder) if owner else files(package)
 
 
 def problems(error: ValidationError, spec: type[BaseModel], where: str, at: str = "") -> list[str]:

@@ -134,7 +134,11 @@ class PathReport:
     def __str__(self) -> str:
         near = ""
         if self.kind == "signals":
-            near = f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
+            near = (
+                f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
+                if self.distance_m
+                else ", as asked"
+            )
         return (
             f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; "
             f"rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, "
@@ -210,13 +214,15 @@ def _too_heavy(limits: VehicleLimits) -> list[Violation]:
     return [Violation(0, "thrust", weight, limits.usable_n, 0.0, text)]
 
 
-def paths(mission: Mission, limits: VehicleLimits, planner: Planner | None = None) -> list[PathReport]:
+def paths(
+    mission: Mission, limits: VehicleLimits, planner: Planner | None = None, shaped: bool = True
+) -> list[PathReport]:
     """How each step is flown that carries the load along a path, or tracks an attitude.
 
     What the vehicle flies after it has released the load is left out. `planner` is somebody's own, of paths
-    through waypoints; PlanError, if what it gives is refused.
+    through waypoints; PlanError, if what it gives is refused. Without `shaped` signals are as asked.
     """
-    shaping = limits.shaping
+    shaping = limits.shaping._replace(shaped=shaped)
     prepared = prepare(mission.steps, range(len(mission.steps)), shaping, planner=planner)
     if planner is not None and prepared.refusal:
         raise PlanError(prepared.refusal)

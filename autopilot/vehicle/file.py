@@ -20,7 +20,7 @@ class VehicleFileError(FileError):
     """A vehicle file is missing or wrong: the fault of whoever wrote or named it."""
 
 
-VEHICLES = TomlFiles("vehicle", "autopilot.vehicle", "vehicles", VehicleFileError)
+VEHICLES = TomlFiles("vehicle", VehicleFileError)
 
 
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:

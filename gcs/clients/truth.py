@@ -16,7 +16,7 @@ Sender = tuple[str, int]
 
 _SIM_BOOT = mavlink.MAVLINK_MSG_ID_SIM_BOOT
 _RUN = Field(mavlink.MAVLink_sim_boot_message, "boot_id")
-_OTHER = "--truth PORT is where the vehicle's own tells it (sitl --truth HOST:PORT)"
+_OTHER = "--truth PORT names the port to which the vehicle's simulator sends it (sitl --truth HOST:PORT)"
 
 
 class Worlds:
@@ -73,8 +73,8 @@ class Truth:
             return ""
         if not self._worlds and self._run is not None:
             return (
-                f"nothing comes at {where}: the vehicle's own tells its truth to gcs fly alone, or elsewhere "
-                "(--truth PORT), or stands still"
+                f"nothing comes at {where}: the vehicle's simulator sends its truth to the gcs fly that "
+                "started it, or to another port (name it by --truth PORT), or it stands still"
             )
         if not self._worlds:
             return f"no simulator tells its truth at {where}; {_OTHER}"

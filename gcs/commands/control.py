@@ -11,6 +11,7 @@ from gcs.clients import command
 from gcs.clients.modes import ALIASES, MODES, change_mode
 from gcs.clients.operation import Operation
 from gcs.commands.options import FiniteType, OptionalArgument, PositiveType, connect_option
+from gcs.errors import RefusedError
 from gcs.shell.link import Address
 from gcs.shell.session import Session
 
@@ -50,7 +51,10 @@ def disarm_command(force: bool, address: Address) -> None:
 
     In the air the vehicle refuses.
     """
-    _send(address, lambda session: command.disarm(session.target, force))
+    try:
+        _send(address, lambda session: command.disarm(session.target, force))
+    except RefusedError as error:
+        raise error if force else RefusedError(f"{error}; --force stops the rotors even in the air") from None
 
 
 @click.command("start")

@@ -55,9 +55,10 @@ def columns_option(command: F) -> F:
 def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     """Find cable, load and drag from a recorded flight.
 
-    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), or rows of comma-separated numbers
-    (.csv, .csv.gz) that a column map describes. Each number comes with its 95 % interval; a warning says
-    which ones the recording does not tell, since load or vehicle move too little.
+    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), of which the true states are read, or
+    rows of comma-separated numbers (.csv, .csv.gz) that a column map describes. Each number comes with its
+    95 % interval; a warning says which ones the recording does not tell, since load or vehicle move too
+    little.
 
     \b
     gcs identify flight-15.csv.gz --columns motion-capture
@@ -96,10 +97,10 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 def replay_command(file: Path, columns: str | None, out: Path | None, as_json: bool) -> None:
     """Estimate the load of a recorded flight, and score it.
 
-    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), or rows of comma-separated numbers
-    (.csv, .csv.gz) that a column map describes. The load is estimated from the vehicle's pose alone
-    (load.csv, load.png) and, where it was measured, predicted 2 s and 5 s ahead, with innovations, errors,
-    and the share of them within the stated bounds.
+    DIR is a simulated flight's folder, FILE its telemetry log (.tlog), of which the true states are read, or
+    rows of comma-separated numbers (.csv, .csv.gz) that a column map describes. The load is estimated from
+    the vehicle's pose alone (load.csv, load.png) and, where it was measured, predicted 2 s and 5 s ahead,
+    with innovations, errors, and the share of them within the stated bounds.
     """
     from gcs.workflows.recorded import replay
 
@@ -122,7 +123,8 @@ def replay_command(file: Path, columns: str | None, out: Path | None, as_json: b
 def _print_rows(record: dict[str, Any]) -> None:
     broken = f", broken at {record['breaks']} rows" if record["breaks"] else ""
     jitter = f", jitter {1e3 * record['row_jitter_s']:.1f} ms" if record["row_jitter_s"] else ""
-    click.echo(f"{record['rows']} rows, {record['duration_s']:.1f} s{jitter}{broken}")
+    source = ": the true states of a simulated flight" if record["true_states"] else ""
+    click.echo(f"{record['rows']} rows, {record['duration_s']:.1f} s{jitter}{broken}{source}")
 
 
 def with_interval(value: float, half_width: float) -> tuple[str, str]:

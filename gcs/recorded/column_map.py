@@ -120,7 +120,7 @@ class ColumnMap(_Table):
         return LoadModel(gravity_m_s2=self.gravity_m_s2, **given)
 
 
-MAPS = TomlFiles("column map", "gcs.recorded", "maps", MapError)
+MAPS = TomlFiles("column map", MapError, "gcs.recorded.maps")
 
 
 def load_map(name_or_path: str | PathLike[str]) -> ColumnMap:

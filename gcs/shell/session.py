@@ -132,11 +132,16 @@ class Session:
         if result is None:
             raise NoVehicleError(f"{label or 'the exchange'}: the vehicle fell silent")
         if result.status is Status.UNANSWERED:
-            raise NoVehicleError(result.silence(self._connection.signatures.trouble))
+            raise NoVehicleError(result.silence(self.signing_trouble))
         if result.status is Status.REFUSED:
             self.watch(lambda: False, REASON_S)
             raise RefusedError(result.refusal(self.view.complaints_since(texts_before)))
         return result
+
+    @property
+    def signing_trouble(self) -> str:
+        """Why nothing that is asked is answered, where that is for want of the key that signs messages."""
+        return self._connection.signatures.trouble
 
     def request(self, message_id: int) -> Any:
         """The newest message of that id, asked for if the vehicle has not sent it by itself."""

@@ -44,15 +44,20 @@ def store_plan(directory: Path, plan: SweepPlan, command: str, origin: Origin) -
     path.write_text(json.dumps(fields, indent=2) + "\n", encoding="utf-8")
 
 
+def default_folder(plan: SweepPlan) -> Path:
+    """sweeps/MISSION"""
+    return Path("sweeps") / Path(plan.mission).stem
+
+
 def default_directory(plan: SweepPlan, origin: Origin, fresh: bool) -> Path:
     """sweeps/MISSION, or the first of sweeps/MISSION-2, -3 ... that holds this sweep, or nothing.
 
     `fresh`: also one that other code has flown, whose flights are discarded.
     """
-    stem = Path(plan.mission).stem
+    first = default_folder(plan)
     ordinal = 1
     while True:
-        directory = Path("sweeps") / (stem if ordinal == 1 else f"{stem}-{ordinal}")
+        directory = first if ordinal == 1 else first.with_name(f"{first.name}-{ordinal}")
         if not directory.exists() or _is_of(directory, origin, fresh):
             return directory
         ordinal += 1

@@ -13,12 +13,18 @@
     frames: 0, // drawn so far
   };
   let scene = null;
+  let noPicture = ""; // why the scene is not drawn
+  function loseScene(why) {
+    noPicture = `${why}: the numbers and plots work without the picture.`;
+    byId("hint").textContent = noPicture;
+  }
   try {
     scene = new Plumbline.Scene(byId("scene"), { theme: "auto" });
     scene.camera("follow");
   } catch (error) {
-    byId("hint").textContent = "This browser offers no WebGL: the numbers and plots work without the picture.";
+    loseScene("This browser offers no WebGL");
   }
+  byId("scene").addEventListener("webglcontextlost", () => loseScene("The browser has stopped drawing (WebGL)"));
   const panels = new Plumbline.LivePanels();
   const plots = new Plumbline.LivePlots(byId("signals"), byId("strips"));
   const controls = new Plumbline.LiveControls(ask);
@@ -170,7 +176,8 @@
     page.enabled = some;
     controls.enable(some);
     if (some && vehicle.record) controls.setParameters(vehicle.record.parameters);
-    byId("hint").textContent = some && scene ? "Double-click: take the load there. Drag: turn. Wheel: zoom." : "";
+    const how = some ? "Double-click: take the load there. Drag: turn. Wheel: zoom." : "";
+    byId("hint").textContent = noPicture || how;
   }
 
   if (scene) {

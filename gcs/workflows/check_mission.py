@@ -17,12 +17,16 @@ from gcs.mission_items import items_of
 from gcs.workflows.checked import note_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
-from missions.model import Mission, Waypoint, Winch
+from missions.model import Mission, Signals, Waypoint, Winch
 
 # Share of the rotors' range that a path must leave a vehicle whose truth is not its belief: slower rotors, a
 # battery that sags and a cable off the centre take a part of it, wind another. `heavy-real` loses Case C with
 # 15 %, and brings it home with 35 %; with 40 % also from wind of 5 m/s with gusts of 1 m/s (docs/realism.md).
 ROOM_FOR_TRUTH = 0.25
+LAW_ERRS = (
+    "note: how near a law without preview keeps to these paths, and whether its own errors lose the flight, "
+    "only a flight tells: gcs fly --law thesis"
+)
 MORE_ROOM = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
 
@@ -53,11 +57,13 @@ def reels_too_far(mission: Mission, vehicle: str) -> Iterator[Violation]:
             yield Violation(entry.item, "cable length", length_m, limit_m, entry.transfer_s, text)
 
 
-def path_reports(mission: Mission, vehicle: str, planner: Planner | None = None) -> list[PathReport]:
-    """How the vehicle flies it, its paths shaped by the autopilot, and with `planner` those through waypoints
-    made by that; GcsError says what is wrong with one of these."""
+def path_reports(
+    mission: Mission, vehicle: str, planner: Planner | None = None, shaped: bool = True
+) -> list[PathReport]:
+    """How the vehicle flies it, its paths `shaped` by the autopilot or as asked, and with `planner` those
+    through waypoints made by that; GcsError says what is wrong with one of these."""
     try:
-        return paths(mission, load_limits(vehicle), planner)
+        return paths(mission, load_limits(vehicle), planner, shaped)
     except PlanError as error:
         raise GcsError(f"{mission.name}: {error}") from None
 
@@ -99,14 +105,16 @@ class Check:
 
 
 def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Planner | None = None) -> Check:
-    """Check a mission against a vehicle; `as_asked`: without shaping, and without a report of its paths.
+    """Check a mission against a vehicle; `as_asked`: without shaping.
 
     GcsError if somebody's own `planner` does not plan it.
     """
     mission = load(name_or_path)
     found = [*violations(mission, vehicle, not as_asked), *reels_too_far(mission, vehicle)]
-    reports = [] if found or as_asked else path_reports(mission, vehicle, planner)
+    reports = [] if found else path_reports(mission, vehicle, planner, not as_asked)
     warnings = tuple(remarks_on(reports, vehicle))
+    if as_asked and any(isinstance(step, Signals) for step in mission.steps):
+        warnings += (LAW_ERRS,)
     if planner is not None and not any(isinstance(step, Waypoint) for step in mission.steps):
         warnings += (f"the planner is never asked: mission {mission.name} has no waypoints",)
     return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)

@@ -29,7 +29,8 @@ class CompareError(GcsError):
 def compare(sources: Sequence[Path], out: Path | None) -> tuple[list[Run], Path]:
     """The flights that were named, and the page that was made of them."""
     if not 2 <= len(sources) <= MOST_RUNS:
-        raise CompareError(f"flights to be compared: {len(sources)}; name 2 to {MOST_RUNS}")
+        named = "one flight was named" if len(sources) == 1 else f"{len(sources)} flights were named"
+        raise CompareError(f"{named}; name 2 to {MOST_RUNS} that are to be compared")
     logs = [find_log(source) for source in sources]
     for i, log in enumerate(logs):
         if log.resolve() in [other.resolve() for other in logs[:i]]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path("replays")
 OWN_MAP = "telemetry"  # of Plumbline's own logs
+TLOG_SUFFIX = ".tlog"
 
 
 def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, Any]:
@@ -130,7 +131,7 @@ def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel
     from gcs.recorded.motion import distances, motion_of
     from gcs.recorded.recording import READ, RecordingError, is_table, read_recording
 
-    is_log = path.suffix == ".tlog"
+    is_log = path.suffix == TLOG_SUFFIX
     if columns is None and not is_log and path.is_file():
         if not is_table(path):
             raise InputError(f"{path}: no recording of a flight; {READ}")
@@ -162,6 +163,7 @@ def _rows_record(path: Path, motion: Motion) -> dict[str, Any]:
     times = motion.times
     return {
         "file": str(path),
+        "true_states": path.suffix == TLOG_SUFFIX,  # of a simulated flight, not what somebody has measured
         "rows": len(motion.time_s),
         "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
         "row_jitter_s": float(np.std(times.offset_s)),

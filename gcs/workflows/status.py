@@ -95,6 +95,8 @@ def _ask_for_texts(session: Session) -> _Asked:
     try:
         session.run(command.request_message(session.target, mavlink.MAVLINK_MSG_ID_STATUSTEXT))
     except (RefusedError, NoVehicleError):
+        if session.signing_trouble:
+            say(f"its texts could not be asked for: {session.signing_trouble}")
         return _Asked(session.view, keeps=False)
     return _Asked(session.view, keeps=True)
 

@@ -16,7 +16,7 @@ from gcs.folders import PAGE_FILE
 from gcs.shell.display import say
 from gcs.shell.stopping import StopRequest
 from gcs.sweep.plan import MOST_FLIGHTS, SweepPlan, make_plan, read_varied
-from gcs.sweep.plan_file import default_directory, sweep_origin
+from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
@@ -114,6 +114,9 @@ def run_sweep(options: SweepOptions) -> Sweep:
     if not options.quiet:
         _tell_doubts(plan)
     directory = options.out or default_directory(plan, sweep_origin(plan), options.fresh)
+    first = default_folder(plan)
+    if not options.out and directory != first and not options.quiet:
+        say(f"{first} holds another sweep: this one goes to {directory}")
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
     with StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop:

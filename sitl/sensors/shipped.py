@@ -9,4 +9,4 @@ class ProfileError(FileError):
     """A sensor profile cannot be used: the fault of its file or of its name."""
 
 
-PROFILES = TomlFiles("sensors", "sitl.sensors", error=ProfileError)
+PROFILES = TomlFiles("sensors", ProfileError)

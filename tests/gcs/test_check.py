@@ -8,7 +8,7 @@ import pytest
 
 from autopilot.trajectory.feasibility import PathReport
 from gcs.errors import InputError
-from gcs.workflows.check_mission import Check, check_mission, reels_too_far, remarks_on
+from gcs.workflows.check_mission import LAW_ERRS, Check, check_mission, reels_too_far, remarks_on
 from missions.model import Land, Mission, Takeoff, Winch
 
 CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
@@ -54,3 +54,12 @@ def test_a_plan_of_another_ground_station_is_told_where_it_is_checked(tmp_path: 
         check_mission(str(plan), "bebop", as_asked=False)
     with pytest.raises(InputError, match=r"unknown mission|No such file|no such file"):
         check_mission(str(tmp_path / "b.plan"), "bebop", as_asked=False)
+
+
+def test_paths_as_asked_are_told_with_what_the_check_does_not_judge() -> None:
+    asked, shaped = (check_mission("case-a", "bebop", as_asked) for as_asked in (True, False))
+    assert asked.warnings == (LAW_ERRS,)
+    assert shaped.warnings == ()
+    assert [path.distance_m > 0.0 for path in (asked.paths[-1], shaped.paths[-1])] == [False, True]
+    assert ", as asked; rotors" in str(asked.paths[-1])
+    assert "mm from the path asked; rotors" in str(shaped.paths[-1])

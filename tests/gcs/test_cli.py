@@ -349,7 +349,11 @@ def test_a_refusal_is_one_line_with_the_reason(live):
 
     vehicle.on_command_long = refuse
     line = one_line(run("disarm", "--connect", port), EXIT_ERROR)
-    assert line == "gcs: Disarming denied: in the air"
+    assert line == "gcs: Disarming denied: in the air; --force stops the rotors even in the air"
+    assert (
+        one_line(run("disarm", "--force", "--connect", port), EXIT_ERROR)
+        == "gcs: Disarming denied: in the air"
+    )
 
 
 def test_a_vehicle_that_stops_answering_is_one_line(live, monkeypatch):
@@ -531,7 +535,8 @@ def test_figures_that_only_the_simulator_knows_are_missed_with_the_option_that_g
     assert json.loads(result.stdout)["rate_hz"] is None
     assert (
         "no rate, lateness and missed ticks of the simulator: no simulator tells its truth at "
-        f"UDP 127.0.0.1:{nobody}; --truth PORT is where the vehicle's own tells it (sitl --truth HOST:PORT)"
+        f"UDP 127.0.0.1:{nobody}; --truth PORT names the port to which the vehicle's simulator sends it "
+        "(sitl --truth HOST:PORT)"
     ) in result.stderr
     assert "--truth is that of a running simulator: add --connect" in one_line(
         run("fly", "hover", "--truth", "14561"), EXIT_USAGE

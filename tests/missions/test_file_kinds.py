@@ -28,6 +28,26 @@ def test_a_python_file_is_told_where_it_belongs(tmp_path: Path) -> None:
         load_mission(law)
 
 
+@pytest.mark.parametrize(
+    ("load", "name", "said"),
+    [
+        (
+            load_vehicle,
+            "case-b",
+            "unknown vehicle 'case-b'; case-b is one of the shipped missions; shipped: ",
+        ),
+        (load_mission, "lab", "unknown mission 'lab'; lab is one of the shipped sensors; shipped: "),
+        (load_profile, "heavy", "unknown sensors 'heavy'; heavy is one of the shipped vehicles; shipped: "),
+    ],
+)
+def test_the_name_of_another_kind_is_told_as_what_it_is(
+    load: Callable[[str], Any], name: str, said: str
+) -> None:
+    with pytest.raises(FileError) as told:
+        load(name)
+    assert str(told.value).startswith(said)
+
+
 @pytest.mark.parametrize(("wanted", "load"), KINDS, ids=lambda one: getattr(one, "kind", ""))
 def test_the_shipped_files_of_the_other_kinds_are_told_as_what_they_are(
     tmp_path: Path, wanted: TomlFiles, load: Callable[[Path], Any]

@@ -107,6 +107,9 @@ def test_a_flight_is_seen_and_led_by_hand(
     ours = (address, address.replace("http:", "ws:") + "socket", "data:,")
     assert [url for url in browser.requests if not url.startswith(ours)] == []
 
+    browser.run("Plumbline.live.scene.renderer.forceContextLoss()")
+    browser.wait("document.getElementById('hint').textContent.startsWith('The browser has stopped drawing')")
+
     browser.open(browser.run("return document.querySelector('#banner a').href"))
     assert "report" in browser.run("return document.title")
     browser.driver.get("about:blank")

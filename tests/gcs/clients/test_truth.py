@@ -52,8 +52,10 @@ def test_a_vehicle_that_does_not_say_has_the_one_world_of_the_port_that_somebody
 def test_a_simulator_that_the_vehicle_has_named_and_that_is_silent_stands_still_or_tells_elsewhere() -> None:
     truth = Truth(AT, vouched=False)
     truth.of_vehicle(7)
-    told = "the vehicle's own tells its truth to gcs fly alone, or elsewhere (--truth PORT), or stands still"
-    assert truth.missing == f"nothing comes at UDP {AT}: {told}"
+    assert truth.missing == (
+        f"nothing comes at UDP {AT}: the vehicle's simulator sends its truth to the gcs fly that started it, "
+        "or to another port (name it by --truth PORT), or it stands still"
+    )
 
 
 def test_a_vehicle_that_did_not_answer_is_not_one_that_does_not_say() -> None:

@@ -214,7 +214,7 @@ def test_the_command_prints_json_and_makes_the_page(runs: list[Path], tmp_path: 
 @pytest.mark.parametrize(
     ("names", "said", "code"),
     [
-        (["one"], "flights to be compared: 1; name 2 to 12", 2),
+        (["one"], "one flight was named; name 2 to 12 that are to be compared", 2),
         (["one", "one"], "is named twice", 2),
         (["one", "nowhere"], "nowhere: no such file", 2),
         (["one", "empty.tlog"], "empty.tlog: holds no telemetry", 2),
