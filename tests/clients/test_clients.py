@@ -40,6 +40,8 @@ FLOWN = [
     "Landed, disarmed",
 ]
 FAILSAFE = m.PLUMBLINE_PHASE_FAILSAFE
+# A text is said once, and a busy MAVProxy can miss it; this it takes from the heartbeats.
+DISARMED = "DISARMED"
 
 
 @pytest.mark.parametrize(
@@ -136,8 +138,7 @@ def test_a_ground_station_that_vanishes_disturbs_nobody(
     flight = mavsdk_and_two_ground_stations()
     assert complaints(flight.stays) == complaints(flight.vanishes) == []
     assert "COMMAND_ACK" not in flight.stays, "an answer to somebody else"
-    # a text is said once, and a busy MAVProxy can miss it; this it takes from the heartbeats
-    assert "DISARMED" in flight.stays.partition("TAKEOFF>")[2]
+    assert DISARMED in flight.stays.partition("TAKEOFF>")[2]
     assert [text for text in flight.witness.texts if complaints(text)] == []
     assert FAILSAFE not in flight.witness.phases
     # measured 3.5 mm, with motion capture
@@ -228,14 +229,13 @@ def mavproxy_and_a_survey(stage: Stage) -> Surveyed:
     program.expect("MISSION>")
     program.type("arm throttle")
     program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
-    program.expect("Cable taut, lifting the load")
+    stage.wait_for("Cable taut, lifting the load")
     program.type("setyaw 0 30 0")
     program.expect("Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
-    program.expect("Landed, disarmed")
+    program.expect(DISARMED)
     program.type("ftp list /fs/microsd/log")
     program.expect(".ulg")
-    program.type("log list")
-    program.expect("numLogs 1")
+    program.insist("log list", "numLogs 1")  # it asks once, and a busy MAVProxy can miss the answer
     program.type("log download 0 flown.ulg")
     program.expect("Finished downloading flown.ulg")
     stage.witness.load.clear()
@@ -383,7 +383,7 @@ def mavproxy_in_a_loop(stage: Stage) -> Looped:
     stage.wait_until(lambda: stage.witness.phases[-1] == m.PLUMBLINE_PHASE_GUIDED)
     _push_forward(stage, program)
     program.type("long DO_SET_MODE 129 4 5")
-    program.expect("Landed, disarmed")
+    program.expect(DISARMED)
     return Looped(program.end(), acknowledged(program, m.MAV_CMD_GET_HOME_POSITION), stage.witness)
 
 
@@ -435,7 +435,7 @@ def clients_of_ardupilot(stage: Stage) -> Ardupilot:
     program.type("guided 47.397745 8.545594 1.5")
     program.type("mode RTL")
     program.expect("RTL>")
-    program.expect("Landed, disarmed")
+    program.expect(DISARMED)
     said = program.end()
     return Ardupilot(dronekit, said, acknowledged(program, m.MAV_CMD_GET_HOME_POSITION), stage.witness)
 
