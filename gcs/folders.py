@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from filelock import FileLock, Timeout
-
 from gcs.errors import InputError, not_written, reason
 
 SUMMARY_FILE, PAGE_FILE = "summary.json", "report.html"
@@ -55,6 +53,8 @@ def reserved(path: Path, what: str) -> Iterator[None]:
 
     The lock goes with the process, however it ends.
     """
+    from filelock import FileLock, Timeout
+
     lock = FileLock(path / LOCK_FILE)
     try:
         lock.acquire(blocking=False)

@@ -1,4 +1,4 @@
-"""What an estimator of one's own is written with: `docs/estimators.md` shows how.
+"""What an estimator of your own is written with: `docs/estimators.md` shows how.
 
 World ENU, body FLU, SI.
 """

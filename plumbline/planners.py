@@ -1,4 +1,4 @@
-"""What a path planner of one's own is written with: `docs/planners.md` shows how.
+"""What a path planner of your own is written with: `docs/planners.md` shows how.
 
 World ENU from home, SI.
 """

@@ -1,4 +1,4 @@
-"""What an estimator of one's own is given at a tick, and what it gives: records, and how they are filled.
+"""What an estimator of your own is given at a tick, and what it gives: records, and how they are filled.
 
 World ENU, body FLU, SI. Times are on the vehicle's clock; an estimate is of the instant that the inertial
 unit shows.

@@ -1,4 +1,4 @@
-"""A law that is flown for nothing: by it the tick that calls laws of one's own is compiled beforehand."""
+"""A law that is flown for nothing: by it the tick that calls laws of your own is compiled beforehand."""
 
 from __future__ import annotations
 

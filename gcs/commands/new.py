@@ -1,4 +1,4 @@
-"""gcs new: a file of one's own to begin with."""
+"""gcs new: a file of your own to begin with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A new file of one's own, from a template that flies as it is.
+"""A new file of your own, from a template that flies as it is.
 
 The kinds are the files in `gcs/templates`: `vehicle.toml` is the template of a vehicle. A template is itself
 such a file, with the name `my_name` (and `MyName`, where a class is named), which is replaced; a comment line
