@@ -35,7 +35,8 @@ _HELD_S = 0.005  # between samples of that bound: 10 m/s^2 make 0.03 mm in the m
 WINDOW_S = 0.45  # before and after a place that cannot be flown
 LONGEST_S = 15.0  # of one window; a longer one is no local change of the path
 _WIDER = 1.6  # a window whose path exceeds the bounds is tried so many times as wide, ...
-_TRIES = 3  # ... so often
+_TRIES = 3  # ... so often, ...
+_LONG_S = 4.0  # ... unless one as long exceeds a bound by a rotor's whole range: its ends are not at fault
 _COARSE_S = 0.01
 _FINE_S = 0.002
 _TOLERANCE_N = 0.05  # by which a shaped path may exceed its bounds between the samples
@@ -48,6 +49,7 @@ _SMOOTH_S = 0.02  # in which the sixth derivative may change by as much
 _JUMP_S = 0.15
 _JUMP_SHARE = 0.01
 _REST_M_S = 1e-2
+_FAR_OFF = 10.0  # times the range of a rotor
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +177,7 @@ def shape(step: Signals, body: Body, bounds: Bounds) -> Shaped:
     times = _span(-lead, duration + tail, _FINE_S)
     away = path_jets(shaped, times)[0] - asked_jets(table, duration, times)[0]
     distance = float(np.sqrt(np.max(np.sum(away * away, axis=1))))
-    reason = "" if worst <= _TOLERANCE_N else f"a rotor or the cable is asked for {worst:.2f} N too much"
+    reason = "" if worst <= _TOLERANCE_N else _too_much(worst, bounds)
     return Shaped(table, rows, duration, lead, tail, distance, worst, 1.0, reason)
 
 
@@ -203,8 +205,16 @@ def _widened(
             found = tried
         if found is not None and found.excess_n <= _TOLERANCE_N:
             break
+        if found is not None and e - b > _LONG_S and found.excess_n > _rotor_range(bounds):
+            break
         wider = (wider + WINDOW_S) * _WIDER - WINDOW_S
     return found
+
+
+def _too_much(excess_n: float, bounds: Bounds) -> str:
+    """What a path asks for that could not be brought within the bounds; how far off is told of near ones."""
+    far = excess_n > _FAR_OFF * _rotor_range(bounds)
+    return f"a rotor or the cable is asked for {'far' if far else f'{excess_n:.2f} N'} too much"
 
 
 def _refused(asked: Shaped, reason: str) -> Shaped:

@@ -170,6 +170,12 @@ def test_a_swing_beyond_the_rotors_is_named() -> None:
     assert "too much" in shaped.reason or "exceeds what can be flown" in shaped.reason
 
 
+def test_of_a_path_that_is_far_beyond_the_rotors_no_figure_is_told() -> None:
+    waves = Term("y", 5.0, 0.0, 4.0, 2.0, 4.0, (Sine(1.0),))
+    shaped = shape(Signals(11.0, (waves,)), BODY, BOUNDS)
+    assert shaped.reason == "a rotor or the cable is asked for far too much"
+
+
 def test_without_shaping_the_asked_path_is_flown() -> None:
     step = signals_of("case-a")
     (made,) = prepare((step,), (0,), LIMITS._replace(shaped=False)).made
