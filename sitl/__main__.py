@@ -211,7 +211,7 @@ def main(
             _run_on(cpu)
         # where it would wait spinning for most of the time, it would keep others from their work
         be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
-        mode = "in lockstep" if unlimited else f"at {factor:g} x real time, waiting where that is too fast"
+        mode = "in lockstep" if unlimited else f"at {factor:g} x real time, slower on a busy machine"
         if real_time:
             mode = f"at {factor:g} x real time, waiting for nobody"
         say(

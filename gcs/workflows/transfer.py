@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from autopilot.wire.dialect import plumbline as mavlink
@@ -88,8 +88,9 @@ def download(address: Address) -> list[WireItem]:
         return _fetched(session, _MISSION)
 
 
-def download_to(file: Path, address: Address) -> Sequence[WireItem]:
-    """The vehicle's mission, written to a .plan, with fence and rally points, or a .waypoints file."""
+def download_to(file: Path, address: Address) -> tuple[list[WireItem], str]:
+    """The vehicle's mission, written to a .plan, with fence and rally points, or a .waypoints file; with what
+    was written, in words."""
     with Session(address) as session:
         session.find()
         items = _fetched(session, _MISSION)
@@ -98,7 +99,9 @@ def download_to(file: Path, address: Address) -> Sequence[WireItem]:
         rally = _fetched(session, _RALLY) if has_areas else []
         home = vehicle_home(session)
     write_foreign(file, items, home, fence, rally)
-    return items
+    lists = (items, "item"), (fence, "fence item"), (rally, "rally point")
+    counts = ((len(one), f"{what}{'s' * (len(one) != 1)}") for one, what in lists if one or one is items)
+    return items, ", ".join(f"{count} {what}" for count, what in counts)
 
 
 def _fetched(session: Session, kind: int) -> list[WireItem]:

@@ -129,7 +129,7 @@ class Clock:
         share = figures.rate_hz * self._simulator.tick_us * 1e-6 / pacing.speed
         if 0.0 < share < _SLOW_SHARE and now - self._told_ns > _SLOW_AGAIN_NS:
             self._told_ns = now
-            text = f"Machine busy: clock at {share:.2f} of {pacing.speed:g} x"
+            text = f"Machine busy: clock at {share:.2f} x, not {pacing.speed:g} x"
             self._say(text.lower())
             self._simulator.parameters.say(text, mavlink.MAV_SEVERITY_NOTICE)
 

@@ -436,7 +436,8 @@ def test_what_of_a_plan_is_not_flown_is_told_and_skipped_only_if_asked(live, tmp
     assert [item.command for item in vehicle.mission] == [22, 2000]
     assert [item.command for item in vehicle.areas[1]] == [5003]
     back = tmp_path / "back.plan"
-    assert run("download", str(back), "--connect", port).exit_code == EXIT_DONE
+    done = run("download", str(back), "--connect", port)
+    assert done.stdout == f"2 items, 1 fence item written to {back}\n"
     assert json.loads(back.read_text())["geoFence"] == plan["geoFence"]
 
 
