@@ -69,9 +69,9 @@ def reason(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
 
 
-def not_written(error: OSError, told: object, kind: str = "folder") -> GcsError:
+def not_written(error: OSError, told: object, kind: str = "folder", by: str = " by --out") -> GcsError:
     """That `told` cannot be written: with a full disk a known error, else wrong input, as another folder (or
-    other `kind`) is to be named."""
+    other `kind`) is to be named, `by` what."""
     if error.errno in _FULL:
-        return GcsError(f"{told}: {reason(error)}; free some space, or name another {kind} by --out")
-    return InputError(f"{told}: {reason(error)}; name another {kind} by --out")
+        return GcsError(f"{told}: {reason(error)}; free some space, or name another {kind}{by}")
+    return InputError(f"{told}: {reason(error)}; name another {kind}{by}")

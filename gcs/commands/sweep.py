@@ -158,6 +158,8 @@ def sweep_command(
     else:
         done = sweep.done
         flew = f", {pace(done.flights_per_s)}" if done.flown else ""
+        if done.flown < done.flights:
+            flew += f"; {done.flights - done.flown} of them were there already"
         say(f"{mission}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{flew}")
         with to_results():
             for one in () if quiet else sweep.flights:

@@ -24,7 +24,7 @@ _MORE = {
     "estimator_error_max_m": "estimate max",
 }
 _LONGEST = 14  # characters of a value that is shown
-_NAME = 36  # of a flight, in a line
+_LEAST_NAME, _NAME = 12, 36  # of a flight, in a line
 _BETWEEN = 3
 
 
@@ -47,7 +47,7 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
     from rich.table import Table
     from rich.text import Text
 
-    left = width - min(_NAME, max(len(run.name) for run in runs)) - _BETWEEN
+    left = width - min(_NAME, max(_LEAST_NAME, *(len(run.name) for run in runs))) - _BETWEEN
     columns, missed = [], [one.name for one in differences(runs)]
     for column in _columns(runs):
         if column.width <= left:
@@ -56,7 +56,7 @@ def overview(runs: Sequence[Run], width: int) -> tuple[Table, list[str]]:
             if column.title in missed:
                 missed.remove(column.title)
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("flight", overflow="fold", min_width=12)
+    table.add_column("flight", overflow="fold", min_width=_LEAST_NAME)
     for column in columns:
         table.add_column(Text(column.title), justify="right", no_wrap=True)
     for i, run in enumerate(runs):

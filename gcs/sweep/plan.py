@@ -159,7 +159,11 @@ def read_varied(text: str, sampled: bool) -> Varied:
             f"--vary {text}: must be NAME=LOW:HIGH:COUNT or NAME=A,B,C, e.g. SIM_ACT_DELAY_MS=0:60:7"
         )
     if ":" not in values:
-        return Varied(name, tuple(_number(text, one) for one in values.split(",")), False)
+        listed = tuple(_number(text, one) for one in values.split(","))
+        twice = next((one for i, one in enumerate(listed) if one in listed[:i]), None)
+        if twice is not None:
+            raise PlanError(f"--vary {text}: {twice:g} is there twice; --seeds flies it more than once")
+        return Varied(name, listed, False)
     parts = values.split(":")
     if len(parts) not in (2, 3):
         raise PlanError(f"--vary {text}: must be NAME=LOW:HIGH:COUNT, or NAME=LOW:HIGH with --sample")

@@ -79,6 +79,7 @@
       stage = new Plumbline.Stage(byId("stage"), flights[0].layout);
     } catch (error) {
       byId("stage").hidden = true; // no WebGL: the plots and the tables stay
+      byId("no-scene").hidden = false;
     }
     byId("explore").hidden = false;
     paint();

@@ -25,7 +25,7 @@ from missions.model import Mission, Signals, Waypoint, Winch
 ROOM_FOR_TRUTH = 0.25
 LAW_ERRS = (
     "note: how near a law without preview keeps to these paths, and whether its own errors lose the flight, "
-    "only a flight tells: gcs fly --law thesis"
+    "only a flight tells: gcs fly MISSION --law thesis"
 )
 MORE_ROOM = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
@@ -139,5 +139,5 @@ def refuse_unflyable(mission: Mission, vehicle: str, shaped: bool = True) -> Non
     """GcsError unless the vehicle can fly the mission."""
     found = violations(mission, vehicle, shaped)
     if found:
-        listed = "; ".join(map(str, found))
-        raise GcsError(f"{mission.name} cannot be flown by vehicle {vehicle}: {listed}; --force tries")
+        head = f"{mission.name} cannot be flown by vehicle {vehicle}; --force tries:"
+        raise GcsError(*([f"{head} {found[0]}"] if len(found) == 1 else [head, *map(str, found)]))

@@ -17,7 +17,7 @@ from pathlib import Path
 from sysconfig import get_path
 
 from autopilot.geometry.machine_code import ROOT
-from gcs.errors import GcsError, InputError
+from gcs.errors import InputError, not_written
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 _FLY_IT = re.compile(r"^\W*Fly it:\s+(\S.*)$", re.MULTILINE)
@@ -47,7 +47,8 @@ def kinds() -> tuple[str, ...]:
 def new_file(kind: str, name: str) -> NewFile:
     """Write the template of `kind` as `name`, which may lead into another folder and may have its ending.
 
-    InputError for a name that cannot be one or is taken; GcsError if the file cannot be written.
+    InputError for a name that cannot be one or is taken, or where no file can be written; GcsError if the
+    disk is full.
     """
     suffix = _suffixes()[kind]
     given = Path(name)
@@ -66,14 +67,14 @@ def new_file(kind: str, name: str) -> NewFile:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
+        raise not_written(error, path, "file", "") from None
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
         raise InputError(f"{path} exists already and is left as it is; choose another name") from None
     except OSError as error:
-        raise GcsError(f"{path}: cannot be written: {error.strerror}") from None
+        raise not_written(error, path, "file", "") from None
     return NewFile(path, _command(text, kind))
 
 

@@ -74,7 +74,8 @@ def find_log(source: Path) -> Path:
 def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, Path]:
     """The report of a log, or of the directory that holds it, made again; the record and its directory."""
     tlog = find_log(source)
-    folder = out or (tlog.parent if tlog.name == TLOG_FILE else tlog.with_suffix(""))
+    beside = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
+    folder = out or (tlog.parent if tlog.name == TLOG_FILE else beside)
     keep_others(folder, TLOG_FILE)
     return make_report(tlog, folder, None, quiet), folder
 

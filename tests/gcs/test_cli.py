@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -216,9 +217,10 @@ def test_what_four_rotors_cannot_fly_is_refused_with_limit_and_excess(tmp_path):
         "[[items.terms.factors]]\nperiod_s = 1.5\n"
         '[[items]]\ntype = "land"\n'
     )
-    line = one_line(run("fly", str(mission), "--out", str(tmp_path / "out"), "--quiet"), EXIT_ERROR)
-    assert "wild cannot be flown by vehicle bebop" in line
-    assert "--force" in line
+    refused = run("fly", str(mission), "--out", str(tmp_path / "out"), "--quiet")
+    assert (refused.exit_code, refused.stdout) == (EXIT_ERROR, "")
+    head = "gcs: wild cannot be flown by vehicle bebop; --force tries: items[1] (signals): at 4.9 s "
+    assert refused.stderr.splitlines()[-1].startswith(head)
     assert not (tmp_path / "out").exists()
     checked = run("check", str(mission))
     assert checked.exit_code == EXIT_ERROR
@@ -447,7 +449,12 @@ def test_a_plan_beyond_the_vehicle_is_refused_unless_forced(live, tmp_path):
     fast = Term("z", 2.0, 0.0, 1.0, None, 0.0, (Sine(0.5),))  # falls faster than gravity
     items = encode_steps((Takeoff(3.0), Signals(5.0, (fast,)), Land()), Home())
     write_foreign(file, items, Home())
-    assert "cannot be flown" in one_line(run("upload", str(file), "--connect", port), EXIT_ERROR)
+    refused = run("upload", str(file), "--connect", port)
+    assert (refused.exit_code, refused.stdout) == (EXIT_ERROR, "")
+    head, end, fall = refused.stderr.splitlines()
+    assert head == "gcs: in.plan cannot be flown by vehicle bebop; --force tries:"
+    assert end.startswith("gcs: items[1] (signals): at 5.0 s, its end, the load still moves at ")
+    assert "the load would have to fall" in fall
     assert run("upload", str(file), "--force", "--connect", port).exit_code == EXIT_DONE
 
 
@@ -769,6 +776,11 @@ def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):
     again = run("report", str(out), "--json")
     assert again.exit_code == EXIT_DONE, again.output
     assert json.loads(again.stdout) == record
+    bare = str(
+        shutil.copy(out / "flight.tlog", tmp_path / "capture")
+    )  # as gcs capture --out capture leaves it
+    assert run("report", bare, "--json").exit_code == EXIT_DONE
+    assert (tmp_path / "capture-report" / "report.html").is_file()
     assert record["samples"] == 0  # from the lift it is lowered at once
     assert f"{out}: holds no moment of a mission with the load in the air" in again.stderr
     sentence = "The figures that need the truth of the simulator are missing: "

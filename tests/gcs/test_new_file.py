@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 import plumbline
 from autopilot.vehicle.model import Vehicle
 from gcs.cli import gcs
-from gcs.errors import EXIT_DONE, EXIT_ERROR, EXIT_USAGE
+from gcs.errors import EXIT_DONE, EXIT_USAGE
 from gcs.workflows.new_file import kinds
 from missions.model import Delay, Land, Mission, Takeoff
 from sitl.sensors.profile import Profile
@@ -101,8 +101,8 @@ def test_a_name_may_lead_into_a_folder_and_have_its_ending() -> None:
         (("mission", "1st"), EXIT_USAGE, "beginning with a letter"),
         (
             ("mission", "/dev/null/such"),
-            EXIT_ERROR,
-            "/dev/null/such.toml: cannot be written: File exists",
+            EXIT_USAGE,
+            "/dev/null/such.toml: File exists; name another file",
         ),
         (("aeroplane", "mine"), EXIT_USAGE, "'aeroplane' is not one of"),
     ],

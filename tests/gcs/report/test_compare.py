@@ -155,6 +155,20 @@ def test_a_dozen_flights_are_a_row_each_in_a_narrow_terminal(runs: list[Path], w
     assert [i for i, row in enumerate(rows) if row.split()[2] == "*"] == best
 
 
+@pytest.mark.parametrize("width", [60, 80, 100])
+def test_no_column_is_cut_where_the_names_of_the_flights_are_short(runs: list[Path], width: int) -> None:
+    found = [replace(loaded(run), name=name) for run, name in zip(runs, ("y1", "y2", "y3"), strict=True)]
+    table, missed = overview(found, width)
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(table)
+    said = console.export_text()
+    assert "…" not in said
+    shown = said.split()
+    assert {"law", "seed", "SIM_WIND_E"} == {
+        name for name in shown if name in ("law", "seed", "SIM_WIND_E")
+    } | set(missed)
+
+
 def test_the_pages_of_many_flights_have_names_of_their_own(
     runs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -35,6 +35,7 @@ def test_ranges_and_lists() -> None:
         "SIM_WIND_E=1,x",
         "SIM_WIND_E=1,,2",
         "SIM_WIND_E=1,nan",
+        "SIM_WIND_E=0,1,0",
         "SIM_WIND_E=2:1:3",
         "SIM_WIND_E=1:2:1",
         "SIM_WIND_E=1:2:2.5",
