@@ -776,10 +776,9 @@ def test_a_running_vehicle_is_flown_and_reported_as_json(live, tmp_path):
     again = run("report", str(out), "--json")
     assert again.exit_code == EXIT_DONE, again.output
     assert json.loads(again.stdout) == record
-    bare = str(
-        shutil.copy(out / "flight.tlog", tmp_path / "capture")
-    )  # as gcs capture --out capture leaves it
-    assert run("report", bare, "--json").exit_code == EXIT_DONE
+    bare = tmp_path / "capture"  # as gcs capture --out capture leaves it
+    shutil.copy(out / "flight.tlog", bare)
+    assert run("report", str(bare), "--json").exit_code == EXIT_DONE
     assert (tmp_path / "capture-report" / "report.html").is_file()
     assert record["samples"] == 0  # from the lift it is lowered at once
     assert f"{out}: holds no moment of a mission with the load in the air" in again.stderr
