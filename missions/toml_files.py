@@ -105,7 +105,8 @@ class TomlFiles:
         try:
             return TomlText(path.stem, given, text_of(path))
         except TextFileError as error:
-            near = "" if path.is_file() else nearest(path.stem, self.names())
+            named = not path.is_file() and path.suffix in ("", _SUFFIX)
+            near = nearest(path.stem, self.names()) if named else ""
             hint = f"; did you mean the shipped {near}?" if near else ""
             raise self.error([f"{given}: {error}{hint}"]) from None
 

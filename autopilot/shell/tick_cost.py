@@ -29,7 +29,7 @@ class TickCost:
         self._bins[min(cost_us // _BIN_US, _BINS)] += 1
         self._longest_us = max(self._longest_us, cost_us)
         self._ticks += 1
-        self._too_long += cost_us >= period_us
+        self._too_long += cost_us > period_us
 
     def pause(self) -> None:
         """What runs until the next tick is no tick's work."""
@@ -50,5 +50,5 @@ class TickCost:
             return ""
         return (
             f"processor time of a tick: p50 {self._percentile_us(0.5)} p99 {self._percentile_us(0.99)} "
-            f"max {self._longest_us} us; {self._too_long} of {self._ticks} took as long as a tick lasts"
+            f"max {self._longest_us} us; {self._too_long} of {self._ticks} took longer than a tick"
         )

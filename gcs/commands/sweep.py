@@ -116,8 +116,8 @@ def sweep_command(
     holds flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that
     was stopped goes on when the same command is given again.
 
-    What the vehicle cannot do is flown as well, as by gcs fly --force: gcs check MISSION reports it
-    beforehand.
+    The mission is not checked beforehand: gcs check MISSION tells what the vehicle cannot do. A path that the
+    autopilot refuses is flown as asked with --set MIS_INFEASIBLE=0, and slower with 1.
 
     \b
     gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5

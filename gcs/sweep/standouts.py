@@ -88,7 +88,7 @@ def flight_settings(plan: SweepPlan, varied: Mapping[str, float]) -> tuple[str, 
 def base_command(plan: SweepPlan) -> str:
     """What the commands of all flights begin with; law, seed and what is varied follow.
 
-    A sweep flies what the vehicle cannot do as well, hence --force.
+    A sweep does not check whether the vehicle can do it, hence --force.
     """
     words = ["gcs", "fly", plan.mission, "--vehicle", plan.vehicle, "--sensors", plan.sensors, "--force"]
     words += own_words(plan.estimator, plan.planner)

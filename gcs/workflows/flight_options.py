@@ -65,7 +65,7 @@ class FlightOptions:
         words += ["--real-time"] if self.real_time else []
         for setting in self.settings:
             words += ["--set", setting]
-        return " ".join(words)
+        return " ".join([*words, "--force"] if self.force else words)
 
     @property
     def tries_anyway(self) -> bool:

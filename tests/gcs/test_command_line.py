@@ -1,0 +1,41 @@
+"""The command that a report names flies its flight again, under the same options."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import replace
+
+import click
+
+from gcs.cli import gcs
+from gcs.workflows.flight_options import FlightOptions
+
+ASKED = FlightOptions(
+    mission="hover",
+    law="thesis",
+    sensors="rtk",
+    vehicle="heavy",
+    seed=7,
+    speed=None,
+    real_time=False,
+    out=None,
+    settings=("SIM_WIND_E=2", "MIS_SPEED=1"),
+    connect=None,
+    quiet=True,
+    force=False,
+    overwrite=False,
+    limit_s=None,
+)
+
+
+def test_the_recorded_command_gives_the_options_back() -> None:
+    for options in (ASKED, replace(ASKED, force=True), replace(ASKED, speed=2.0, real_time=True)):
+        program, command, *words = shlex.split(options.command_line())
+        assert (program, command) == ("gcs", "fly")
+        fly = gcs.get_command(click.Context(gcs), command)
+        assert fly is not None
+        given = fly.make_context(command, words).params
+        assert given["mission"] == options.mission
+        assert tuple(given["settings"]) == options.settings
+        for name in ("law", "sensors", "vehicle", "seed", "speed", "real_time", "force"):
+            assert given[name] == getattr(options, name), name
