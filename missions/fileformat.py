@@ -67,7 +67,7 @@ def mission_of(table: Mapping[str, Any], name: str, where: str) -> Mission:
         try:
             items.append(ITEMS[kind].model_validate({k: v for k, v in item.items() if k != "type"}))
         except ValidationError as error:
-            wrong += problems(error, ITEMS[kind], where, at)
+            wrong += problems(error, ITEMS[kind], where, at, item)
     wrong = wrong or _order_problems([item["type"] for item in head.items], where)
     if wrong:
         raise MissionFileError(wrong)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
@@ -127,7 +127,7 @@ class TomlFiles:
         try:
             return spec.model_validate(table)
         except ValidationError as error:
-            raise self.error(problems(error, spec, where)) from None
+            raise self.error(problems(error, spec, where, given=table)) from None
 
     def _hint(self, given: str) -> str:
         for kind, package in _SHIPPED_IN.items():
@@ -152,18 +152,25 @@ def _folder(package: str) -> Traversable:
     return files(owner).joinpath(folder) if owner else files(package)
 
 
-def problems(error: ValidationError, spec: type[BaseModel], where: str, at: str = "") -> list[str]:
+def problems(
+    error: ValidationError,
+    spec: type[BaseModel],
+    where: str,
+    at: str = "",
+    given: Mapping[str, Any] | None = None,
+) -> list[str]:
     """One line for each finding, unknown keys first; a key missing for being misspelt is not told twice, and
     what keys a table may have is told once.
 
-    `where` names the file, `at` the table within it that was validated against `spec`.
+    `where` names the file, `at` the table within it that was validated against `spec`, and `given` is that
+    table: a key that it has is not what another one was meant to be.
     """
     unknown, others, meant = [], [], set()
     listed: set[type[BaseModel]] = set()
     for finding in error.errors(include_url=False):
         path, key, owner = _place(finding["loc"], spec, at)
         if finding["type"] == "extra_forbidden":
-            near = _meant_key(key, owner)
+            near = _meant_key(key, owner, _keys_of(given or {}, finding["loc"][:-1]))
             meant.add(path.removesuffix(key) + near)
             unknown.append(f"{where}: {path}: {_unknown_key(near, owner, owner in listed)}")
             if not near:
@@ -252,9 +259,19 @@ def _problem(error: dict[str, Any], path: str, field: FieldInfo | None) -> str:
     return f"{path} = {shown(error['input'])}; must be {_allowed(error, field)}{about}"
 
 
-def _meant_key(key: str, owner: type[BaseModel]) -> str:
+def _keys_of(table: Any, location: Sequence[str | int]) -> Collection[str]:
+    """The keys of the table at a location within a table."""
+    for part in location:
+        try:
+            table = table[part]
+        except (KeyError, IndexError, TypeError):  # the location names more than the table holds
+            return ()
+    return table if isinstance(table, Mapping) else ()
+
+
+def _meant_key(key: str, owner: type[BaseModel], given: Collection[str]) -> str:
     """The key that was meant, or "": the same quantity in another unit, or a near spelling."""
-    known = list(owner.model_fields)
+    known = [one for one in owner.model_fields if one not in given]
     # altitude_ft and altitude both mean altitude_m: compare what stands before the unit
     stem = key.rsplit("_", 1)[0]
     same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]

@@ -103,6 +103,10 @@ BAD = {
     ): "items[1].altitude: unknown key; write altitude_m (in metres)",
     WAYPOINT.replace("north_m", "nroth_m"): "items[1].nroth_m: unknown key; write north_m (in metres)",
     WAYPOINT + "colour = 1": ("items[1].colour: unknown key; allowed: east_m, north_m, altitude_m, hold_s"),
+    # what another key gives already is not what this one was meant to be
+    '[[items]]\ntype = "winch"\nlength_m = 0.2\nnorth_m = 1.0': (
+        "items[1].north_m: unknown key; allowed: length_m, speed_m_s"
+    ),
     WAYPOINT.replace("north_m = -2.0\n", ""): "items[1].north_m is missing (north of home)",
     WAYPOINT.replace("-2.0", '"-2.0"'): 'items[1].north_m = "-2.0"; must be a number (north of home)',
     WAYPOINT.replace("-2.0", "true"): "items[1].north_m = true; must be a number (north of home)",
