@@ -69,9 +69,10 @@ def reason(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno and error.errno > 0 else str(error)
 
 
-def not_written(error: OSError, told: object, kind: str = "folder", by: str = " by --out") -> GcsError:
+def not_written(error: OSError, told: object, kind: str = "folder", by: str = "--out") -> GcsError:
     """That `told` cannot be written: with a full disk a known error, else wrong input, as another folder (or
-    other `kind`) is to be named, `by` what."""
+    other `kind`) is to be named, `by` an option if there is one."""
+    other = f"name another {kind}{f' by {by}' if by else ''}"
     if error.errno in _FULL:
-        return GcsError(f"{told}: {reason(error)}; free some space, or name another {kind}{by}")
-    return InputError(f"{told}: {reason(error)}; name another {kind}{by}")
+        return GcsError(f"{told}: {reason(error)}; free some space, or {other}")
+    return InputError(f"{told}: {reason(error)}; {other}")

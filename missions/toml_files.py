@@ -14,7 +14,7 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -27,9 +27,6 @@ Spec = TypeVar("Spec", bound=BaseModel)
 _SUFFIX = ".toml"
 _LONGEST_SHOWN = 40  # characters of a value
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-# a key that each file of a kind has, and those of no other kind: files of the wrong kind are told by it
-_MARKS = {"items": "mission", "quad_mass_kg": "vehicle", "imu": "sensors"}
-_SHIPPED_IN = {"mission": "missions", "vehicle": "autopilot.vehicle.vehicles", "sensors": "sitl.sensors"}
 _NUMBER_WITH_UNIT = re.compile(
     r"\s*(\w+)\s*=\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[A-Za-z%/][\w%/^*]*\s*(?:#.*)?$"
 )
@@ -52,6 +49,20 @@ _UNITS = {
     "_kg": "kilograms",
     "_n": "newtons",
     "_hz": "hertz",
+}
+
+
+class _Kind(NamedTuple):
+    """What is known here of a kind of file."""
+
+    package: str  # in which folder the shipped ones are
+    mark: str  # a key that each file has, and those of no other kind: files of the wrong kind are told by it
+
+
+_KINDS = {
+    "mission": _Kind("missions", "items"),
+    "vehicle": _Kind("autopilot.vehicle.vehicles", "quad_mass_kg"),
+    "sensors": _Kind("sitl.sensors", "imu"),
 }
 
 
@@ -121,24 +132,24 @@ class TomlFiles:
 
     def record(self, spec: type[Spec], table: Mapping[str, Any], where: str) -> Spec:
         """The table as `spec` describes it."""
-        marks = [kind for key, kind in _MARKS.items() if key in table]
-        if marks and self.kind in _MARKS.values() and self.kind not in marks:
-            raise self.error([f"{where}: is a {marks[0]} file; a {self.kind} file is wanted here"])
+        found = [kind for kind, known in _KINDS.items() if known.mark in table]
+        if found and self.kind in _KINDS and self.kind not in found:
+            raise self.error([f"{where}: is a {found[0]} file; a {self.kind} file is wanted here"])
         try:
             return spec.model_validate(table)
         except ValidationError as error:
             raise self.error(problems(error, spec, where, given=table)) from None
 
     def _hint(self, given: str) -> str:
-        for kind, package in _SHIPPED_IN.items():
-            if kind != self.kind and given in _names(package):
+        for kind, known in _KINDS.items():
+            if kind != self.kind and given in _names(known.package):
                 return f"{given} is one of the shipped {kind.removesuffix('s')}s; "
         beside = given + _SUFFIX
         return f"did you mean {beside}? " if Path(beside).is_file() else did_you_mean(given, self.names())
 
     @property
     def _package(self) -> str:
-        return self.package or _SHIPPED_IN[self.kind]
+        return self.package or _KINDS[self.kind].package
 
 
 def _names(package: str) -> tuple[str, ...]:

@@ -133,12 +133,10 @@ class PathReport:
 
     def __str__(self) -> str:
         near = ""
-        if self.kind == "signals":
-            near = (
-                f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
-                if self.distance_m
-                else ", as asked"
-            )
+        if self.kind == "signals" and self.distance_m == 0.0:
+            near = ", as asked"
+        elif self.kind == "signals":
+            near = f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
         return (
             f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; "
             f"rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, "

@@ -203,9 +203,8 @@ def _widened(
         tried = _solve(step, table, b, e, body, bounds)
         if tried is not None and (found is None or tried.excess_n < found.excess_n):
             found = tried
-        if found is not None and found.excess_n <= _TOLERANCE_N:
-            break
-        if found is not None and e - b > _LONG_S and found.excess_n > _rotor_range(bounds):
+        mendable_n = _rotor_range(bounds) if e - b > _LONG_S else inf
+        if found is not None and (found.excess_n <= _TOLERANCE_N or found.excess_n > mendable_n):
             break
         wider = (wider + WINDOW_S) * _WIDER - WINDOW_S
     return found

@@ -51,8 +51,8 @@ def check_command(
     time and the excess; the exit code is 1 if there is any. Otherwise the duration of each path, its distance
     from the asked path, and its peaks of rotor force, tension and tilt are printed. With --as-asked the paths
     are judged as the laws thesis and lqr fly them, not shaped to what can be flown; how near such a law keeps
-    to them is not judged. With --planner the paths
-    through waypoints are those of a planner of your own, whose errors are printed.
+    to them is not judged. With --planner the paths through waypoints are those of a planner of your own,
+    whose errors are printed.
     """
     if planner and as_asked:
         raise click.UsageError("--as-asked judges no path of a planner; leave --planner or it out", ctx)

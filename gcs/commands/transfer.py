@@ -61,10 +61,13 @@ def download_command(file: Path | None, as_json: bool, address: Address) -> None
     """
     if file is not None and not is_foreign(file):
         raise click.BadParameter(f"{file}; must end in .plan or .waypoints", param_hint="FILE")
-    items, written = (download(address), "") if file is None else download_to(file, address)
-    if file is not None and not as_json:
-        click.echo(f"{written} written to {file}")
-        return
+    if file is None:
+        items = download(address)
+    else:
+        items, written = download_to(file, address)
+        if not as_json:
+            click.echo(f"{written} written to {file}")
+            return
     if as_json:
         print_json([{"seq": seq, **_record(item)} for seq, item in enumerate(items)])
         return

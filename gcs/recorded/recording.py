@@ -48,7 +48,7 @@ def read_recording(path: Path, columns: ColumnMap) -> Recording:
     try:
         if not path.is_file():
             raise RecordingError(f"{path}: {'not a file' if path.exists() else 'no such file'}; {READ}")
-        found = _telemetry(path) if path.suffix == ".tlog" else _rows(path, columns)
+        found = _telemetry(path) if is_log(path) else _rows(path, columns)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
     return _valid(found, path)
@@ -57,6 +57,11 @@ def read_recording(path: Path, columns: ColumnMap) -> Recording:
 def name_of(path: Path) -> str:
     """The file's name without what says its kind."""
     return path.name.removesuffix(".gz").rsplit(".", 1)[0]
+
+
+def is_log(path: Path) -> bool:
+    """Whether it is a telemetry log, of a simulated flight, and not rows of numbers."""
+    return path.suffix == ".tlog"
 
 
 def is_table(path: Path) -> bool:

@@ -65,7 +65,8 @@ class FlightOptions:
         words += ["--real-time"] if self.real_time else []
         for setting in self.settings:
             words += ["--set", setting]
-        return " ".join([*words, "--force"] if self.force else words)
+        words += ["--force"] if self.force else []
+        return " ".join(words)
 
     @property
     def tries_anyway(self) -> bool:

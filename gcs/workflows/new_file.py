@@ -67,14 +67,14 @@ def new_file(kind: str, name: str) -> NewFile:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise not_written(error, path, "file", "") from None
+        raise not_written(error, path, "file", by="") from None
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
         raise InputError(f"{path} exists already and is left as it is; choose another name") from None
     except OSError as error:
-        raise not_written(error, path, "file", "") from None
+        raise not_written(error, path, "file", by="") from None
     return NewFile(path, _command(text, kind))
 
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 FOLDER = Path("replays")
 OWN_MAP = "telemetry"  # of Plumbline's own logs
-TLOG_SUFFIX = ".tlog"
 
 
 def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, Any]:
@@ -129,16 +128,15 @@ def name_of(path: Path) -> str:
 def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel]:
     from gcs.recorded.column_map import MAPS, MapError, load_map
     from gcs.recorded.motion import distances, motion_of
-    from gcs.recorded.recording import READ, RecordingError, is_table, read_recording
+    from gcs.recorded.recording import READ, RecordingError, is_log, is_table, read_recording
 
-    is_log = path.suffix == TLOG_SUFFIX
-    if columns is None and not is_log and path.is_file():
+    if columns is None and not is_log(path) and path.is_file():
         if not is_table(path):
             raise InputError(f"{path}: no recording of a flight; {READ}")
         raise InputError(f"{path}: say what its columns are by --columns: {MAPS.choice()}")
     try:
         asked = load_map(columns or OWN_MAP)
-        if is_log and asked.vehicle is not None:
+        if is_log(path) and asked.vehicle is not None:
             raise InputError(
                 f"--columns {columns}: describes rows of numbers by another system of tracking; {path} names "
                 "its columns itself: leave --columns out, or name a map without [vehicle]"
@@ -160,10 +158,12 @@ def _needs_load(path: Path, motion: Motion) -> None:
 
 
 def _rows_record(path: Path, motion: Motion) -> dict[str, Any]:
+    from gcs.recorded.recording import is_log
+
     times = motion.times
     return {
         "file": str(path),
-        "true_states": path.suffix == TLOG_SUFFIX,  # of a simulated flight, not what somebody has measured
+        "true_states": is_log(path),  # of a simulated flight, not what somebody has measured
         "rows": len(motion.time_s),
         "duration_s": float(motion.time_s[-1] - motion.time_s[0]),
         "row_jitter_s": float(np.std(times.offset_s)),

@@ -113,10 +113,12 @@ def run_sweep(options: SweepOptions) -> Sweep:
     )
     if not options.quiet:
         _tell_doubts(plan)
-    directory = options.out or default_directory(plan, sweep_origin(plan), options.fresh)
-    first = default_folder(plan)
-    if not options.out and directory != first and not options.quiet:
-        say(f"{first} holds another sweep: this one goes to {directory}")
+    directory = options.out
+    if directory is None:
+        directory = default_directory(plan, sweep_origin(plan), options.fresh)
+        first = default_folder(plan)
+        if directory != first and not options.quiet:
+            say(f"{first} holds another sweep: this one goes to {directory}")
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
     with StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop:
