@@ -174,7 +174,7 @@ def problems(
     what keys a table may have is told once.
 
     `where` names the file, `at` the table within it that was validated against `spec`, and `given` is that
-    table: a key that it has is not what another one was meant to be.
+    table: a key that it has is no near spelling of another one.
     """
     unknown, others, meant = [], [], set()
     listed: set[type[BaseModel]] = set()
@@ -281,14 +281,15 @@ def _keys_of(table: Any, location: Sequence[str | int]) -> Collection[str]:
 
 
 def _meant_key(key: str, owner: type[BaseModel], given: Collection[str]) -> str:
-    """The key that was meant, or "": the same quantity in another unit, or a near spelling."""
-    known = [one for one in owner.model_fields if one not in given]
+    """The key that was meant, or "": the same quantity in another unit, or a near spelling of one that is
+    not given."""
+    known = list(owner.model_fields)
     # altitude_ft and altitude both mean altitude_m: compare what stands before the unit
     stem = key.rsplit("_", 1)[0]
     same = [k for k in known if "_" in k and (k.rsplit("_", 1)[0] in (stem, key) or k.startswith(stem + "_"))]
     if "_" not in key and same:  # a word alone, as cable: the keys of a thing stand in order of weight
         return same[0]
-    return nearest(key, same, likeness=0.0) or nearest(key, known)
+    return nearest(key, same, likeness=0.0) or nearest(key, [one for one in known if one not in given])
 
 
 def _unknown_key(near: str, owner: type[BaseModel], listed: bool) -> str:
