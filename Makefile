@@ -58,6 +58,7 @@ types: $(DEV_STAMP) ## mypy, strict
 	$(BIN)/mypy
 
 docs: $(DOCS_STAMP) ## build the documentation as a site: site/index.html
+	@echo "Flying the notebooks and building the site, some minutes. Their kernels warn of TCP: it is this machine's loopback"
 	NO_MKDOCS_2_WARNING=1 RUN_NOTEBOOKS=true $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 

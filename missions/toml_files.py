@@ -141,15 +141,23 @@ class TomlFiles:
             raise self.error(problems(error, spec, where, given=table)) from None
 
     def _hint(self, given: str) -> str:
-        for kind, known in _KINDS.items():
-            if kind != self.kind and given in _names(known.package):
-                return f"{given} is one of the shipped {kind.removesuffix('s')}s; "
+        other = of_another_kind(given, self.kind)
+        if other:
+            return other
         beside = given + _SUFFIX
         return f"did you mean {beside}? " if Path(beside).is_file() else did_you_mean(given, self.names())
 
     @property
     def _package(self) -> str:
         return self.package or _KINDS[self.kind].package
+
+
+def of_another_kind(name: str, kind: str) -> str:
+    """The beginning of a hint if a file of another kind is shipped by that name, or else empty."""
+    for other, known in _KINDS.items():
+        if other != kind and name in _names(known.package):
+            return f"{name} is one of the shipped {other.removesuffix('s')}s; "
+    return ""
 
 
 def _names(package: str) -> tuple[str, ...]:
@@ -317,6 +325,9 @@ def _allowed(error: dict[str, Any], field: FieldInfo | None) -> str:
         "finite_number": "a finite number",
         "float_type": "a number",
         "int_type": "a whole number",
+        "int_from_float": "a whole number",
+        "int_parsing": "a whole number",
+        "float_parsing": "a number",
         "string_type": "a text in quotes",
         "list_type": "a list",
         "tuple_type": "a list",

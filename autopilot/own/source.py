@@ -20,6 +20,7 @@ from types import ModuleType
 
 from autopilot.own.interruption import is_interruption
 from missions.nearest import did_you_mean
+from missions.toml_files import of_another_kind
 
 _OURS = Path(__file__).resolve().parents[1]
 _MODULE = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
@@ -112,7 +113,7 @@ def _of_entry_point(name: str, group: str, what: str, shipped: Sequence[str]) ->
     if name not in there:
         known = "".join(f"{one}, " for one in (*shipped, *sorted(there)))
         known += "or " if known else ""
-        hint = did_you_mean(name, (*shipped, *there))
+        hint = of_another_kind(name, what) or did_you_mean(name, (*shipped, *there))
         raise OwnError(f"{name!r}: no {what} of that name; {hint}must be {known}a file as my_law.py:MyLaw")
     try:
         found = there[name].load()

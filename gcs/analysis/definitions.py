@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any, Literal
 
@@ -31,16 +31,29 @@ class Metric(_Strict):
     decimals: int | None = Field(None, ge=0)
     better: Literal["less", "more"] | None = None
 
-    def read(self, record: dict[str, Any]) -> str:
+    def read(self, record: Mapping[str, Any]) -> str:
         """The recorded value as people read it, with its unit; an en dash where it is not known."""
         value = record.get(self.name)
         if value is None:
             return UNKNOWN
-        unit = self.unit if self.shown is None else self.shown
+        unit = self._shown_unit
         if unit == "mm" and abs(value) >= _ONE_METRE:
             return f"{value:.2f} m"
         text = f"{value * self.scale:.{self.decimals}f}" if self.decimals is not None else str(value)
         return f"{text} {unit}".rstrip() if unit != "°" else f"{text}{unit}"
+
+    def read_alike(self, records: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+        """The values of several records, all in metres where one is a metre or more."""
+        values = [record.get(self.name) for record in records]
+        if self._shown_unit != "mm" or not any(
+            value is not None and abs(value) >= _ONE_METRE for value in values
+        ):
+            return tuple(self.read(record) for record in records)
+        return tuple(UNKNOWN if value is None else f"{value:.3f} m" for value in values)
+
+    @property
+    def _shown_unit(self) -> str:
+        return self.unit if self.shown is None else self.shown
 
 
 class Group(_Strict):

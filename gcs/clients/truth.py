@@ -47,11 +47,12 @@ class Truth:
         self._vouched = vouched
         self._worlds = Worlds()
         self._run: int | None = None  # of the vehicle
-        self._silent = False  # the vehicle, when it was asked
+        self._silent = ""  # why the vehicle did not answer
         self.heard = False  # the vehicle's own
 
-    def of_vehicle(self, run: int | None, silent: bool = False) -> None:
-        """The run of the world that the vehicle says it flies in; None: it does not say, or was `silent`."""
+    def of_vehicle(self, run: int | None, silent: str = "") -> None:
+        """The run of the world that the vehicle says it flies in; None: it does not say, or has not answered
+        and `silent` says why."""
         self._run, self._silent = run, silent
 
     def take(self, datagrams: Iterable[tuple[bytes, Sender]]) -> list[bytes]:
@@ -85,8 +86,7 @@ class Truth:
         if self._silent:
             return (
                 f"the vehicle did not answer which simulator it flies in, so the truth at {where} is not "
-                "taken; it or its simulator stands still (SIGSTOP, a debugger), or the link loses messages: "
-                "try again"
+                f"taken; {self._silent}"
             )
         return (
             f"the vehicle does not say which simulator it flies in, so the truth at {where} is refused; "

@@ -34,7 +34,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
 
     found, page = compare(runs, out)
 
-    from gcs.report.compare import comparison, comparison_table, in_columns
+    from gcs.report.compare import STAR, comparison, comparison_table, figures, in_columns
 
     if as_json:
         print_json(comparison(found))
@@ -52,4 +52,6 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, qui
             console.print(table)
             too = f" What differs too: {', '.join(missed)}." if missed else ""
             click.echo(f"The page and --json have all figures.{too}")
+        if any(row.best for _, rows in figures(found) for row in rows):
+            click.echo(STAR)
     click.echo(f"comparison: {page}")

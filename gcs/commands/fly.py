@@ -24,7 +24,7 @@ from gcs.commands.options import (
     truth_option,
     vehicle_option,
 )
-from gcs.errors import EXIT_REQUIRED
+from gcs.errors import EXIT_DONE, EXIT_REQUIRED
 from gcs.shell.display import say, to_reader
 from gcs.shell.link import DEFAULT_PORT, Address
 
@@ -226,5 +226,6 @@ def fly_command(
     if not (as_json or quiet):
         to_reader(lambda: click.echo(f"report: {flight.out / 'report.html'}"))
     wall_s = flight.record["wall_s"] or 0.0
-    met = conclude(run, junit, flight.outcome.name, wall_s, judge(requirements, flight.record))
-    return flight.exit_code if met or flight.stopped else EXIT_REQUIRED
+    outcome = flight.outcome
+    met = conclude(run, junit, outcome.name, wall_s, judge(requirements, flight.record), outcome.reason)
+    return flight.exit_code or (EXIT_DONE if met else EXIT_REQUIRED)

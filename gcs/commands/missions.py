@@ -40,10 +40,17 @@ def missions_command(as_json: bool) -> None:
 @vehicle_option("The vehicle that is to fly it")
 @planner_option
 @click.option("--as-asked", is_flag=True, help="Judge the paths as asked, not shaped.")
+@click.option("--law", hidden=True, help="Refused: paths are checked, not a law.")
 @json_option
 @click.pass_context
 def check_command(
-    ctx: click.Context, mission: str, vehicle: str, planner: str | None, as_asked: bool, as_json: bool
+    ctx: click.Context,
+    mission: str,
+    vehicle: str,
+    planner: str | None,
+    as_asked: bool,
+    law: str | None,
+    as_json: bool,
 ) -> int:
     """Check whether a vehicle can fly a mission.
 
@@ -54,6 +61,10 @@ def check_command(
     to them is not judged. With --planner the paths through waypoints are those of a planner of your own,
     whose errors are printed.
     """
+    if law is not None:
+        raise click.UsageError(
+            "paths are checked and not a law; --as-asked checks them as the laws thesis and lqr fly them", ctx
+        )
     if planner and as_asked:
         raise click.UsageError("--as-asked judges no path of a planner; leave --planner or it out", ctx)
 

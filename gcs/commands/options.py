@@ -14,7 +14,7 @@ import click
 from autopilot.shell.options import NamedPath, WholeNumber
 from gcs.errors import InputError
 from gcs.folders import check_writable
-from gcs.shell.display import keep_stdout_for_results, to_results
+from gcs.shell.display import keep_stdout_for_results, to_reader, to_results
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -358,5 +358,8 @@ def print_table(rows: Sequence[Sequence[str]], header: Sequence[str] = ()) -> No
     if not lines:
         return
     widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
-    for line in lines:
-        click.echo("  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip())
+    text = "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    )
+    to_reader(lambda: click.echo(text))

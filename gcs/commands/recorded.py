@@ -67,6 +67,8 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
     from gcs.workflows.recorded import identify
 
     record = identify(file, columns, as_json)
+    if record["doubt"]:
+        say(record["doubt"])
     names = [_NUMBERS[name] for name in record["not_told"]]
     if names:
         say(
@@ -105,13 +107,16 @@ def replay_command(file: Path, columns: str | None, out: Path | None, as_json: b
     from gcs.workflows.recorded import replay
 
     record, folder = replay(file, columns, out, as_json)
+    if record["doubt"]:
+        say(record["doubt"])
     if as_json:
         print_json(record)
         return
     _print_rows(record)
     for name, scores in record.items():
         if isinstance(scores, dict) and name != "innovations":
-            click.echo(f"{_WORDS[name]}: {', '.join(_shown(key, value) for key, value in scores.items())}")
+            shown = ", ".join(_shown(key, value) for key, value in scores.items() if math.isfinite(value))
+            click.echo(f"{_WORDS[name]}: {shown or 'nothing; no stretch without a break is so long'}")
     for name, one in record.get("innovations", {}).items():
         click.echo(
             f"innovations of {name}: {one['mean_square_per_axis']:.2f} per axis, {one['refused']} refused"

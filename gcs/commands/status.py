@@ -22,7 +22,7 @@ def status_command(as_json: bool, address: Address, truth_at: Address | None) ->
 
     Its last warnings and errors follow, with their age.
     """
-    record = vehicle_status(address, truth_at)
+    record = vehicle_status(address, truth_at, as_json)
     if as_json:
         print_json(record)
         return
@@ -39,7 +39,8 @@ def status_command(as_json: bool, address: Address, truth_at: Address | None) ->
 def texts_command(as_json: bool, address: Address) -> None:
     """List the messages (STATUSTEXT) of the vehicle.
 
-    The vehicle keeps the last 50, each with the time at which it was last sent.
+    The vehicle keeps the last 50, each with the time at which it was last sent: what it does, warnings, and
+    why it has refused a command.
     """
     texts = vehicle_texts(address)
     if as_json:

@@ -24,7 +24,7 @@ from gcs.commands.options import (
     sensors_option,
     vehicle_option,
 )
-from gcs.errors import EXIT_REQUIRED
+from gcs.errors import EXIT_DONE, EXIT_REQUIRED
 from gcs.shell.display import say, to_results
 
 
@@ -160,7 +160,9 @@ def sweep_command(
         flew = f", {pace(done.flights_per_s)}" if done.flown else ""
         if done.flown < done.flights:
             flew += f"; {done.flights - done.flown} of them were there already"
-        say(f"{mission}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{flew}")
+        say(
+            f"{sweep.name}: {done.flights} of {sweep.planned} flights flown, {done.completed} completed{flew}"
+        )
         with to_results():
             for one in () if quiet else sweep.flights:
                 click.echo(
@@ -169,4 +171,4 @@ def sweep_command(
             click.echo(f"report: {sweep.page}")
     outcome = COMPLETED if sweep.done.whole else "interrupted"
     met = conclude(run, junit, outcome, sweep.done.wall_s, judge(requirements, sweep.record))
-    return sweep.exit_code if met or not sweep.done.whole else EXIT_REQUIRED
+    return sweep.exit_code or (EXIT_DONE if met else EXIT_REQUIRED)

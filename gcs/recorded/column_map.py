@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from os import PathLike
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from gcs.recorded.load_model import LoadModel
 from missions.toml_files import FileError, TomlFiles
@@ -112,6 +113,29 @@ class ColumnMap(_Table):
     attachment: Attachment = Attachment()
     model: ModelTable
     identify: Identify = Identify()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ColumnMap:
+        if self.time is not None and self.rate_hz is not None:
+            raise ValueError("has both time and rate_hz; rows that have a time need no rate")
+        named: dict[int, str] = {}
+        for name, column in self._columns():
+            if column in named:
+                raise ValueError(f"{name} = {column}; is {named[column]} already")
+            named[column] = name
+        return self
+
+    def _columns(self) -> Iterator[tuple[str, int]]:
+        if self.time is not None:
+            yield "time", self.time
+        vehicle, load = self.vehicle, self.load
+        lists = {
+            "vehicle.position": vehicle.position if vehicle else (),
+            "vehicle.quaternion": vehicle.quaternion if vehicle else (),
+            "load.position": load.position if load else (),
+        }
+        for name, columns in lists.items():
+            yield from ((f"{name}[{i}]", column) for i, column in enumerate(columns))
 
     def load_model(self, length_m: float) -> LoadModel:
         """The model; `length_m` counts where the map names no length."""

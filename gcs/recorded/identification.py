@@ -69,8 +69,15 @@ _LEAST = {"length_m": 0.01, "wash_radius_m": 0.01, "wash_delay_s": 0.0}  # of wh
 LEAST_S = 2.0 * _EDGE_S + _BLOCK_S
 
 
+_TILT_SHARE = (0.5, 2.0)  # of a vehicle that leans by its thrust, as all multirotors do
+
+
 class TooLittleMotionError(ValueError):
     """The recording does not tell the numbers of the vehicle apart."""
+
+
+class NoLoadError(ValueError):
+    """Nothing predicts what is said to be the load."""
 
 
 class Identified(NamedTuple):
@@ -104,6 +111,7 @@ def identify_load(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Identified]:
     """The numbers `names` of the model that predict this load best; the rest stays as it is in `model`.
+    NoLoadError if none does.
 
     `progress` is told how many predictions of the recording are done, and how many there are at most.
     """
@@ -127,7 +135,10 @@ def identify_load(
         weights = _weights(errors)
         normal = np.einsum("jkhi,kh,lkhi->jl", sensitivity, weights, sensitivity)
         gradient = np.einsum("jkhi,kh,khi->j", sensitivity, weights, errors)
-        change = -np.linalg.solve(normal + _prior(errors) * np.eye(len(names)), gradient)
+        held = normal + _prior(errors) * np.eye(len(names))
+        if not np.isfinite(held).all() or not held.any():
+            raise NoLoadError("the load does not move as one on a cable does: does the column map fit?")
+        change = -np.linalg.solve(held, gradient)
         before = _cost(errors)
         for shorter in _SHORTENED:
             moved = {
@@ -190,6 +201,18 @@ def identify_vehicle(motion: Motion, model: LoadModel) -> list[Identified]:
     spread = half_widths(np.einsum("kij,kil->kjl", rows, rows), each, time[kept])
     names = ("mass_ratio", "vehicle_drag_per_s", "tilt_share", "attitude_delay_s", "vehicle_drag_per_m")
     return [Identified(n, float(v), float(s)) for n, v, s in zip(names, found, spread, strict=False)]
+
+
+def map_doubt(vehicle: Sequence[Identified]) -> str:
+    """Why the column map may not be the recording's, by the numbers of the vehicle; empty: it may be."""
+    share = next(one for one in vehicle if one.name == "tilt_share")
+    least, most = _TILT_SHARE
+    if share.value + share.half_width >= least and share.value - share.half_width <= most:
+        return ""
+    return (
+        f"the tilt shows {share.value:.2f} of the vehicle's acceleration, and of a multirotor some 1: the "
+        "column map may not fit (lengths in m, times in s, order of the quaternion, which column is which)"
+    )
 
 
 def _errors(motion: Motion, model: LoadModel) -> tuple[Floats, Floats]:

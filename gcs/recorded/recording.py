@@ -18,6 +18,9 @@ from gcs.recorded.smoothing import Floats
 LEAST_ROWS = 200
 _MOST_BYTES = 2**30
 _LONGEST_ROW = 2**16  # bytes
+_STAMPS = range(10**15, 10**16)  # us since 1970, of any year from 2001 to 2286
+_FRAMES = (b"\xfd", b"\xfe")  # what a frame of MAVLink begins with
+_SHORTEST_S, _LONGEST_S = 1e-4, 0.5  # between rows
 _UNIT = 0.1  # by which the length of a quaternion may differ from 1
 _LIFTED_M = 0.05  # above the lowest place of the load: a log begins and ends on the ground
 
@@ -60,8 +63,16 @@ def name_of(path: Path) -> str:
 
 
 def is_log(path: Path) -> bool:
-    """Whether it is a telemetry log, of a simulated flight, and not rows of numbers."""
-    return path.suffix == ".tlog"
+    """Whether it is a telemetry log, of a simulated flight, and not rows of numbers: by its name, or because
+    it begins with a time of 8 bytes and a frame."""
+    if path.suffix == ".tlog" or not path.is_file():  # a pipe may have no end
+        return path.suffix == ".tlog"
+    try:
+        with path.open("rb") as file:
+            head = file.read(9)
+    except OSError:
+        return False
+    return int.from_bytes(head[:8]) in _STAMPS and head[8:] in _FRAMES
 
 
 def is_table(path: Path) -> bool:
@@ -141,6 +152,9 @@ def recording_of(telemetry: Telemetry, name: str) -> Recording:
     within = (track.time_s >= attitude.time_s[0]) & (track.time_s <= attitude.time_s[-1])
     lifted = track.position_m[:, 2] > np.min(track.position_m[:, 2]) + _LIFTED_M
     flown = _longest(within & lifted & (track.taut > 0))
+    if flown.stop - flown.start < LEAST_ROWS:
+        held = "is never carried" if flown.stop == 0 else f"is carried for {flown.stop - flown.start} rows"
+        raise RecordingError(f"the load {held} off the ground; at least {LEAST_ROWS} rows are needed")
     turned = Slerp(attitude.time_s, Rotation.from_quat(np.roll(attitude.quat_wxyz, -1, axis=1)))
     time, load = track.time_s[flown], track.position_m[flown]
     vehicle = load - track.distance_m[flown, None] * track.q_cable[flown]
@@ -171,4 +185,11 @@ def _valid(found: Recording, path: Path) -> Recording:
     kept = Recording(found.name, time, found.position[good], found.quaternion_xyzw[good], found.load[good])
     if kept.time_s is not None and np.any(np.diff(kept.time_s) <= 0.0):
         raise RecordingError(f"{path}: times do not increase from row to row")
+    if kept.time_s is not None:
+        step_s = float(np.median(np.diff(kept.time_s)))
+        if not _SHORTEST_S <= step_s <= _LONGEST_S:
+            raise RecordingError(
+                f"{path}: rows would be {step_s:.3g} s apart; must be {_SHORTEST_S:g} to {_LONGEST_S:g} s: "
+                "are times in s, and in the column that the map names?"
+            )
     return kept

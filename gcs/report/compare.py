@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,9 +36,12 @@ _WAYS = (
     "seed",
 )  # keys of the record that say how it was flown
 _CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
+STAR = "*: the best of the completed flights, and what is within 1 % of it."
 DEFAULT = "default"  # of a parameter that was not changed
+_AS_GOOD = 0.01  # as a share of the best value: a difference that is none
 _PARTS = 3  # of a label; what differs beyond is in the table
-_UNTOLD = {"mission items"}  # in labels
+STEPS = "mission steps"
+_UNTOLD = {STEPS}  # in labels
 _HEADING = 14  # characters in a line of the name of a flight, in the terminal
 _LABELS = 32  # before the columns of the flights
 _DRAWN = {"load", "vehicle", "asked", "quat", "cable", "tension", "rotor", "taut", "attached", "scored"}
@@ -89,13 +93,15 @@ def load_run(name: str, tlog: Path, meta: FlightMeta) -> Run:
 
 
 def differences(runs: Sequence[Run]) -> list[Difference]:
-    """What is known of how they were flown and is not the same in all."""
+    """What is known of how they were flown and is not the same in all: what was asked for first, then the
+    parameters that followed from it."""
     rows: dict[str, list[str]] = {name: [_shown(run.record[name]) for run in runs] for name in _WAYS}
     settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
     unnamed = [DEFAULT if run.meta.command or run.telemetry.parameters else UNKNOWN for run in runs]
-    for name in sorted(set().union(*settings)):
+    asked = {name for run in runs for name in run.meta.settings}
+    for name in sorted(set().union(*settings), key=lambda name: (name not in asked, name)):
         rows[name] = [found.get(name, other) for found, other in zip(settings, unnamed, strict=True)]
-    rows["mission items"] = [_steps(run) for run in runs]
+    rows[STEPS] = _different_steps(runs)
     rows["version"] = [_shown(run.meta.version) for run in runs]
     return [Difference(name, tuple(values)) for name, values in rows.items() if len(set(values)) > 1]
 
@@ -105,7 +111,7 @@ def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
     found = []
     for group, metrics in GROUPS:
         rows = [
-            Figure(metric, tuple(metric.read(run.record) for run in runs), _best(metric, runs))
+            Figure(metric, metric.read_alike([run.record for run in runs]), _best(metric, runs))
             for metric in metrics
             if metric.name not in _WAYS and any(run.record[metric.name] for run in runs)
         ]
@@ -115,15 +121,22 @@ def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
 
 
 def _best(metric: Metric, runs: Sequence[Run]) -> tuple[int, ...]:
-    """Which runs have the best value as it is read; of flights that were completed, if there are any."""
+    """Which runs have the best value, and those that are as good (`_AS_GOOD`), of flights that were completed
+    if there are any. None where all are as good."""
     completed = [i for i, run in enumerate(runs) if run.record["outcome"] == "completed"]
-    rated = [i for i in completed or range(len(runs)) if runs[i].record[metric.name] is not None]
-    read = {i: metric.read(runs[i].record) for i in rated}
-    if metric.better is None or metric.name in _CLOCK or len(set(read.values())) < 2:
+    rated = {
+        i: value for i in completed or range(len(runs)) if (value := runs[i].record[metric.name]) is not None
+    }
+    if metric.better is None or metric.name in _CLOCK or not rated:
         return ()
-    choose = min if metric.better == "less" else max
-    best = read[choose(rated, key=lambda i: runs[i].record[metric.name])]
-    return tuple(i for i in rated if read[i] == best)
+    best = min(rated.values()) if metric.better == "less" else max(rated.values())
+    told = {metric.read(runs[i].record) for i, value in rated.items() if value == best}
+    good = [
+        i
+        for i, value in rated.items()
+        if abs(value - best) <= _AS_GOOD * abs(best) or metric.read(runs[i].record) in told
+    ]
+    return tuple(good) if len(good) < len(rated) else ()
 
 
 def labels(runs: Sequence[Run]) -> list[str]:
@@ -172,7 +185,7 @@ def in_columns(runs: Sequence[Run], width: int) -> bool:
 
 
 def comparison_table(runs: Sequence[Run]) -> Table:
-    """For the terminal: differences first, then the figures, a star at the best."""
+    """For the terminal: differences first, then the figures, a star at the best (`STAR` says so)."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
     from rich.text import Text
@@ -255,8 +268,20 @@ def _first(run: Run, phases: tuple[int, ...]) -> float | None:
     return float(times[0]) if len(times) else None
 
 
-def _steps(run: Run) -> str:
-    return "; ".join(step.text for step in step_texts(run.telemetry.mission, run.telemetry.home)) or UNKNOWN
+def _different_steps(runs: Sequence[Run]) -> list[str]:
+    """The steps of each mission without those at its beginning and at its end that all have."""
+    missions = [[step.text for step in step_texts(run.telemetry.mission, run.telemetry.home)] for run in runs]
+    first = _common(missions)
+    last = _common([list(reversed(steps[first:])) for steps in missions])
+    return [
+        "; ".join(f"{i + 1}. {steps[i]}" for i in range(first, len(steps) - last)) or UNKNOWN
+        for steps in missions
+    ]
+
+
+def _common(lists: Sequence[Sequence[str]]) -> int:
+    """How many entries all begin with."""
+    return sum(1 for _ in takewhile(lambda entries: len(set(entries)) == 1, zip(*lists, strict=False)))
 
 
 def _brief(text: str, most: int = 60) -> str:

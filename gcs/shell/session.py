@@ -23,6 +23,9 @@ FIND_S = 5.0
 TRUTH_S = 2.0  # it says five times a second of its clock whose it is
 REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may come a little later
 _TICK_S = 0.02
+_STANDS_STILL = (
+    "it or its simulator stands still (SIGSTOP, a debugger), or the link loses messages: try again"
+)
 
 Seen = Callable[[bytes, int], None]  # a datagram of the vehicle and the time
 
@@ -38,6 +41,7 @@ class Session:
         self.on_received: Seen | None = None
         self.on_sent: Seen | None = None
         self.on_truth: Seen | None = None
+        self.deaf = ""  # why the vehicle has not answered, where that is for want of its key
         self._truth: TruthLink | None = None
         self._find_s = FIND_S if find_s is None else find_s
         self._connection = Connection(link_timeout_us)
@@ -69,9 +73,11 @@ class Session:
         except RefusedError:  # another firmware, or a vehicle that flies in no simulator
             truth.of_vehicle(None)
         except GcsError:
-            truth.of_vehicle(None, silent=True)
+            self.deaf = self.signing_trouble
+            truth.of_vehicle(None, silent=self.deaf or _STANDS_STILL)
         self._truth = truth
-        self.watch(lambda: truth.heard, TRUTH_S)
+        if not self.deaf:
+            self.watch(lambda: truth.heard, TRUTH_S)
         return target
 
     def find(self) -> Target:

@@ -28,8 +28,9 @@ class TruthLink:
                 trouble = "is in use by another program, or not of this machine"
                 raise GcsError(f"--truth: UDP {named} {trouble}") from None
 
-    def of_vehicle(self, run: int | None, silent: bool = False) -> None:
-        """The run of the world that the vehicle says it flies in; None: it does not say, or was `silent`."""
+    def of_vehicle(self, run: int | None, silent: str = "") -> None:
+        """The run of the world that the vehicle says it flies in; None: it does not say, or has not answered
+        and `silent` says why."""
         self._truth.of_vehicle(run, silent)
 
     def drain(self) -> list[bytes]:

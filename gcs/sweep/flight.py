@@ -103,7 +103,8 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
     if Phase.TAUTEN not in times:
         raise ValueError(
             f"{mission.name} does not start under the conditions of the sweep: {outcome.reason} (items are "
-            "numbered as they are uploaded; gcs check names those of the file)"
+            "numbered as they are uploaded; gcs check names those of the file; MIS_INFEASIBLE says what "
+            "becomes of a path that cannot be flown: 0 as asked, 1 slower)"
         )
     return Boarding(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
 

@@ -79,7 +79,7 @@ def _fly_missing(
     missing = [case for case in plan.cases() if case.index not in stored]
     whole, flown, wall_s = True, 0, 0.0
     if missing:
-        work = prepare(plan, warm)
+        work = prepare(plan, warm, quiet)
         with workers as (executor, count), BatchDisplay(len(stored), plan.flights, quiet) as display:
 
             def told(rows: Sequence[Row], running: Running) -> None:

@@ -10,6 +10,7 @@ from autopilot.geometry.lane_numbers import LANES
 from autopilot.own.law import name_of
 from autopilot.shell.compiling import Part
 from autopilot.shell.watched_calls import watched_calls
+from gcs.shell.display import told_if_slow
 from gcs.sweep import lane_kernel
 from gcs.sweep.cell import cell_of
 from gcs.sweep.flight import Boarding, Flown, SweptFlight, boarding, fly
@@ -36,7 +37,7 @@ class Work:
     in_lanes: frozenset[str] = frozenset()  # laws of which eight flights are flown at once
 
 
-def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None]) -> Work:
+def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None], quiet: bool = True) -> Work:
     """The work of a plan; flies the beginning of one flight for each law.
 
     `warm` compiles what is not compiled yet of some parts of the flight software. The instants of arming and
@@ -51,7 +52,7 @@ def prepare(plan: SweepPlan, warm: Callable[[Iterable[Part]], None]) -> Work:
     for law, case in cases.items():
         conditions = bare.conditions(case)
         try:
-            with watched_calls():
+            with watched_calls(), told_if_slow(f"preparing the flights with law {name_of(law)}", quiet):
                 boardings[law] = boarding(mission, conditions)
         except ValueError as error:
             raise PlanError(f"law {name_of(law)}: {error}") from None

@@ -8,10 +8,11 @@ from autopilot.wire.tlog import TlogWriter
 from gcs.clients import command
 from gcs.clients.capture import Capture
 from gcs.clients.flight import REPORT_INTERVAL_US, REPORT_MESSAGES
+from gcs.clients.operation import Target
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.errors import InputError, NoVehicleError, RefusedError, not_written
 from gcs.folders import TLOG_FILE, fresh_folder
-from gcs.shell.display import say
+from gcs.shell.display import is_live, say
 from gcs.shell.link import Address, monotonic_us, unix_us
 from gcs.shell.session import Session
 from gcs.shell.stopping import StopRequest
@@ -39,7 +40,9 @@ def capture_to(
         StopRequest("stopping") as stop,
     ):
         target = session.find_with_truth(world)
-        if world.missing:
+        if session.deaf:
+            say(f"only what the vehicle sends by itself is captured, without truth: {session.deaf}")
+        elif world.missing:
             say(f"the log will have no truth of the simulator: {world.missing}")
         path = out or fresh_folder("capture") / TLOG_FILE
         try:
@@ -63,18 +66,27 @@ def capture_to(
             session.on_truth = truth
             session.on_received = received
             session.on_sent = sent
-            try:
-                session.run(ParameterList(target), "parameters")
-            except NoVehicleError as error:
-                say(str(error))
-            for message_id in REPORT_MESSAGES:
-                try:
-                    session.run(command.message_interval(target, message_id, REPORT_INTERVAL_US))
-                except RefusedError as error:
-                    say(str(error))
+            if not session.deaf:
+                _ask_for_all(session, target)
+            if not is_live():  # on a terminal a bar shows it
+                until = "until Ctrl-C" if duration_s is None else f"for {duration_s:g} s"
+                say(f"capturing to {path} {until}")
             session.watch(lambda: bool(stop), duration_s, "capturing")
             capture.flush(monotonic_us())
         return path, capture.records
+
+
+def _ask_for_all(session: Session, target: Target) -> None:
+    """Parameters, and the fast messages that a report needs."""
+    try:
+        session.run(ParameterList(target), "parameters")
+    except NoVehicleError as error:
+        say(str(error))
+    for message_id in REPORT_MESSAGES:
+        try:
+            session.run(command.message_interval(target, message_id, REPORT_INTERVAL_US))
+        except RefusedError as error:
+            say(str(error))
 
 
 def _keep_earlier(out: Path) -> None:

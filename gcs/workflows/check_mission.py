@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -17,16 +18,12 @@ from gcs.mission_items import items_of
 from gcs.workflows.checked import note_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
-from missions.model import Mission, Signals, Waypoint, Winch
+from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
 
 # Share of the rotors' range that a path must leave a vehicle whose truth is not its belief: slower rotors, a
 # battery that sags and a cable off the centre take a part of it, wind another. `heavy-real` loses Case C with
 # 15 %, and brings it home with 35 %; with 40 % also from wind of 5 m/s with gusts of 1 m/s (docs/realism.md).
 ROOM_FOR_TRUTH = 0.25
-LAW_ERRS = (
-    "note: how near a law without preview keeps to these paths, and whether its own errors lose the flight, "
-    "only a flight tells: gcs fly MISSION --law thesis"
-)
 MORE_ROOM = "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1 of gcs fly"
 
 
@@ -86,6 +83,15 @@ def remarks_on(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
             )
 
 
+def flown_alone(mission: Mission) -> Iterator[str]:
+    """A line about what comes behind a release, which no path report tells of."""
+    released = [i for i, step in enumerate(mission.steps) if isinstance(step, Release)]
+    if released and released[0] + 1 < len(mission.steps):
+        rest = [f"items[{i}]" for i in (released[0] + 1, len(mission.steps) - 1)]
+        which = " to ".join(dict.fromkeys(rest))
+        yield f"note: {which}: flown without the load, slower where the rotors ask for it; no path to report"
+
+
 @dataclass(frozen=True)
 class Check:
     """What `gcs check` found: what the vehicle cannot do, or else how it flies each path, with what is to be
@@ -113,8 +119,12 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Plan
     found = [*violations(mission, vehicle, not as_asked), *reels_too_far(mission, vehicle)]
     reports = [] if found else path_reports(mission, vehicle, planner, not as_asked)
     warnings = tuple(remarks_on(reports, vehicle))
-    if as_asked and any(isinstance(step, Signals) for step in mission.steps):
-        warnings += (LAW_ERRS,)
+    if as_asked and any(isinstance(step, Signals | AttitudeRun) for step in mission.steps):
+        warnings += (
+            "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "
+            f"only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
+        )
+    warnings += tuple(flown_alone(mission))
     if planner is not None and not any(isinstance(step, Waypoint) for step in mission.steps):
         warnings += (f"the planner is never asked: mission {mission.name} has no waypoints",)
     return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)

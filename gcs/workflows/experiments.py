@@ -42,7 +42,7 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
             if not fly_missing(waiting, flights, ProgramCrew(cores(jobs), begin), tell, lambda: bool(stop)):
                 stored = len(plan) - len(missing(plan, flights, False))
                 raise StoppedError(f"stopped: {stored} of {len(plan)} flights are stored")
-        with StepDisplay("figures", quiet) as figures:
+        with StepDisplay("figures", quiet, long=True) as figures:
 
             def drawn(done: int, total: int, name: str) -> None:
                 if stop:

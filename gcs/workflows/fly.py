@@ -60,7 +60,7 @@ class Flight:
     outcome: Outcome
     record: Record
     out: Path
-    stopped: bool  # by Ctrl-C
+    stopped: bool  # by Ctrl-C, before the mission was over
 
     @property
     def exit_code(self) -> int:
@@ -215,7 +215,7 @@ def _end(
     except KeyboardInterrupt:
         _tell_abandoned(tlog)
         raise
-    return Flight(outcome, record, out, bool(stop))
+    return Flight(outcome, record, out, bool(stop) and outcome.name == "interrupted")
 
 
 def _tell_abandoned(tlog: Path) -> None:

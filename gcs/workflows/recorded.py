@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from gcs.recorded.motion import Motion
 
 FOLDER = Path("replays")
+_FARTHEST_M = 200.0  # a load from its vehicle: nobody flies a cable so long
 OWN_MAP = "telemetry"  # of Plumbline's own logs
 
 
@@ -26,9 +28,11 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
     what it says nothing."""
     from gcs.recorded.identification import (
         LEAST_S,
+        NoLoadError,
         TooLittleMotionError,
         identify_load,
         identify_vehicle,
+        map_doubt,
         tracked_length,
     )
 
@@ -50,15 +54,16 @@ def identify(path: Path, columns: str | None, quiet: bool = False) -> dict[str, 
         def tell(done: int, total: int) -> None:
             display.update(done, total, "fitting predictions of the load")
 
-        found: list[Identified] = [
-            tracked_length(motion, asked.attachment.below_m),
-            *identify_load(motion, model, asked.identify.parameters, tell),
-            *vehicle,
-        ]
+        try:
+            load = identify_load(motion, model, asked.identify.parameters, tell)
+        except NoLoadError as error:
+            raise InputError(f"{path}: {error}") from None
+        found: list[Identified] = [tracked_length(motion, asked.attachment.below_m), *load, *vehicle]
     return {
         **_rows_record(path, motion),
         "identified": {one.name: {"value": one.value, "half_width": one.half_width} for one in found},
         "not_told": [one.name for one in found if not one.is_told],
+        "doubt": map_doubt(vehicle),
     }
 
 
@@ -67,6 +72,7 @@ def replay(
 ) -> tuple[dict[str, Any], Path]:
     """The scores of the estimates, and the folder in which their table and picture are."""
     from gcs.recorded.estimates import filtered, load_position, rows_of
+    from gcs.recorded.identification import LEAST_S, TooLittleMotionError, identify_vehicle, map_doubt
     from gcs.recorded.replay_files import write_picture, write_table
     from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
 
@@ -76,7 +82,10 @@ def replay(
         _, motion, model = _read(path, columns)
         rows = rows_of(motion, model)
         seen = bool(np.isfinite(motion.load).all())
-        record: dict[str, Any] = _rows_record(path, motion)
+        record: dict[str, Any] = {**_rows_record(path, motion), "doubt": ""}
+        if seen and record["duration_s"] >= LEAST_S:
+            with suppress(TooLittleMotionError):
+                record["doubt"] = map_doubt(identify_vehicle(motion, model))
         if seen:
             squares = filtered(rows, model, load=True, tilt=True).squares
             record["innovations"] = {
@@ -147,9 +156,15 @@ def _read(path: Path, columns: str | None) -> tuple[ColumnMap, Motion, LoadModel
     except RecordingError as error:
         raise InputError(str(error)) from None
     far = distances(motion)
-    if asked.model.length_m is None and not np.isfinite(far).any():
+    length_m = float(np.nanmedian(far)) if np.isfinite(far).any() else 0.0
+    if length_m > _FARTHEST_M:
+        raise InputError(
+            f"{path}: the load would be {length_m:.0f} m from the vehicle; {_FARTHEST_M:g} m at most: are "
+            "positions in m, and in the columns that the map names?"
+        )
+    if asked.model.length_m is None and not length_m:
         raise InputError(f"{path}: without measured loads the column map must say model.length_m")
-    return asked, motion, asked.load_model(float(np.nanmedian(far)) if np.isfinite(far).any() else 0.0)
+    return asked, motion, asked.load_model(length_m)
 
 
 def _needs_load(path: Path, motion: Motion) -> None:

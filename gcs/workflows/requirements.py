@@ -109,14 +109,21 @@ def reporting(run: str, junit: Path | None) -> Iterator[None]:
         raise
 
 
-def conclude(run: str, junit: Path | None, outcome: str, wall_s: float, verdicts: Sequence[Verdict]) -> bool:
+def conclude(
+    run: str,
+    junit: Path | None,
+    outcome: str,
+    wall_s: float,
+    verdicts: Sequence[Verdict],
+    reason: str = "",
+) -> bool:
     """Tell each requirement that was not met on stderr, and write the test report: whether the run was
-    completed, and each requirement. True if all requirements were met."""
+    completed, or else the `reason`, and each requirement. True if all requirements were met."""
     missed = [verdict for verdict in verdicts if not verdict.met]
     for verdict in missed:
         say(verdict.line)
     if junit is not None:
-        cases = [("completed", outcome == COMPLETED, f"outcome {outcome}")]
+        cases = [("completed", outcome == COMPLETED, ": ".join(filter(None, (f"outcome {outcome}", reason))))]
         cases += [(verdict.requirement.text, verdict.met, verdict.line) for verdict in verdicts]
         suite = _suite(run, len(cases), sum(not met for _, met, _ in cases), wall_s=wall_s)
         for name, met, said in cases:

@@ -9,7 +9,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients import command
 from gcs.clients.vehicle_view import Text, VehicleView
 from gcs.errors import NoVehicleError, RefusedError
-from gcs.shell.display import say
+from gcs.shell.display import say, told_if_slow
 from gcs.shell.link import Address, monotonic_us
 from gcs.shell.session import Session
 from gcs.shell.truth import TruthLink
@@ -34,12 +34,16 @@ _SEVERITIES = {
 }
 
 
-def vehicle_status(address: Address, truth_at: Address | None = None) -> dict[str, Any]:
+def vehicle_status(address: Address, truth_at: Address | None = None, quiet: bool = False) -> dict[str, Any]:
     """The record of the vehicle at `address`; `texts` are the last warnings, and what is worse.
 
     `truth_at`: where its simulator tells what is true; None: where `sitl` does by default.
     """
-    with TruthLink(truth_at) as truth, Session(address) as session:
+    with (
+        TruthLink(truth_at) as truth,
+        Session(address) as session,
+        told_if_slow("listening to the vehicle, which says little", quiet),
+    ):
         session.find_with_truth(truth)
         told = {"SIM_STATUS"} if truth.heard else set()
         view = session.view
@@ -49,24 +53,24 @@ def vehicle_status(address: Address, truth_at: Address | None = None) -> dict[st
             LISTEN_S,
             "listening",
         )
-        if truth.missing:
+        if session.deaf:
+            say(f"texts, and rate, lateness and missed ticks of the simulator, are not told: {session.deaf}")
+        elif truth.missing:
             say(f"no rate, lateness and missed ticks of the simulator: {truth.missing}")
         texts = [text for text in asked.texts if text.severity <= mavlink.MAV_SEVERITY_WARNING]
         return {**status_record(session.view), "texts": text_records(texts[-SHOWN_TEXTS:])}
 
 
 def vehicle_texts(address: Address) -> list[dict[str, Any]]:
-    """What the vehicle at `address` has told the operators, the oldest first."""
+    """What the vehicle at `address` has told the operators, the oldest first; of one that keeps no texts,
+    what it said meanwhile. NoVehicleError if it does not answer for want of its key."""
     with Session(address) as session:
         session.find()
-        return text_records(recall(session))
-
-
-def recall(session: Session) -> list[Text]:
-    """What the vehicle has said, the oldest first; of one that keeps no texts, what it said meanwhile."""
-    asked = _ask_for_texts(session)
-    session.watch(lambda: asked.answered, RECALL_S)
-    return asked.texts
+        asked = _ask_for_texts(session)
+        if session.deaf:
+            raise NoVehicleError(f"its texts could not be asked for: {session.deaf}")
+        session.watch(lambda: asked.answered, RECALL_S)
+        return text_records(asked.texts)
 
 
 class _Asked:
@@ -92,13 +96,15 @@ class _Asked:
 
 
 def _ask_for_texts(session: Session) -> _Asked:
-    try:
-        session.run(command.request_message(session.target, mavlink.MAVLINK_MSG_ID_STATUSTEXT))
-    except (RefusedError, NoVehicleError):
-        if session.signing_trouble:
-            say(f"its texts could not be asked for: {session.signing_trouble}")
-        return _Asked(session.view, keeps=False)
-    return _Asked(session.view, keeps=True)
+    keeps = not session.deaf
+    if keeps:
+        try:
+            session.run(command.request_message(session.target, mavlink.MAVLINK_MSG_ID_STATUSTEXT))
+        except RefusedError:
+            keeps = False
+        except NoVehicleError:
+            keeps, session.deaf = False, session.signing_trouble
+    return _Asked(session.view, keeps)
 
 
 def text_records(texts: list[Text]) -> list[dict[str, Any]]:

@@ -66,8 +66,9 @@ class SweepOptions:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What came of it."""
+    """What came of it; `name` is the mission's."""
 
+    name: str
     done: Swept
     planned: int
     directory: Path
@@ -118,7 +119,8 @@ def run_sweep(options: SweepOptions) -> Sweep:
         directory = default_directory(plan, sweep_origin(plan), options.fresh)
         first = default_folder(plan)
         if directory != first and not options.quiet:
-            say(f"{first} holds another sweep: this one goes to {directory}")
+            goes = "is in" if directory.exists() else "goes to"
+            say(f"{first} holds another sweep: this one {goes} {directory}")
     scheduler = options.scheduler
     workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
     with StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop:
@@ -139,7 +141,7 @@ def run_sweep(options: SweepOptions) -> Sweep:
             say("drawing the report")
         page = write_report(directory, plan)
     flights = tuple(_told(plan, one, directory) for one in found)
-    return Sweep(done, plan.flights, directory, page, flights)
+    return Sweep(Path(plan.mission).stem, done, plan.flights, directory, page, flights)
 
 
 def _tell_doubts(plan: SweepPlan) -> None:

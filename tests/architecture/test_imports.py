@@ -73,7 +73,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "autopilot.supervisor": (*LEAVES, RECORDS, "autopilot.guidance", "autopilot.services"),
     **{one: (*LEAVES, *(other for other in OWN if other != one)) for one in OWN},
     "autopilot.own.interruption": (),
-    "autopilot.own.source": ("autopilot.own.interruption", "missions.nearest"),
+    "autopilot.own.source": ("autopilot.own.interruption", "missions.nearest", "missions.toml_files"),
     "autopilot.own": (*LEAVES, "autopilot.control", "autopilot.estimation"),
     "autopilot.core": (
         *LEAVES,

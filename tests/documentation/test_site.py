@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -34,3 +36,12 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(
         for found in LOADED.finditer(path.read_text(encoding="utf-8"))
     }
     assert asked == set()
+    assert {f"{page.name}: {link}" for page in pages for link in _dead(page)} == set()
+
+
+def _dead(page: Path) -> Iterator[str]:
+    """The links of a page to files that are not there."""
+    for link in re.findall(r'<a [^>]*href="([^"#?]+)[^"]*"', page.read_text(encoding="utf-8")):
+        elsewhere = re.match(r"[a-z]+:|//", link) or (page.name == "404.html" and link.startswith("/"))
+        if not elsewhere and not (page.parent / unquote(link)).exists():
+            yield link

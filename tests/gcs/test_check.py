@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from autopilot.trajectory.feasibility import PathReport
-from gcs.errors import InputError
-from gcs.workflows.check_mission import LAW_ERRS, Check, check_mission, reels_too_far, remarks_on
-from missions.model import Land, Mission, Takeoff, Winch
+from gcs.cli import gcs
+from gcs.errors import EXIT_USAGE, InputError
+from gcs.workflows.check_mission import Check, check_mission, flown_alone, reels_too_far, remarks_on
+from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
 
 CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
 
@@ -58,8 +60,25 @@ def test_a_plan_of_another_ground_station_is_told_where_it_is_checked(tmp_path: 
 
 def test_paths_as_asked_are_told_with_what_the_check_does_not_judge() -> None:
     asked, shaped = (check_mission("case-a", "bebop", as_asked) for as_asked in (True, False))
-    assert asked.warnings == (LAW_ERRS,)
+    (note,) = asked.warnings
+    assert note.endswith("only a flight tells: gcs fly case-a --law thesis")
     assert shaped.warnings == ()
     assert [path.distance_m > 0.0 for path in (asked.paths[-1], shaped.paths[-1])] == [False, True]
     assert ", as asked; rotors" in str(asked.paths[-1])
     assert "mm from the path asked; rotors" in str(shaped.paths[-1])
+
+
+def test_what_is_flown_without_the_load_is_told_to_have_no_path() -> None:
+    steps = (Takeoff(2.0), Release(), Waypoint(1.0, 0.0, 2.0), Land())
+    (note,) = flown_alone(Mission("m", "M", "", (), steps))
+    assert note.startswith("note: items[2] to items[3]: flown without the load")
+    (note,) = flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Release(), Land())))
+    assert note.startswith("note: items[2]: flown without the load")
+    assert list(flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Land())))) == []
+    assert list(flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Release())))) == []
+
+
+def test_a_law_is_not_checked_and_its_paths_are() -> None:
+    result = CliRunner().invoke(gcs, ["check", "case-a", "--law", "thesis"], prog_name="gcs")
+    assert result.exit_code == EXIT_USAGE
+    assert "--as-asked checks them as the laws thesis and lqr fly them" in result.stderr

@@ -669,6 +669,7 @@ def test_capture(live, tmp_path):
     assert result.exit_code == EXIT_DONE, result.output
     records = list(read_tlog(path))
     assert f"{len(records)} messages" in result.stdout
+    assert f"gcs: capturing to {path} for 0.3 s" in result.stderr.splitlines()
     assert {one.system for _, one in records} == {1, 2, 255}
     stamps = [stamp for stamp, _ in records]
     assert stamps == sorted(stamps)

@@ -12,7 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 from gcs.cli import gcs
+from gcs.clients.flight import Outcome
 from gcs.errors import GcsError, InputError
+from gcs.workflows.fly import Flight
 from gcs.workflows.requirements import conclude, judge, read_requirements, reporting
 
 KEYS = ("load_error_max_m", "outcome", "slack_events")
@@ -96,9 +98,9 @@ def test_what_was_missed_is_told_and_stands_in_the_report(
 
 def test_a_flight_that_was_lost_fails_in_the_report(tmp_path: Path) -> None:
     junit = tmp_path / "report.xml"
-    assert conclude("run", junit, "diverged", 1.0, [])
+    assert conclude("run", junit, "diverged", 1.0, [], "it fell")
     (suite,) = ET.parse(junit).getroot()
-    assert [fault.get("message") for case in suite for fault in case] == ["outcome diverged"]
+    assert [fault.get("message") for case in suite for fault in case] == ["outcome diverged: it fell"]
 
 
 def test_a_run_that_does_not_come_about_is_an_error_in_the_report(tmp_path: Path) -> None:
@@ -137,3 +139,19 @@ def test_a_sweep_is_judged_as_a_whole(
     assert (suite.get("tests"), suite.get("failures")) == (str(1 + len(required)), "1" if code else "0")
     if code:
         assert "required completed_fraction > 1; found 1.0" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("outcome", "stopped", "code"),
+    [("completed", False, 4), ("diverged", False, 3), ("interrupted", True, 130), ("lost", False, 1)],
+)
+def test_a_flight_that_was_not_completed_is_that_whatever_was_required(
+    outcome: str, stopped: bool, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record = {"load_error_max_m": 1.0, "wall_s": 1.0}
+    flight = Flight(Outcome(outcome, "it fell"), record, tmp_path, stopped)
+    monkeypatch.setattr("gcs.workflows.fly.fly", lambda *_: flight)
+    words = ["fly", "hover", "--quiet", "--require", "load_error_max_m < 0.01"]
+    result = CliRunner().invoke(gcs, words, prog_name="gcs")
+    assert result.exit_code == code
+    assert "required load_error_max_m < 0.01; found 1.0" in result.stderr

@@ -10,10 +10,11 @@ from click.testing import CliRunner
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.signing import Signing, key_of_text, timestamp_of
+from autopilot.wire.tlog import read_tlog
 from gcs.cli import gcs
 from gcs.clients.connection import Connection
 from gcs.clients.flight import FlightClient
-from gcs.errors import EXIT_ERROR
+from gcs.errors import EXIT_DONE, EXIT_ERROR
 from gcs.shell import session as session_module
 from gcs.shell.link import unix_us
 
@@ -95,3 +96,34 @@ def test_a_command_says_what_does_not_match(live, monkeypatch, tmp_path, theirs,
     result = CliRunner().invoke(gcs, [*key, *words, "--connect", port], prog_name="gcs")
     assert (result.exit_code, result.stdout) == (EXIT_ERROR, "")
     assert told in result.stderr
+
+
+def test_a_vehicle_that_answers_nothing_for_want_of_its_key_is_asked_once_and_captured(
+    live, monkeypatch, tmp_path
+):
+    vehicle, port = live
+    sign = Signing(KEY, timestamp_of(unix_us())).signer(0)
+    vehicle.writer.frame = partial(vehicle.writer.frame, sign=sign)
+    asked = []
+    vehicle.on_command_long = asked.append
+    monkeypatch.setattr("gcs.clients.command.RETRY_US", 10_000)
+
+    def run(*words: str) -> tuple[int, list[str]]:
+        asked.clear()
+        result = CliRunner().invoke(gcs, [*words, "--connect", port], prog_name="gcs")
+        return result.exit_code, result.stderr.splitlines()
+
+    texts = run("texts")
+    assert texts[0] == EXIT_ERROR
+    assert texts[1][0].startswith(f"gcs: its texts could not be asked for: {NO_KEY}name the file")
+    code, told = run("status")
+    assert code == EXIT_DONE and len(asked) == 5
+    (line,) = [line for line in told if "listening" not in line]
+    assert line.startswith("gcs: texts, and rate, lateness and missed ticks of the simulator, are not told: ")
+    assert NO_KEY in line
+    log = tmp_path / "flight.tlog"
+    code, told = run("capture", "--duration", "0.2", "--out", str(log))
+    assert code == EXIT_DONE and len(asked) == 5
+    assert told[0].startswith("gcs: only what the vehicle sends by itself is captured, without truth: ")
+    assert NO_KEY in told[0]
+    assert list(read_tlog(log))

@@ -60,9 +60,10 @@ def test_a_simulator_that_the_vehicle_has_named_and_that_is_silent_stands_still_
 
 def test_a_vehicle_that_did_not_answer_is_not_one_that_does_not_say() -> None:
     truth = Truth(AT, vouched=False)
-    truth.of_vehicle(None, silent=True)
+    truth.of_vehicle(None, silent="it sleeps")
     assert truth.take([(run(7), OURS)]) == []
     assert truth.missing.startswith("the vehicle did not answer which simulator it flies in, so the truth at")
+    assert truth.missing.endswith(" is not taken; it sleeps")
 
 
 def test_worlds_are_told_apart_by_where_they_tell_from() -> None:

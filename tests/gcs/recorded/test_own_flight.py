@@ -15,6 +15,7 @@ from gcs.cli import gcs
 from gcs.closed_loop import Conditions, fly
 from gcs.commands.options import spoken
 from gcs.errors import EXIT_USAGE
+from gcs.recorded.identification import Identified, map_doubt
 from gcs.workflows.recorded import name_of
 from missions.fileformat import load_mission
 from missions.model import Delay, Land, Mission, Takeoff
@@ -70,6 +71,37 @@ def test_a_flight_that_tells_nothing_is_told_in_one_line(hold_s: float, says: st
     assert result.stdout == ""
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"gcs: {path}: ") and says in line
+
+
+def test_a_log_needs_no_ending(flown: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "monday"
+    bare.write_bytes(flown.read_bytes())
+    result = CliRunner().invoke(gcs, ["identify", str(bare), "--json"], prog_name="gcs")
+    assert json.loads(result.stdout)["true_states"] is True
+
+
+def test_a_load_that_was_never_carried_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "flight.tlog"
+    with path.open("wb") as file:
+        waits = Mission("waits", "", "", (), (Takeoff(0.4), Land()))
+        fly(
+            waits,
+            Conditions(sensors="ideal"),
+            TlogWriter(file),
+            lambda onboard, _: onboard.now_us < 2_500_000,
+        )
+    result = CliRunner().invoke(gcs, ["replay", str(path)], prog_name="gcs")
+    assert result.exit_code == EXIT_USAGE
+    assert (
+        result.stderr
+        == f"gcs: {path}: the load is never carried off the ground; at least 200 rows are needed\n"
+    )
+
+
+def test_a_tilt_that_does_not_show_the_acceleration_casts_doubt_on_the_map() -> None:
+    assert map_doubt([Identified("tilt_share", 0.95, 0.05)]) == ""
+    assert map_doubt([Identified("tilt_share", 0.1, 0.6)]) == ""  # nobody can say
+    assert map_doubt([Identified("tilt_share", 0.001, 0.02)]).startswith("the tilt shows 0.00 of the")
 
 
 def test_a_flight_goes_by_its_folder_and_any_other_recording_by_its_file(tmp_path: Path) -> None:

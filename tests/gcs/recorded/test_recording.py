@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 from pathlib import Path
 
 import numpy as np
@@ -146,6 +147,10 @@ def test_a_map_of_rows_of_numbers_is_not_for_a_telemetry_log(tmp_path: Path) -> 
     [
         (MAP.replace("quaternion =", "quaternions ="), "unknown key; write quaternion"),
         (MAP.replace("[1, 2, 3]", "[1, 2]"), "vehicle.position"),
+        (MAP.replace("[1, 2, 3]", "[1, 2, 2]"), "vehicle.position[2] = 2; is vehicle.position[1] already"),
+        (MAP.replace("time = 0", "time = 0.5"), "time = 0.5; must be a whole number"),
+        (MAP.replace("[1, 2, 3]", '["x", 2, 3]'), 'vehicle.position[0] = "x"; must be a whole number'),
+        (MAP.replace("time = 0", "time = 0\nrate_hz = 30"), "has both time and rate_hz"),
         (MAP.replace("mass_ratio = 0.2", "mass_ratio = -1"), "model.mass_ratio = -1"),
         (MAP + "[identify]\nparameters = ['mass']\n", "identify.parameters[0]"),
     ],
@@ -161,3 +166,35 @@ def test_a_wrong_map_is_told(tmp_path: Path, text: str, says: str) -> None:
 @pytest.mark.parametrize("name", MAPS.names())
 def test_shipped_maps_are_read(name: str) -> None:
     assert np.isfinite(load_map(name).load_model(1.0)).all()
+
+
+def test_what_the_map_gets_wrong_is_told_in_one_line(tmp_path: Path, columns: Path) -> None:
+    path = tmp_path / "flight.csv"
+    path.write_text("".join(ROW.format(50.0 * k) for k in range(300)), encoding="utf-8")  # ms
+    for command in ("identify", "replay"):
+        told = run(command, path, "--columns", columns).stderr
+        assert told.startswith(f"gcs: {path}: rows would be 50 s apart; ") and told.count("\n") == 1
+    far = MAP.replace("[load]", "[attachment]\nbelow_m = 700.0\n[load]")
+    columns.write_text(far, encoding="utf-8")
+    path.write_text(rows(), encoding="utf-8")
+    told = run("identify", path, "--columns", columns).stderr
+    assert told.startswith(f"gcs: {path}: the load would be 699 m from the vehicle") and told.count("\n") == 1
+
+
+def test_a_pipe_is_not_read(tmp_path: Path, columns: Path) -> None:
+    path = tmp_path / "flight.csv"
+    os.mkfifo(path)
+    for command in ("identify", "replay"):
+        for words in ((), ("--columns", columns)):
+            assert f"gcs: {path}: not a file; must be" in run(command, path, *words).stderr
+
+
+def test_of_a_recording_with_a_break_everywhere_nothing_is_said_to_be_predicted(
+    tmp_path: Path, columns: Path
+) -> None:
+    path = tmp_path / "flight.csv"
+    times = [0.4 * k + 1.5 * (k // 4) for k in range(300)]  # never 2 s without a break
+    path.write_text("".join(ROW.format(time) for time in times), encoding="utf-8")
+    result = run("replay", path, "--columns", columns, "--out", tmp_path / "out")
+    assert result.exit_code == 0
+    assert "predicted 2 s ahead: nothing; no stretch without a break is so long" in result.stdout

@@ -12,9 +12,11 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
+from autopilot.wire.items import encode_steps
 from gcs.analysis.record import FlightMeta
 from gcs.cli import gcs
 from gcs.report.compare import (
+    STEPS,
     Run,
     begins,
     comparison,
@@ -26,6 +28,7 @@ from gcs.report.compare import (
     load_run,
 )
 from gcs.report.overview import overview
+from missions.model import Land, Takeoff, Waypoint
 from tests.doubles import recorded_flights as flights
 from tests.doubles.browser import Browser
 
@@ -101,6 +104,55 @@ def test_a_flight_that_was_lost_is_no_better_than_one_that_was_completed(runs: l
     values = [run.record["load_error_rms_m"] for run in found]
     found[values.index(min(values))].record["outcome"] = "diverged"
     assert "load_error_rms_m" not in comparison(found)["best"]
+
+
+def test_what_is_as_good_as_the_best_has_its_star_too(runs: list[Path]) -> None:
+    base = loaded(runs[0])
+
+    def best(*values: float | None) -> object:
+        found = [replace(base, record={**base.record, "load_error_rms_m": value}) for value in values]
+        return comparison(found)["best"].get("load_error_rms_m")
+
+    assert best(0.1, 0.1009, 0.1011) == [0, 1]
+    assert best(0.1, 0.1009) is None  # a difference that is none
+    assert best(0.0001, 0.00012) is None  # both are read as 0.1 mm
+    assert best(None, 0.2, 0.1) == [2]
+
+
+def test_lengths_beside_each_other_are_in_one_unit(runs: list[Path]) -> None:
+    base = loaded(runs[0])
+    found = [
+        replace(base, record={**base.record, "load_error_max_m": value}) for value in (0.0061, 12.3, None)
+    ]
+    rows = {row.metric.name: row.values for _, rows in figures(found) for row in rows}
+    assert rows["load_error_max_m"] == ("0.006 m", "12.300 m", "–")
+    assert rows["load_error_rms_m"][0].endswith(" mm")
+
+
+def test_what_was_set_is_told_before_what_follows_from_it(runs: list[Path]) -> None:
+    base = loaded(runs[0])
+    told = replace(base.telemetry, parameters={"CTL_LAW": 1.0, "VEH_ACT_DELAY": 0.5})
+    set_ = replace(base, telemetry=told, meta=replace(base.meta, settings={"SIM_ACT_DELAY_MS": 72.0}))
+    names = [one.name for one in differences([base, set_])]
+    assert names == ["SIM_ACT_DELAY_MS", "CTL_LAW", "VEH_ACT_DELAY"]
+
+
+def test_of_the_steps_only_those_are_told_that_differ(runs: list[Path]) -> None:
+    base = loaded(runs[0])
+
+    def mission(*altitudes: float) -> Run:
+        steps = [Takeoff(altitudes[0]), *(Waypoint(0.0, 0.0, one) for one in altitudes[1:]), Land()]
+        items = encode_steps(steps, base.telemetry.home)
+        return replace(base, telemetry=replace(base.telemetry, mission=items))
+
+    told = {
+        one.name: one.values
+        for one in differences([mission(5.0, 6.0, 7.0, 8.0), mission(5.0, 6.0, 9.0, 8.0)])
+    }
+    way = "3. Carry the load to 0 m east, 0 m north, {} m up"
+    assert told == {STEPS: (way.format(7), way.format(9))}
+    more = differences([mission(5.0, 6.0, 7.0), mission(5.0, 7.0)])[0]
+    assert more.values == ("2. Carry the load to 0 m east, 0 m north, 6 m up", "–")
 
 
 def test_flights_meet_where_all_have_begun(runs: list[Path], tmp_path: Path) -> None:

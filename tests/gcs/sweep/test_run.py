@@ -115,6 +115,13 @@ def test_flights_are_stored_without_what_imports_pandas(
     assert str(store.merge().to_pylist()) == str(rows)  # nan is not equal to itself
 
 
+def test_a_report_without_flights_says_so(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:
+    plan, _, _ = whole
+    assert swept(plan, tmp_path, lambda: True).flights == 0
+    page = write_report(tmp_path, plan).read_text(encoding="utf-8")
+    assert "No flight has ended yet." in page and "<h2>" not in page
+
+
 def test_report_holds_map_curve_and_margin(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
     plan, directory, _ = whole
     page = write_report(directory, plan).read_text(encoding="utf-8")

@@ -1,0 +1,28 @@
+"""What mkdocs leaves undone: links from notebooks to pages, which it only follows in Markdown."""
+
+from __future__ import annotations
+
+import logging
+import posixpath
+import re
+from typing import Any
+
+_LINK = re.compile(r'href="(?![a-z]+:)([^"#]+\.md)(#[^"]*)?"')
+_log = logging.getLogger("mkdocs.plugins.site_hooks")  # where a warning fails a strict build
+
+
+def on_page_content(html: str, *, page: Any, config: Any, files: Any) -> str:
+    """A notebook with its links to `page.md` made links to the page of the site; mkdocs calls this."""
+    if not page.file.src_uri.endswith(".ipynb"):
+        return html
+
+    def linked(found: re.Match[str]) -> str:
+        place, anchor = found.groups(default="")
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(page.file.src_uri), place))
+        target = files.get_file_from_path(path)
+        if target is None:
+            _log.warning("%s: a link to %s, which is no page", page.file.src_uri, place)
+            return found.group()
+        return f'href="{target.url_relative_to(page.file)}{anchor}"'
+
+    return _LINK.sub(linked, html)
