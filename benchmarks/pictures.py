@@ -150,6 +150,7 @@ def main() -> None:
         with chromium(folder / "profile") as browser:
             for name in options.names or PICTURES:
                 file, make = PICTURES[name]
+                print(f"{file}: flying and drawing, which takes minutes", flush=True)
                 make(browser, folder, options.images / file)
                 size = (options.images / file).stat().st_size
                 print(f"{options.images / file}: {size / 1000:.0f} kB", flush=True)

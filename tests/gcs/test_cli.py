@@ -95,6 +95,13 @@ def test_all_commands_are_listed():
     assert all(f"  {name} " in output for name in COMMANDS)
 
 
+def test_a_shell_can_complete_words(monkeypatch):
+    words = {"_GCS_COMPLETE": "bash_complete", "COMP_WORDS": "gcs sta", "COMP_CWORD": "1"}
+    assert "_GCS_COMPLETE=bash_source gcs" in (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+    told = CliRunner().invoke(gcs, [], prog_name="gcs", env=words).stdout
+    assert told.split() == ["plain,status", "plain,start"]
+
+
 def test_help_is_quick():
     best = float("inf")
     for _ in range(HELP_TRIES):

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from autopilot.shell.options import address_option
 from autopilot.shell.program import main as autopilot
+from gcs.cli import gcs
 from gcs.shell.link import free_port
 from sitl.__main__ import main as sitl
 
@@ -48,6 +49,13 @@ def test_what_is_wrong_on_the_command_line_ends_with_2(invoke, program, words, t
     assert (result.exit_code, result.stdout) == (2, "")
     assert result.stderr.startswith(f"{program.name}: ") and told in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("program", [sitl, autopilot, gcs])
+def test_h_is_help(program: click.Command) -> None:
+    short, long = (CliRunner().invoke(program, [word]) for word in ("-h", "--help"))
+    assert short.exit_code == 0
+    assert short.stdout == long.stdout and "Usage: " in short.stdout
 
 
 @pytest.mark.parametrize("program", [sitl, autopilot])

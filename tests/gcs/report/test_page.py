@@ -211,6 +211,17 @@ def test_nothing_over_the_scene_lies_on_anything_else(page: Browser) -> None:
         assert not over, width
 
 
+def test_what_stands_over_the_scene_can_be_read_in_a_narrow_window(page: Browser) -> None:
+    page.resize(500, 800)
+    sizes = page.run(
+        """return [...document.querySelectorAll("#stage *, .readings *, .timeline *")]
+            .filter((one) => [...one.childNodes].some((part) => part.nodeType === 3 && part.data.trim()))
+            .map((one) => [one.textContent, parseFloat(getComputedStyle(one).fontSize)])"""
+    )
+    assert len(sizes) > 10
+    assert [(text, size) for text, size in sizes if size < 10.0] == []
+
+
 def test_labels_of_an_axis_fit_beside_it(page: Browser) -> None:
     for ticks, labels in (
         ([0, 0.00005, 0.0001, 0.00015], ["0", "0.5·10⁻⁴", "1·10⁻⁴", "1.5·10⁻⁴"]),
