@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from autopilot.services.ftp import Op, Packet, payload_of
+from autopilot.shell.storage import CARD_DIRECTORY
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
@@ -43,11 +44,15 @@ ITEMS = 200  # of a mission that is uploaded again and again
 SUMMARY = re.compile(r"p50 (\d+) p99 (\d+) max (\d+) us; (\d+) of (\d+) took")
 
 
+LARGE, LARGE_BYTES = "large.bin", 64 * 2**20  # on the card of a vehicle that is asked for its checksum
+
+
 class Flood(NamedTuple):
-    """What is said, in turn, by peers in turn; by TCP if asked for."""
+    """What is said, in turn, by peers in turn; by TCP if asked for. `large`: it asks for that file."""
 
     words: list[bytes]
     tcp: bool = False
+    large: bool = False
 
 
 def frames(messages: Iterable[Any]) -> list[bytes]:
@@ -100,6 +105,9 @@ FLOODS: dict[str, Callable[[], Flood]] = {
         file_requests((Op.MAKE_FOLDER, b"a"), (Op.LIST, b"/"), (Op.REMOVE_FOLDER, b"a"))
     ),
     "files read": lambda: Flood(file_requests((Op.CHECKSUM, b"@PARAM/param.pck"), (Op.LIST, b"/log"))),
+    "checksums of 64 MiB": lambda: Flood(
+        file_requests((Op.CHECKSUM, f"/fs/microsd/{LARGE}".encode())), large=True
+    ),
     "setpoints": lambda: Flood(
         frames([m.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0xDF8, 0, 0, -2, *((0.0,) * 8))])
     ),
@@ -149,11 +157,16 @@ class Vehicle:
         with self._log.open("wb") as log:
             return subprocess.Popen([sys.executable, "-m", *arguments], stdout=log, stderr=log)
 
-    def _start_autopilot(self) -> subprocess.Popen[bytes]:
+    def _start_autopilot(self, large: bool = False) -> subprocess.Popen[bytes]:
         self._count += 1
+        storage = self._folder / str(self._count)
+        if large:
+            card = storage / CARD_DIRECTORY
+            card.mkdir(parents=True)
+            (card / LARGE).write_bytes(bytes(LARGE_BYTES))
         return self._start(
             *("autopilot", "--sim", self._listen, "--gcs", self._ground, "--api", self._api),
-            *("--tcp", self._tcp, "--storage", str(self._folder / str(self._count))),
+            *("--tcp", self._tcp, "--storage", str(storage)),
         )
 
     def take_off(self) -> None:
@@ -178,7 +191,7 @@ class Vehicle:
     def under(self, flood: Flood, seconds: float) -> tuple[int, str]:
         """How many datagrams were sent in the life of one autopilot, and what it said of its ticks."""
         self._end_autopilot()
-        self._autopilot = self._start_autopilot()
+        self._autopilot = self._start_autopilot(flood.large)
         self._hold()
         sent = multiprocessing.Value("l", 0)
         arguments = (flood, ports_of(self._autopilot.pid), self._base + 4, sent)

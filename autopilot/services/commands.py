@@ -575,10 +575,13 @@ class CommandService:
 
 
 def _said(command: int, verdict: Verdict) -> list[Output]:
-    if verdict.result == ACCEPTED:
-        news = [] if verdict.text is None else [Say(mavlink.MAV_SEVERITY_INFO, verdict.text)]
-        return [Settled(command), *news]
-    return [] if verdict.text is None else [Say(mavlink.MAV_SEVERITY_WARNING, verdict.text, command)]
+    accepted = verdict.result == ACCEPTED
+    said: list[Output] = [Settled(command)] if accepted else []
+    if verdict.text is not None and (verdict.warns or not accepted):
+        said.append(Say(mavlink.MAV_SEVERITY_WARNING, verdict.text, command))
+    elif verdict.text is not None:
+        said.append(Say(mavlink.MAV_SEVERITY_INFO, verdict.text))
+    return said
 
 
 def _ack(command: int, result: int, peer: Peer) -> Output:

@@ -6,7 +6,7 @@ Sessions that are not used for `IDLE_US` are closed.
 
 A request that comes twice (same client, same sequence number, same bytes) is not done twice: its reply is
 sent again. Bursts go out at a steady pace, `BURST_PACKETS` at a time, the last of them marked. The checksum
-of a file is counted a part at each tick; a client has one under way at most.
+of a file is counted a part at each tick, of one client after the other; a client has one under way at most.
 """
 
 from __future__ import annotations
@@ -175,7 +175,9 @@ class FtpService:
     def poll(self, now_us: int) -> list[Output]:
         """The packets of bursts whose time has come, and checksums; forgets idle sessions."""
         outputs: list[Output] = []
-        for peer, one in list(self._sums.items()):
+        if self._sums:  # one client's a tick, in turn: however many ask, a tick takes no longer
+            peer = next(iter(self._sums))
+            self._sums[peer] = one = self._sums.pop(peer)
             outputs += self._count(peer, one)
         for key, burst in list(self._bursts.items()):
             outputs += self._go_on(key, burst, now_us)

@@ -144,6 +144,7 @@ class Verdict(NamedTuple):
 
     result: int
     text: str | None = None
+    warns: bool = False  # of what was accepted: the text is a warning all the same
 
 
 # A request is one of the dataclasses of `requests`; the supervisor decides.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from autopilot.wire.tlog import TlogWriter, read_tlog
+from autopilot.wire.tlog import TlogWriter
 from gcs.errors import (
     EXIT_DONE,
     EXIT_ERROR,
@@ -30,6 +30,7 @@ from gcs.workflows.mission_file import load
 from gcs.workflows.own_vehicle import AUTOPILOT_LOG, FIRMWARE_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
 from gcs.workflows.report import make_report
 from gcs.workflows.stopwatch import Stopwatch
+from gcs.workflows.too_slow import too_slow
 from gcs.workflows.warmup import flight_parts, warm_up
 from missions.model import Mission
 
@@ -48,7 +49,6 @@ _EXIT = {
 }
 
 UNFLOWN_FILE = "unflown.tlog"  # what a vehicle said with which nothing was flown
-MOST_MISSED = 1e-3  # share of the commands that may come too late before it is told of
 
 Told = Callable[["Record", "Outcome"], None]
 
@@ -208,7 +208,7 @@ def _end(
         raise GcsError(f"{mission.name}: {outcome.name}: {outcome.reason}; {told_by}")
     folder.keep()
     if options.real_time and outcome.name != "completed":
-        outcome = outcome.because(_too_slow(tlog))
+        outcome = outcome.because(too_slow(tlog))
     try:
         meta = meta_of(mission, options, outcome, wall_s, truth_missing)
         record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
@@ -220,22 +220,6 @@ def _end(
 
 def _tell_abandoned(tlog: Path) -> None:
     say(f"report abandoned; the telemetry is in {tlog}")
-
-
-def _too_slow(tlog: Path) -> str:
-    """What the simulator counted of commands that came too late, where it is more than one of a thousand."""
-    from autopilot.wire.dialect import plumbline as mavlink
-
-    sent = missed = 0
-    for _, received in read_tlog(tlog):
-        if received.id == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
-            status = received.message
-            sent, missed = round(status.time_usec * 1e-6 * status.rate_hz), status.missed
-    if missed <= MOST_MISSED * sent:
-        return ""
-    return (
-        f"the machine was too slow: {missed} of some {sent} commands came too late; try without --real-time"
-    )
 
 
 class FlightFolder:

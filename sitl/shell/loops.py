@@ -126,10 +126,10 @@ class Clock:
         if figures is self._simulator.pacing:
             return
         self._simulator.pacing = figures
-        share = figures.rate_hz * self._simulator.tick_us * 1e-6 / pacing.speed
-        if 0.0 < share < _SLOW_SHARE and now - self._told_ns > _SLOW_AGAIN_NS:
+        speed = figures.rate_hz * self._simulator.tick_us * 1e-6
+        if 0.0 < speed < _SLOW_SHARE * pacing.speed and now - self._told_ns > _SLOW_AGAIN_NS:
             self._told_ns = now
-            text = f"Machine busy: clock at {share:.2f} x, not {pacing.speed:g} x"
+            text = f"Machine busy: clock at {speed:.2f} x, not {pacing.speed:g} x"
             self._say(text.lower())
             self._simulator.parameters.say(text, mavlink.MAV_SEVERITY_NOTICE)
 

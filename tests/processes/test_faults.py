@@ -179,6 +179,44 @@ def test_a_vehicle_whose_simulator_is_silent_refuses_what_is_to_be_flown(
     flight.take_off()
 
 
+FENCED = {
+    "fileType": "Plan",
+    "version": 1,
+    "mission": {
+        "items": [
+            {
+                "type": "SimpleItem",
+                "command": 22,
+                "frame": 3,
+                "autoContinue": True,
+                "params": [0, 0, 0, 0, 47.397742, 8.545594, 2],
+            }
+        ]
+    },
+    "geoFence": {
+        "circles": [{"inclusion": True, "circle": {"center": [47.397742, 8.545594], "radius": 25}}],
+        "polygons": [],
+    },
+    "rallyPoints": {"points": []},
+}
+
+
+def test_a_vehicle_whose_stored_fence_is_damaged_is_not_armed_until_it_has_another(
+    fly: Callable[..., Flight], tmp_path: Path
+) -> None:
+    storage, plan = tmp_path / "storage", tmp_path / "fenced.plan"
+    storage.mkdir()
+    (storage / "fence.bin").write_bytes(b"rubbish")
+    plan.write_text(json.dumps(FENCED), encoding="utf-8")
+    flight = fly(*QUICK)
+    assert f"Storage: {storage}/fence.bin: " in flight.do("texts")
+    assert flight.until(lambda status: status["time_s"] > 4.0)["ready_to_arm"] is False
+    flight.do("upload", str(plan))
+    flight.until(lambda status: status["ready_to_arm"])
+    assert (storage / "fence.corrupt").read_bytes() == b"rubbish", "kept, as it may be mended"
+    assert (storage / "fence.bin").read_bytes() != b"rubbish"
+
+
 def test_an_autopilot_that_stands_still_is_named_where_the_flight_is_lost(
     start: Start, tmp_path: Path
 ) -> None:

@@ -245,6 +245,21 @@ def test_no_command_is_left_without_an_answer(rig):
         assert len(acks(rig.replies(long(command)))) == 1
 
 
+@pytest.mark.parametrize("command", [181, 183, 187])
+def test_who_wants_an_actuator_is_told_what_moves_them(rig, command):
+    said = "".join(r.text for r in rig.replies(long(command)) if r.get_type() == "STATUSTEXT")
+    assert said == "Actuators: there are rotors, gripper and winch; DO_GRIPPER and DO_WINCH move these"
+
+
+@pytest.mark.parametrize(
+    ("warns", "severity"), [(False, mavlink.MAV_SEVERITY_INFO), (True, mavlink.MAV_SEVERITY_WARNING)]
+)
+def test_what_is_said_with_an_acceptance_is_news_or_a_warning(rig, warns, severity):
+    rig.verdict = lambda request: Verdict(OK, "load position not settled", warns)
+    (text,) = [r for r in rig.replies(long(401)) if r.get_type() == "STATUSTEXT"]
+    assert (text.severity, text.text) == (severity, "load position not settled")
+
+
 def test_the_ack_names_the_asker(rig):
     (ack,) = rig.replies(long(20), system=245, component=77)
     assert (ack.target_system, ack.target_component) == (245, 77)

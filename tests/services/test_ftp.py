@@ -451,6 +451,27 @@ def test_a_checksum_is_counted_over_many_ticks(client: Client) -> None:
     assert (reply.opcode, reply.data[0]) == (Op.NAK, Trouble.NOT_FOUND)
 
 
+def test_checksums_of_many_clients_are_counted_in_turn(card: Card, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tick reads no more for many than for one."""
+    first = Client(card)
+    first.put(b"/fs/microsd/a", b"")
+    first.good(Op.TRUNCATE, b"/fs/microsd/a", offset=100_000)
+    reads: list[tuple[Any, ...]] = []
+    read = card.read
+    monkeypatch.setattr(card, "read", lambda *asked: (reads.append(asked), read(*asked))[1])
+    clients = [Client(card, Peer("gcs", number, 190), first.service) for number in range(1, 9)]
+    for client in clients:
+        assert client.send(Packet(1, 0, Op.CHECKSUM, 14, data=b"/fs/microsd/a\0")) == []
+    replies: list[Packet] = []
+    ticks = 0
+    while len(replies) < len(clients):
+        replies += first.poll()
+        ticks += 1
+        assert len(reads) <= ticks
+    assert {struct.unpack("<I", reply.data) for reply in replies} == {(checksum(bytes(100_000)),)}
+    assert first.service.next_timer() > 0
+
+
 def test_unknown_opcodes_and_replies(client: Client) -> None:
     assert client.trouble(99) == Trouble.UNKNOWN_COMMAND
     assert client.send(Packet(1, 0, Op.ACK, 0)) == []

@@ -132,6 +132,12 @@ def test_a_key_is_set_changed_and_taken_away(open_to_all: Any) -> None:
     assert KEY.hex() not in repr(rig.events)
 
 
+def test_a_key_that_is_taken_is_acknowledged_by_text(open_to_all: Any) -> None:
+    rig = open_to_all
+    (text,) = [one.text for one in rig.replies(setup(KEY, BOOT)) if one.get_type() == "STATUSTEXT"]
+    assert text == "Signing is on: only signed messages are heard"
+
+
 def test_a_refused_change_changes_nothing(open_to_all: Any) -> None:
     rig = open_to_all
     rig.verdict = lambda request: Verdict(m.MAV_RESULT_DENIED, "disarm first")

@@ -12,17 +12,25 @@ from typing import Any
 
 import pytest
 
+from autopilot.services.endpoint import PATIENCE, VehicleEndpoint
+from autopilot.services.identity import Identity
+from autopilot.services.records import Verdict
 from autopilot.shell.ground import AutopilotError, GroundStations, listen
 from autopilot.shell.options import StopRequest
 from autopilot.shell.storing import Storing
 from autopilot.shell.tcp_server import MAX_CLIENTS, SILENCE_US, TcpServer
+from autopilot.wire import codec
 from autopilot.wire.codec import FrameWriter, decode
+from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as m
+from autopilot.wire.parameter_table import ParameterTable
 from gcs.shell.link import LOOPBACK, free_port
 
 SLOW_S = 1e-3  # for one message: longer than there is for all
 HEARS_S = 0.1  # what was sent arrives within
 MOST_TICKS = 50  # until what had to wait for a later tick is sent
+MOST_READ = 2048  # bytes at a time, of a datagram or of a client by TCP
+LONGEST = 65_507  # bytes that a datagram can have
 
 
 def test_a_port_that_is_taken_is_told_in_words_with_the_way_out() -> None:
@@ -136,6 +144,72 @@ def test_what_is_no_message_is_passed_over_and_what_follows_is_heard(ground: Cal
     for _ in range(2):
         autopilot.exchange()
     assert autopilot.heard == [7]
+
+
+def test_what_is_behind_2_kb_of_a_datagram_is_not_heard(ground: Callable[[], Ground]) -> None:
+    autopilot = ground()
+    for datagram in (pings(0, 1000), pings(5000, 1)):
+        autopilot.peers[0].sendto(datagram, autopilot.theirs[0])
+    while 5000 not in autopilot.heard:
+        autopilot.exchange()
+    *first, _ = autopilot.heard
+    assert first == list(range(len(first)))
+    assert len(pings(0, len(first))) <= MOST_READ < len(pings(0, len(first) + 1))
+
+
+def test_a_client_by_tcp_is_read_2_kb_at_a_time(ground: Callable[[], Ground]) -> None:
+    autopilot = ground()
+    address = (LOOPBACK, free_port())
+    server = listen(address)
+    said, taken = pings(0, 1000), []
+    with socket.create_connection(address, 5.0) as client:
+        client.sendall(said)
+        while len(b"".join(taken)) < len(said):
+            arrived = server.take(autopilot.onboard)
+            if arrived is not None:
+                taken.append(arrived[0])
+                assert len(b"".join(taken)) <= len(taken) * MOST_READ
+    assert b"".join(taken) == said
+    server.close()
+
+
+class Searching:
+    """An onboard that is its endpoint alone; it counts the checksums that were computed of what it hears."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_us, self.checksums = 0, 0
+        self.endpoint = VehicleEndpoint(Identity(), Home(), ParameterTable([]))
+        checksum = codec.mcrf4xx
+
+        def counted(*arguments: Any) -> int:
+            self.checksums += 1
+            return checksum(*arguments)
+
+        monkeypatch.setattr(codec, "mcrf4xx", counted)
+
+    def receive_ground(self, datagram: bytes, link: Any, program: bool = False) -> list[Any]:
+        return list(self.endpoint.receive(datagram, link, self.now_us, self.refuse, program))
+
+    def refuse(self, request: object) -> Verdict:
+        return Verdict(m.MAV_RESULT_DENIED, "")
+
+    def ground_datagrams(self) -> list[tuple[Any, bytes]]:
+        return []
+
+
+def test_a_whole_datagram_of_begins_of_frames_is_soon_given_up(
+    ground: Callable[[], Ground], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each 0xFE may begin a frame, whose checksum is then computed: twice for one."""
+    autopilot = ground()
+    searching: Any = Searching(monkeypatch)
+    autopilot.onboard = searching
+    autopilot.peers[0].sendto(b"\xfe" * LONGEST, autopilot.theirs[0])
+    autopilot.exchange()
+    assert 0 < searching.checksums <= 2 * (PATIENCE + 1)
+    searching.checksums = 0
+    searching.receive_ground(b"\xfe" * LONGEST, "ground")
+    assert 0 < searching.checksums <= 2 * (PATIENCE + 1), "nor where it comes in one piece"
 
 
 def test_a_flood_by_one_way_leaves_the_others_their_turn(ground: Callable[[], Ground]) -> None:

@@ -190,6 +190,25 @@ def test_a_file_that_is_none_is_said_and_changes_nothing(tmp_path: Path, text: b
     assert Storage(tmp_path).load_parameters(again) == []
 
 
+@pytest.mark.parametrize("name", ["fence", "rally", "world"])
+def test_a_damaged_file_is_kept_aside_when_another_takes_its_place(tmp_path: Path, name: str) -> None:
+    file = {"fence": "fence.bin", "rally": "rally.bin", "world": WORLD_FILE}[name]
+    (tmp_path / file).write_bytes(b"rubbish")
+    storage = Storage(tmp_path)
+    assert len(storage.load_areas(HOME)[1] + storage.load_world()[1]) == 1
+    assert [p.name for p in tmp_path.glob(f"{name}.*")] == [file], "it stays where it is"
+    for kind in (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY):
+        storage.keep_areas(kind, ())
+    storage.keep_world({"SIM_WIND_E": 3.0})
+    assert (tmp_path / f"{name}.corrupt").read_bytes() == b"rubbish"
+    assert [p.name for p in tmp_path.glob("*.corrupt*")] == [f"{name}.corrupt"], (
+        "of what was read none is kept"
+    )
+    again = Storage(tmp_path)
+    assert again.load_areas(HOME) == ({}, [])
+    assert again.load_world() == ({"SIM_WIND_E": 3.0}, [])
+
+
 def test_what_was_lost_is_a_reason_not_to_arm_until_it_is_stored_again(tmp_path: Path) -> None:
     for name in ("fence.bin", "rally.bin", PARAMETER_FILE):
         (tmp_path / name).write_bytes(b"rubbish")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +17,11 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import WireItem, encode_steps
 from missions.fileformat import load_mission
+from tests.doubles.killed import killed_at
 
 HOME = Home()
-CALLS = ("open", "write", "fsync", "close", "rename", "replace", "unlink", "mkdir")
-FENCE = mavlink.MAV_MISSION_TYPE_FENCE
+FENCE, RALLY = mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_RALLY
+RUBBISH = b"rubbish"
 
 
 def fence(radius: float) -> tuple[WireItem, ...]:
@@ -42,29 +41,10 @@ def fence(radius: float) -> tuple[WireItem, ...]:
     return (circle,)
 
 
-def killed_at(number: int, what: Callable[[], Any]) -> bool:
-    """Do `what` in a process that dies by SIGKILL at its system call `number`, before it is made."""
-    child = os.fork()
-    if child == 0:
-        left = [number]
-
-        def counted(call: Callable[..., Any]) -> Callable[..., Any]:
-            def made(*args: Any, **kwargs: Any) -> Any:
-                left[0] -= 1
-                if left[0] < 0:
-                    os.kill(os.getpid(), signal.SIGKILL)
-                return call(*args, **kwargs)
-
-            return made
-
-        for name in CALLS:
-            setattr(os, name, counted(getattr(os, name)))
-        try:
-            what()
-        finally:
-            os.kill(os.getpid(), signal.SIGTERM)  # by the end, without the cleaning up of the test program
-    _, status = os.waitpid(child, 0)
-    return os.WTERMSIG(status) == signal.SIGKILL
+def rally(height: float) -> tuple[WireItem, ...]:
+    (circle,) = fence(0.0)
+    frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    return (circle._replace(frame=frame, command=mavlink.MAV_CMD_NAV_RALLY_POINT, z=height),)
 
 
 def missions(directory: Path) -> Any:
@@ -73,7 +53,7 @@ def missions(directory: Path) -> Any:
 
 def areas(directory: Path) -> Any:
     found, troubles = Storage(directory).load_areas(HOME)
-    return found.get(FENCE), troubles
+    return found, troubles
 
 
 def parameters(directory: Path) -> Any:
@@ -107,6 +87,21 @@ WRITES = {
         lambda storage: storage.keep_areas(FENCE, fence(30.0)),
         areas,
     ),
+    "fence cleared": (
+        lambda storage: storage.keep_areas(FENCE, fence(20.0)),
+        lambda storage: storage.keep_areas(FENCE, ()),
+        areas,
+    ),
+    "rally points": (
+        lambda storage: storage.keep_areas(RALLY, rally(20.0)),
+        lambda storage: storage.keep_areas(RALLY, rally(30.0)),
+        areas,
+    ),
+    "rally points cleared": (
+        lambda storage: storage.keep_areas(RALLY, rally(20.0)),
+        lambda storage: storage.keep_areas(RALLY, ()),
+        areas,
+    ),
     "parameters": (
         lambda storage: storage.keep_parameter("NGC_KX", 5.0),
         lambda storage: storage.keep_parameter("NGC_KX", 5.5),
@@ -116,6 +111,16 @@ WRITES = {
         lambda storage: storage.keep_world({"SIM_WIND_E": 3.0}),
         lambda storage: storage.keep_world({"SIM_WIND_E": 4.0}),
         world,
+    ),
+    "world cleared": (
+        lambda storage: storage.keep_world({"SIM_WIND_E": 3.0}),
+        lambda storage: storage.keep_world({}),
+        world,
+    ),
+    "key taken away": (
+        lambda storage: storage.keep_signing(bytes(range(32)), 5),
+        lambda storage: storage.keep_signing(None, 0),
+        key,
     ),
     "key": (
         lambda storage: storage.keep_signing(bytes(range(32)), 5),
@@ -147,6 +152,40 @@ def test_a_process_killed_at_any_system_call_leaves_the_old_or_the_new(tmp_path:
     assert all(found in (old, new) for found in seen)
     assert seen[-1] == new
     assert not list(tmp_path.glob("*.corrupt*"))
+
+
+# what is stored, and read and replaced; and what a start finds of a damaged one, for as long as it is there
+REPLACED = {
+    "mission.bin": lambda storage: storage.load_mission(HOME),
+    "fence.bin": lambda storage: (storage.load_areas(HOME), storage.keep_areas(FENCE, fence(30.0))),
+    "rally.bin": lambda storage: (storage.load_areas(HOME), storage.keep_areas(RALLY, ())),
+    "parameters.txt": lambda storage: (
+        storage.load_parameters(autopilot_parameters(load_vehicle("bebop"))),
+        storage.keep_parameter("NGC_KX", 5.0),
+    ),
+    "world.txt": lambda storage: (storage.load_world(), storage.keep_world({"SIM_WIND_E": 4.0})),
+}
+
+
+@pytest.mark.parametrize("name", REPLACED)
+def test_a_process_killed_as_it_sets_a_damaged_file_aside_loses_none(tmp_path: Path, name: str) -> None:
+    replace, whole = REPLACED[name], tmp_path / "whole" / name
+    replace(Storage(whole.parent))
+    new = whole.read_bytes() if whole.exists() else None
+    number, killed = 0, True
+    while killed:
+        path = tmp_path / str(number) / name
+        storage = Storage(path.parent)
+        path.write_bytes(RUBBISH)
+        killed = killed_at(number, lambda storage=storage: replace(storage))
+        found = path.read_bytes() if path.exists() else None
+        aside = list(path.parent.glob("*.corrupt*"))
+        assert found == RUBBISH or (found == new and len(aside) == 1)
+        assert all(one.read_bytes() == RUBBISH for one in aside), "whole or not at all"
+        replace(Storage(path.parent))  # at the next start
+        assert (path.read_bytes() if path.exists() else None) == new
+        number += 1
+    assert number > 10, "calls at which it was killed"
 
 
 def test_a_seal_is_broken_by_any_byte() -> None:

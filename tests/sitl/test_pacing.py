@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from autopilot.wire.dialect import plumbline as mavlink
 from sitl.pacing import Pacing, percentile
 from sitl.shell import loops
 
@@ -71,27 +72,57 @@ def test_waiting_for_somebody_else_is_not_counted() -> None:
     assert pacing.summary(0) == "250.00 ticks/s, late p50 0 p99 0 max 0 us, 0 of 500 commands missed"
 
 
+class Paced:
+    """A simulator that keeps to a clock, on a machine whose time is told here."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, speed: float) -> None:
+        self.now_ns = 100 * SECOND
+        self.stopped_s = 0.0  # by which the next sleep lasts longer
+        self.said: list[str] = []
+        self.told: list[tuple[str, int]] = []  # to the operators, and how grave it is
+        time = SimpleNamespace(sleep=self._sleep, perf_counter_ns=self._perf_counter_ns)
+        monkeypatch.setattr(loops, "time", time)
+        parameters = SimpleNamespace(say=lambda text, severity: self.told.append((text, severity)))
+        simulator: Any = SimpleNamespace(tick_us=4000, pacing=None, parameters=parameters)
+        self.pacing = Pacing(speed)
+        self._clock = loops.Clock(self.pacing, simulator, self.said.append)
+
+    def _sleep(self, seconds: float) -> None:
+        self.now_ns += round((seconds + self.stopped_s) * SECOND)
+        self.stopped_s = 0.0
+
+    def _perf_counter_ns(self) -> int:
+        self.now_ns += 1000
+        return self.now_ns
+
+    def run(self, ticks: int, work_ms: float = 0.0) -> None:
+        """So many ticks, each of which is so much work."""
+        for _ in range(ticks):
+            self.now_ns += round(work_ms * 1e6)
+            self._clock.wait()
+
+
 def test_a_clock_that_was_stopped_is_not_a_busy_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    now, stopped_s, said = [0], [0.0], list[str]()
+    paced = Paced(monkeypatch, 1.0)
+    paced.run(500)
+    paced.stopped_s = 30.0
+    paced.run(1500)
+    assert paced.said == ["stood still for 30.0 s (SIGSTOP, Ctrl-Z, a debugger, or the machine did)"]
+    assert paced.told == []
+    assert paced.pacing.figures.rate_hz == pytest.approx(250.0, rel=0.01)
+    assert "stalled" not in paced.pacing.summary(0)
 
-    def sleep(seconds: float) -> None:
-        now[0] += round((seconds + stopped_s[0]) * SECOND)
-        stopped_s[0] = 0.0
 
-    def perf_counter_ns() -> int:
-        now[0] += 1000
-        return now[0]
-
-    monkeypatch.setattr(loops, "time", SimpleNamespace(sleep=sleep, perf_counter_ns=perf_counter_ns))
-    simulator: Any = SimpleNamespace(
-        tick_us=4000, pacing=None, parameters=SimpleNamespace(say=lambda text, severity: said.append(text))
-    )
-    pacing = Pacing(1.0)
-    clock = loops.Clock(pacing, simulator, said.append)
-    for tick in range(2000):
-        if tick == 500:
-            stopped_s[0] = 30.0
-        clock.wait()
-    assert said == ["stood still for 30.0 s (SIGSTOP, Ctrl-Z, a debugger, or the machine did)"]
-    assert pacing.figures.rate_hz == pytest.approx(250.0, rel=0.01)
-    assert "stalled" not in pacing.summary(0)
+@pytest.mark.parametrize("speed", [1.0, 4.0])
+def test_a_machine_that_is_too_slow_for_the_clock_is_told(
+    monkeypatch: pytest.MonkeyPatch, speed: float
+) -> None:
+    paced = Paced(monkeypatch, speed)
+    paced.run(round(1500 * speed), work_ms=3.0 / speed)
+    assert (paced.said, paced.told) == ([], []), "in time"
+    began_ns = paced.now_ns
+    paced.run(round(1500 * speed), work_ms=8.0 / speed)
+    assert paced.now_ns - began_ns == pytest.approx(12 * SECOND, rel=0.01), "slower, and not behind"
+    text = f"Machine busy: clock at {0.5 * speed:.2f} x, not {speed:g} x"
+    assert paced.told == [(text, mavlink.MAV_SEVERITY_NOTICE)] * 2, "again after ten seconds"
+    assert paced.said == [text.lower()] * 2

@@ -170,8 +170,8 @@ def test_waiting_for_the_autopilot_is_no_busy_machine(port: int) -> None:
     output, errors = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, errors) == (0, "")
     assert re.search(r"^sitl: waited 1\.\d s for the autopilot$", output, re.MULTILINE)
-    share = re.search(r"machine busy: clock at (\d\.\d\d)", output)
-    assert share is None or float(share[1]) > 0.5, output
+    speed = re.search(r"machine busy: clock at (\d\.\d\d)", output)
+    assert speed is None or float(speed[1]) > 0.1, output
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import pytest
 
 from autopilot.guidance.legs import Hold, Transfer
 from autopilot.services import identity, requests
+from autopilot.services.records import Verdict
 from autopilot.supervisor.advance import advance
 from autopilot.supervisor.requests.arming import arming_complaints
 from autopilot.supervisor.requests.decide import decide
@@ -183,7 +184,7 @@ def test_arming_is_denied_with_the_reason_and_can_be_forced(trouble: str) -> Non
     after, verdict = decide(Flight(), R.Arm(True, False), seen, SETTINGS)
     assert (after.phase, verdict.result, verdict.text) == (Phase.DISARMED, DENIED, f"Arming denied: {why}")
     _, told = decide(Flight(), R.RunPrearmChecks(), seen, SETTINGS)
-    assert (told.result, told.text) == (ACCEPTED, why)
+    assert (told.result, told.text, told.warns) == (ACCEPTED, why, True)
     forced, verdict = decide(Flight(), R.Arm(True, True), seen, SETTINGS)
     assert (forced.phase, verdict) == (Phase.ARMED, YES)
 
@@ -196,7 +197,7 @@ def test_what_the_storage_lost_keeps_the_vehicle_from_being_armed() -> None:
 
 def test_a_vehicle_that_stands_still_and_sees_is_ready() -> None:
     assert arming_complaints(Flight(), view(), SETTINGS) == ()
-    assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1].text == "Ready to arm"
+    assert decide(Flight(), R.RunPrearmChecks(), view(), SETTINGS)[1] == Verdict(ACCEPTED, "Ready to arm")
 
 
 @pytest.mark.parametrize("phase", sorted(IN_AIR))

@@ -71,9 +71,10 @@ def arm(flight: Flight, request: Arm, view: View, settings: Settings) -> Decisio
 
 
 def run_checks(flight: Flight, request: RunPrearmChecks, view: View, settings: Settings) -> Decision:
-    """Tell what keeps the vehicle from being armed."""
+    """Tell what keeps the vehicle from being armed: as a warning, by which clients know what is a reason."""
     complaints = arming_complaints(flight, view, settings)
-    return flight, Verdict(mavlink.MAV_RESULT_ACCEPTED, "; ".join(complaints) or "Ready to arm")
+    text = "; ".join(complaints) or "Ready to arm"
+    return flight, Verdict(mavlink.MAV_RESULT_ACCEPTED, text, warns=bool(complaints))
 
 
 def terminate(flight: Flight, request: Terminate, view: View, settings: Settings) -> Decision:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,11 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
+from autopilot.shell.compiling import Part
 from gcs.batch import pool
 from gcs.cli import gcs
 from gcs.sweep import run
-from gcs.sweep.plan import SweepPlan
+from gcs.sweep.plan import PlanError, SweepPlan
 from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.results import cells, flights_of, reach
@@ -283,3 +284,27 @@ def test_flights_that_stand_out_are_the_same_when_they_are_flown_again(short: st
         assert record["load_error_max_m"] == pytest.approx(rows[one["index"]]["load_error_max_m"], rel=5e-3)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 'href="flights/plumbline-worst/report.html"' in page
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_sweep_with_a_part_that_is_not_compiled_says_that_it_compiles(
+    short: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quiet: bool
+) -> None:
+    made: list[str] = []
+    command = ("-n", "1", "-r", "1", "pass")  # of the standard library
+    cold = Part("the sweep's flight", "timeit", command, Path(__file__), "cold", 8.0)
+
+    def prepare(plan: SweepPlan, warm: Callable[[list[Part]], None]) -> None:
+        warm([cold])
+        raise PlanError("not flown")
+
+    monkeypatch.setattr(Part, "ready", property(lambda part: part.mark in made))
+    monkeypatch.setattr(Part, "done", lambda part: made.append(part.mark))
+    monkeypatch.setattr(run, "prepare", prepare)
+    words = ["sweep", short, "--law", "thesis", "--seeds", "1", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(gcs, [*words, *(["--quiet"] if quiet else [])], prog_name="gcs")
+    *said, last = result.stderr.splitlines()
+    assert (made, last) == (["cold"], "gcs: not flown")
+    assert bool(said) is not quiet
+    if said:
+        assert said[0].startswith("gcs: compiling the flight software, once: the sweep's flight, about ")

@@ -1,0 +1,29 @@
+"""Whether the machine was fast enough for a flight in real time, by what its simulator counted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from autopilot.wire.tlog import read_tlog
+
+MOST_MISSED = 1e-3  # share of the commands that may come too late before it is told of
+_MICRO = 1e-6
+
+
+def too_slow(tlog: Path) -> str:
+    """What the simulator counted of commands that came too late, where it is more than one of a thousand."""
+    from autopilot.wire.dialect import plumbline as mavlink
+
+    missed, flown_s, rate_hz = 0, 0.0, 0.0  # the rate by the vehicle's clock, of a second that was in time
+    for _, received in read_tlog(tlog):
+        if received.id == mavlink.MAVLINK_MSG_ID_SIM_STATUS:
+            status = received.message
+            missed, flown_s = status.missed, status.time_usec * _MICRO
+            if status.speed_factor > 0.0:
+                rate_hz = max(rate_hz, status.rate_hz / status.speed_factor)
+    sent = round(flown_s * rate_hz)
+    if not sent or missed <= MOST_MISSED * sent:
+        return ""
+    return (
+        f"the machine was too slow: {missed} of some {sent} commands came too late; try without --real-time"
+    )
