@@ -72,8 +72,9 @@ figures: $(DEV_STAMP) ## fly the figures of README and docs/control.md anew, and
 pictures: $(DEV_STAMP) ## make the pictures of README and docs anew (needs chromium and its driver)
 	$(BIN)/python benchmarks/pictures.py
 
-robustness: $(STAMP) ## fly the sweeps of docs/robustness.md and renew its maps
+robustness: $(DEV_STAMP) ## fly the sweeps of docs/robustness.md and renew its maps and what it says of them
 	$(BIN)/python benchmarks/robustness.py
+	$(BIN)/python tests/documentation/test_robustness.py
 
 bench: $(STAMP) ## measure this machine
 	$(BIN)/python benchmarks/plant_convergence.py

@@ -37,7 +37,6 @@ TOLD = {f"VEH_ATT_{axis}": place for axis, place in OFF_CENTRE.items()}
 SHAKEN = {"SIM_VIB_ACC": 2, "SIM_VIB_GYR": 0.05}
 CORD = {"SIM_CBL_LINKS": 4, "SIM_CBL_MASS": 0.003, "SIM_CABLE_DIAM": 2}
 WINDY = {"SIM_WIND_E": 5, "SIM_GUST_STD": 1}
-ROOM = {"MIS_ROTOR_MARG": 35, "MIS_INFEASIBLE": 1}  # paths made slower, so that they leave 35 % to control
 EFFECTS = (
     Effect("nothing"),
     Effect("wind of 3 m/s", {"SIM_WIND_E": 3}),
@@ -75,9 +74,7 @@ EFFECTS = (
     Effect("`field`", sensors="field"),
     Effect("`heavy`", vehicle="heavy"),
     Effect("`heavy-real`", vehicle="heavy-real"),
-    Effect("`heavy-real`, more room", ROOM, vehicle="heavy-real"),
     Effect("`field`, `heavy-real`, wind 5 m/s, gusts 1 m/s", WINDY, "field", "heavy-real"),
-    Effect("the same with more room", {**WINDY, **ROOM}, "field", "heavy-real"),
 )
 
 

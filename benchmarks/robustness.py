@@ -1,4 +1,5 @@
-"""The sweeps of docs/robustness.md: flies them and renews the maps in docs/images/robustness.
+"""The sweeps of docs/robustness.md: flies them, and renews the maps in docs/images/robustness and the record
+docs/robustness.json, from which `tests/documentation/test_robustness.py` writes what the page says.
 
     python benchmarks/robustness.py [--out DIR] [--docs DIR] [--only NAME ...] [--whole]
 
@@ -9,14 +10,22 @@ and after Ctrl-C the same command goes on. `--whole` adds the sweep of 10 000 fl
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
 import shutil
+import statistics
 import sys
+from collections import Counter
+from itertools import groupby
 from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
 
 from gcs.cli import gcs
 
 ROOT = Path(__file__).resolve().parents[1]
+RECORD = ROOT / "docs" / "robustness.json"
 BOTH = "--law plumbline --law thesis"
 NOISE = "--vary SIM_NOISE_SCALE=0.5,1,2,4,8"
 DELAY = "--vary SIM_ACT_DELAY_MS=0:96:9"
@@ -39,6 +48,43 @@ WHOLE = {
 }
 
 
+def cells(directory: Path, names: list[str]) -> list[dict[str, Any]]:
+    """What came of each setting with each law: how many flights, how many of them home with which errors
+    (mm), and in which phases the others were lost."""
+    rows = pq.read_table(directory / "flights.parquet").to_pylist()
+
+    def setting(row: dict[str, Any]) -> tuple[Any, ...]:
+        return (row["law"], *(row[name] for name in names))
+
+    found = []
+    for (law, *values), group in groupby(sorted(rows, key=setting), key=setting):
+        flights = list(group)
+        errors = [1e3 * row["load_error_max_m"] for row in flights if row["outcome"] == "completed"]
+        lost = Counter(row["lost_phase"] for row in flights if row["outcome"] != "completed")
+        found.append(
+            {
+                "law": law,
+                **dict(zip(names, values, strict=True)),
+                "flown": len(flights),
+                "completed": len(errors),
+                "median_mm": round(statistics.median(errors), 1) if errors else None,
+                "worst_mm": round(max(errors), 1) if errors else None,
+                "lost": dict(sorted(lost.items())),
+            }
+        )
+    return found
+
+
+def keep(record: dict[str, list[dict[str, Any]]]) -> None:
+    """Put what was flown into the record, a line for each cell."""
+    stored = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.is_file() else {}
+    parts = []
+    for name, found in {**stored, **record}.items():
+        lines = ",\n".join(f"  {json.dumps(cell)}" for cell in found)
+        parts.append(f" {json.dumps(name)}: [\n{lines}\n ]")
+    RECORD.write_text("{\n" + ",\n".join(parts) + "\n}\n", encoding="utf-8")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("sweeps/robustness"))
@@ -57,6 +103,9 @@ def main() -> int:
         except SystemExit as end:
             if end.code:
                 return int(end.code)
+        if name in SWEEPS:
+            varied = [words[i + 1].split("=")[0] for i, word in enumerate(words) if word == "--vary"]
+            keep({name: cells(directory, varied)})
         options.docs.mkdir(parents=True, exist_ok=True)
         maps = sorted(directory.glob("map-*.png")) if name in SWEEPS else []
         for picture in maps or sorted(directory.glob("curve-*.png")):

@@ -35,12 +35,11 @@ def pytest_collection_finish() -> None:
 def shaped_once() -> Iterator[None]:
     """Each path is shaped once, whoever flies or checks it: shaping takes longer than most tests, and the
     same path leads to the same bits."""
-    from autopilot.trajectory import feasibility, prepare
+    from autopilot.trajectory import prepare
 
     shape = cache(prepare.shape)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(prepare, "shape", shape)
-        patch.setattr(feasibility, "shape", shape)
         yield
 
 

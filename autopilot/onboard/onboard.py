@@ -53,6 +53,7 @@ from autopilot.services.records import (
     MissionChanged,
     ParameterChanged,
     Verdict,
+    WorldAsked,
 )
 from autopilot.services.requests import (
     FLOWN,
@@ -576,17 +577,17 @@ class Onboard:
                     self._take_plan(mission)
                 case AreasChanged(kind, items):
                     self.take_areas(kind, items)
-                case ParameterChanged(name, value):
-                    self._world.changed(name, value)
+                case WorldAsked(name, value):
+                    self._world.ask(name, value)
                 case _:
                     pass  # the shell waits for it, stores it, or shows it
         return [event for event in events if self._outlives(event)]
 
     def _outlives(self, event: Event) -> bool:
-        """Whether the shell is to store it: not the parameters of the world, nor the loss of the link."""
-        return not isinstance(event, ParameterChanged) or (
-            event.name not in self.parameters.learned and self.parameters.describe(event.name).stored
-        )
+        """Whether the shell is to store it: not what is asked of the world, nor the loss of the link."""
+        if isinstance(event, ParameterChanged):
+            return self.parameters.describe(event.name).stored
+        return not isinstance(event, WorldAsked)
 
     def ground_datagrams(self) -> list[tuple[Link, bytes]]:
         """What is due on the ground links at this tick."""

@@ -1,8 +1,8 @@
 """The simulator's SIM_* parameters, shown to ground stations as if they were ours.
 
 They are learned over the simulator link, once it is up; a ground station's PARAM_SET is handed on, and what
-the simulator then says is what holds. They describe a world, not the autopilot, and are stored only where
-PREFLIGHT_STORAGE asks for it; then they are set again in every simulator that is met.
+the simulator then says is what holds, and the answer. They describe a world, not the autopilot, and are
+stored only where PREFLIGHT_STORAGE asks for it; then they are set again in every simulator that is met.
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ class WorldParameters:
         self._restored: Mapping[str, float] = {}
         self._wanted: dict[str, tuple[float, int]] = {}  # value, and when it is sent (again)
 
-    def changed(self, name: str, value: float) -> None:
-        """A ground station set a parameter."""
-        if name in self._table.learned:
-            self._wanted[name] = (value, 0)
+    def ask(self, name: str, value: float) -> None:
+        """Set a parameter in the simulator."""
+        self._wanted[name] = (value, 0)
 
     def restore(self, values: Mapping[str, float]) -> None:
         """Set these in the simulator as soon as it has told that it has them."""
         self._restored = values
 
     def receive(self, message: Any) -> str | None:
-        """Take a message of the simulator in; the name of a value that differs from what we have told."""
+        """Take a message of the simulator in; the name of a value that is to be told: it is the answer to
+        what was asked for, or another one than we have told."""
         if message.get_msgId() != mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             return None
         name: str = message.param_id
         value = decimal_from_float32(message.param_value)
         self._heard.add(name)
         self._complete = len(self._heard) >= message.param_count
-        self._wanted.pop(name, None)
+        asked = self._wanted.pop(name, None) is not None
         if name in self._table.learned:
-            if self._table[name] == value:
-                return None
-            self._table.set(name, value)
-            return name
+            new = self._table[name] != value
+            if new:
+                self._table.set(name, value)
+            return name if new or asked else None
         if name in self._table or not name.startswith("SIM_") or not abs(value) <= _ANYTHING:
             return None
         text = "Of the simulator, which knows its range"

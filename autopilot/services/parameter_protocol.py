@@ -3,6 +3,7 @@ an INT32 where the identity says so.
 
 Lists go out at a steady pace for each link; whoever misses an index asks for it again. A set is answered with
 the value that is really stored, to every link if it is a new one, so that no ground station shows an old one.
+One of the simulator's is answered when that has said what holds: it alone knows the range.
 
 Where values travel by their bits, as from PX4, a list begins with PX4's `_HASH_CHECK`: a ground station that
 has kept parameters of this hash sends it back, and the list ends there.
@@ -23,6 +24,7 @@ from autopilot.services.records import (
     Peer,
     Say,
     Send,
+    WorldAsked,
     WorldSaved,
 )
 from autopilot.services.streams import NEVER_US
@@ -101,6 +103,8 @@ class ParameterService:
             self.table.describe(name).checked(value)
         except ParameterError as error:
             return self._refused(name, OUT_OF_RANGE, str(error), peer)
+        if name in self.table.learned:
+            return [WorldAsked(name, value)]
         try:
             after = self.table.set(name, value)
         except ParameterError as error:  # in range, but fixed while running
@@ -112,9 +116,13 @@ class ParameterService:
     def reset(self) -> list[Output]:
         """Every parameter back to its default, but for those that are fixed while running."""
         outputs: list[Output] = []
-        kept = 0
+        count = kept = 0
         for name, value in self.table.changed().items():
             default = self.table.describe(name).default
+            if name in self.table.learned:
+                outputs.append(WorldAsked(name, default))
+                count += 1
+                continue
             try:
                 self.table.set(name, default)
             except ParameterError:
@@ -122,7 +130,8 @@ class ParameterService:
                 continue
             if self.table[name] != value:
                 outputs += [Send(None, self.value_message(name)), ParameterChanged(name, default)]
-        text = f"{len(outputs) // 2} parameters are at their default again"
+                count += 1
+        text = f"{count} parameters are at their default again"
         if kept:
             text += f"; {kept} are fixed while running"
         return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
@@ -133,7 +142,7 @@ class ParameterService:
             return None
         before = int(self.table[name])
         after = self.table.set(name, before | bits if fail else before & ~bits)
-        return [Send(None, self.value_message(name)), ParameterChanged(name, after)]
+        return [WorldAsked(name, after)]
 
     def world(self) -> WorldSaved:
         """What the simulator's parameters are now."""

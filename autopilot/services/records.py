@@ -75,6 +75,14 @@ class ParameterChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class WorldAsked:
+    """A parameter of the simulator is to be `value`; what it then says is what holds, and is told."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
 class MissionChanged:
     """A whole mission was accepted in place of the last one, or the mission was cleared (no items)."""
 
@@ -128,6 +136,7 @@ class ServiceFailed:
 
 Event = (
     ParameterChanged
+    | WorldAsked
     | MissionChanged
     | AreasChanged
     | TimesyncAnswered

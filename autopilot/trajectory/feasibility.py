@@ -27,10 +27,10 @@ from autopilot.trajectory.peaks import (
     survey_signals,
     survey_transfer,
 )
-from autopilot.trajectory.prepare import REFUSE, Limits, prepare, trouble_of
+from autopilot.trajectory.prepare import REFUSE, Limits, prepare, shaped_path
 from autopilot.trajectory.rotor_demand import Bounds
 from autopilot.trajectory.route import PlanError, Planner
-from autopilot.trajectory.shaping import Shaped, path_jets, shape
+from autopilot.trajectory.shaping import Shaped, path_jets
 from autopilot.trajectory.signals import evaluate, joints, signal_table
 from autopilot.trajectory.timeline import MissionState, TimelineEntry, timeline
 from autopilot.trajectory.waypoint_path import Passage, passage_jets
@@ -57,8 +57,9 @@ _NUMBERS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 class VehicleLimits:
     """The vehicle that is to fly, and what is asked of it at most.
 
-    `thrust_reserve` is the share of the total thrust kept free for control. `speed_m_s` (until the mission
-    sets its own) and `accel_m_s2` are the peaks of transfers.
+    `thrust_reserve` is the share of the total thrust kept free for control, `rotor_margin` that of each
+    rotor's range beside either limit along shaped paths. `speed_m_s` (until the mission sets its own) and
+    `accel_m_s2` are the peaks of transfers; `when_infeasible` is what becomes of a path that cannot be had.
     """
 
     vehicle: Vehicle
@@ -66,6 +67,8 @@ class VehicleLimits:
     tilt_max_rad: float = radians(45.0)
     speed_m_s: float = 1.5
     accel_m_s2: float = 1.5
+    rotor_margin: float = ROTOR_MARGIN
+    when_infeasible: int = REFUSE
 
     @property
     def body(self) -> Body:
@@ -102,7 +105,7 @@ class VehicleLimits:
     def shaping(self) -> Limits:
         """What the autopilot shapes paths to, as delivered: its MIS_ parameters."""
         vehicle = self.vehicle
-        margin = ROTOR_MARGIN * (vehicle.rotor_max_n - vehicle.rotor_min_n)
+        margin = self.rotor_margin * (vehicle.rotor_max_n - vehicle.rotor_min_n)
         bounds = Bounds(
             vehicle.rotor_min_n + margin if vehicle.limited else -inf,
             vehicle.rotor_max_n - margin if vehicle.limited else inf,
@@ -111,7 +114,14 @@ class VehicleLimits:
             vehicle.rotor_tau_s,
         )
         return Limits(
-            self.body, bounds, True, SHAPING_M, REFUSE, self.speed_m_s, self.accel_m_s2, time_optimal=False
+            self.body,
+            bounds,
+            True,
+            SHAPING_M,
+            self.when_infeasible,
+            self.speed_m_s,
+            self.accel_m_s2,
+            time_optimal=False,
         )
 
 
@@ -130,6 +140,7 @@ class PathReport:
     rotor_high_n: float
     tension_low_n: float
     tilt_deg: float
+    slowed: float = 1.0  # times as long as asked
 
     def __str__(self) -> str:
         near = ""
@@ -137,6 +148,8 @@ class PathReport:
             near = ", as asked"
         elif self.kind == "signals":
             near = f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
+        if self.slowed != 1.0:
+            near = f", {self.slowed:.2f} times as long as asked{near.removesuffix(' asked')}"
         return (
             f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; "
             f"rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, "
@@ -182,7 +195,7 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
             if shaped and not jumps:
                 along = _survey(entry, limits)
                 assert along is not None
-                trouble = trouble_of(shape(entry.step, limits.body, limits.shaping.bounds), limits.shaping)
+                trouble = shaped_path(entry.step, limits.shaping).trouble
                 low = list(_judge(entry, along, limits))
                 if not trouble:
                     found += [v for v in low if v.quantity == "height"]
@@ -227,6 +240,7 @@ def paths(
     found = []
     for entry in _timeline(mission, limits):
         made, distance, along = prepared.made[entry.item], 0.0, None
+        slowed = made.slowed if isinstance(made, Shaped) else 1.0
         if entry.before.released or isinstance(entry.step, Winch | Land):
             continue
         if isinstance(made, Shaped):
@@ -242,11 +256,13 @@ def paths(
             along = _survey(entry, limits)
             duration_s = entry.duration_s if isinstance(entry.step, AttitudeRun) else entry.transfer_s
         if along is not None:
-            found.append(_path_report(entry, duration_s, distance, along))
+            found.append(_path_report(entry, duration_s, distance, along, slowed))
     return found
 
 
-def _path_report(entry: TimelineEntry, duration_s: float, distance_m: float, along: Peaks) -> PathReport:
+def _path_report(
+    entry: TimelineEntry, duration_s: float, distance_m: float, along: Peaks, slowed: float
+) -> PathReport:
     return PathReport(
         entry.item,
         KINDS[type(entry.step)],
@@ -256,6 +272,7 @@ def _path_report(entry: TimelineEntry, duration_s: float, distance_m: float, alo
         along.rotor_high.value,
         along.tension_low.value,
         degrees(along.tilt.value),
+        slowed,
     )
 
 

@@ -85,19 +85,14 @@ def prepare(
         if not limits.shaped:
             made.append(unshaped(step))
             continue
-        found = shape(step, limits.body, limits.bounds)
-        trouble = trouble_of(found, limits)
-        if trouble and limits.when_infeasible == SLOW_DOWN:
-            slowed = slow_down(step, limits)
-            if slowed is not None:
-                notes.append(f"Item {item} flown {slowed.slowed:.2f} times as long: {trouble}")
-                found, trouble = slowed, ""
-        if trouble:
+        found = shaped_path(step, limits)
+        if found.slowed_for:
+            notes.append(f"Item {item} flown {found.path.slowed:.2f} times as long: {found.slowed_for}")
+        if found.trouble:
             if limits.when_infeasible != AS_ASKED:
-                refusal = refusal or f"item {item}: {trouble}"
-            notes.append(f"Item {item}: {trouble}")
-            found = unshaped(step)
-        made.append(found)
+                refusal = refusal or f"item {item}: {found.trouble}"
+            notes.append(f"Item {item}: {found.trouble}")
+        made.append(unshaped(step) if found.trouble else found.path)
     least = tuple(_transfer_times(entries, limits)) if limits.shaped else ()
     return Prepared(tuple(made), tuple(notes), refusal, least_s=least)
 
@@ -211,6 +206,25 @@ def trouble_of(found: Shaped, limits: Limits) -> str:
     return ""
 
 
+class ShapedPath(NamedTuple):
+    """The path that is flown of signals; what forbids it as asked (`slowed_for`) or at all (`trouble`)."""
+
+    path: Shaped
+    trouble: str = ""
+    slowed_for: str = ""
+
+
+def shaped_path(step: Signals, limits: Limits) -> ShapedPath:
+    """Signals shaped to the vehicle, slowed down where that is wanted and needed."""
+    found = shape(step, limits.body, limits.bounds)
+    trouble = trouble_of(found, limits)
+    if trouble and limits.when_infeasible == SLOW_DOWN:
+        slowed = slow_down(step, limits)
+        if slowed is not None:
+            return ShapedPath(slowed, slowed_for=trouble)
+    return ShapedPath(found, trouble)
+
+
 def slow_down(step: Signals, limits: Limits) -> Shaped | None:
     """The signals no slower than they must be, to a few percent; None if no slower ones will do either."""
 
@@ -218,12 +232,16 @@ def slow_down(step: Signals, limits: Limits) -> Shaped | None:
         found = shape(slower(step, factor), limits.body, limits.bounds)
         return None if trouble_of(found, limits) else replace(found, slowed=factor)
 
+    # a path that cannot be flown takes the longest to be found so: few are tried
     low, best = 1.0, None
-    for factor in _SLOWER:
-        best = tried(factor)
-        if best is not None:
-            break
-        low = factor
+    factors = list(_SLOWER)
+    while factors:
+        half = (len(factors) - 1) // 2
+        found = tried(factors[half])
+        if found is None:
+            low, factors = factors[half], factors[half + 1 :]
+        else:
+            best, factors = found, factors[:half]
     if best is None:
         return None
     for _ in range(_HALVINGS):

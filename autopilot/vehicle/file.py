@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.vehicle.model import Vehicle
+from autopilot.wire.parameter_names import unknown_parameter
+from autopilot.wire.parameter_table import ParameterError
 from missions.toml_files import FileError, TomlFiles, shown
 
 
@@ -27,23 +29,51 @@ def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:
     """What flies: the vehicle of a shipped name (`bebop`) or of a file; a VehicleFileError says what is
     wrong."""
     keys, where = vehicle_keys(name_or_path)
-    return VEHICLES.record(Vehicle, keys, where)
+    found = VEHICLES.record(Vehicle, keys, where)
+    wrong = [f"{where}: parameters.{line}" for line in _wrong_parameters(found)]
+    if wrong:
+        raise VehicleFileError(wrong)
+    return found
 
 
 def load_belief(name_or_path: str | PathLike[str]) -> Vehicle:
-    """What the autopilot takes it for; a VehicleFileError says what is wrong with either."""
+    """What the autopilot takes it for, with the parameters of either; a VehicleFileError says what is wrong
+    with one of them."""
     table, where = _table(name_or_path)
     believed = _believed(table, name_or_path)
     if not believed:
         return load_vehicle(name_or_path)
     with _told_of(where, table):
-        return load_vehicle(believed)
+        belief = load_vehicle(believed)
+    if "parameters" not in table:
+        return belief
+    own = load_vehicle(name_or_path).parameters
+    return belief.model_copy(update={"parameters": {**belief.parameters, **own}})
 
 
 def belief_of(name_or_path: str | PathLike[str]) -> str | PathLike[str]:
     """Name or path of the vehicle that is believed: that which is named, or its own."""
     table, _ = _table(name_or_path)
     return _believed(table, name_or_path) or name_or_path
+
+
+def _wrong_parameters(vehicle: Vehicle) -> Iterator[str]:
+    """What cannot be of the parameters with which a vehicle is delivered."""
+    if not vehicle.parameters:
+        return
+    from autopilot.vehicle.parameters import definitions, vehicle_values
+
+    known = definitions().parameters
+    for name, value in vehicle.parameters.items():
+        if name not in known:
+            yield unknown_parameter(name, known)
+        elif known[name].from_vehicle:
+            yield f"{name}: is {known[name].from_vehicle}; write that key instead"
+        else:
+            try:
+                known[name].parameter(name, vehicle_values(vehicle)).checked(value)
+            except ParameterError as error:
+                yield str(error)
 
 
 def vehicle_keys(name_or_path: str | PathLike[str]) -> tuple[dict[str, Any], str]:

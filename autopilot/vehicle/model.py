@@ -97,6 +97,12 @@ class Vehicle(BaseModel):
         description="rotors at any places, each a table [[rotor]], in place of `rotors`, `frame` and `spin`",
     )
 
+    parameters: dict[str, float] = Field(
+        {},
+        description="parameters of the autopilot with which this vehicle is delivered, a table [parameters] "
+        "with names and values; beside a belief they are the autopilot's too",
+    )
+
     # the gains that grow with the mass (QP_) end at 62 kg
     quad_mass_kg: float = _quantity("kg", 0.01, 60.0, "mass of the vehicle without its load")
     load_mass_kg: float = _quantity("kg", 0.001, 100.0, "mass of the load")

@@ -85,12 +85,16 @@ class AutopilotParameters(ParameterTable):
 def autopilot_parameters(
     belief: Vehicle, law: str = "", brought: Iterable[Parameter] = ()
 ) -> AutopilotParameters:
-    """The table, with the vehicle's numbers taken from `belief`.
+    """The table, with the vehicle's numbers and the parameters it is delivered with taken from `belief`.
 
     `law`: the name of a law that somebody has brought, to which CTL_LAW is set. What somebody has brought has
     `brought` these parameters along; ParameterError if one of them is there already.
     """
-    found = definitions().definitions(vehicle_values(belief))
+    delivered = belief.parameters
+    found = [
+        replace(one, default=one.checked(delivered[one.name])) if one.name in delivered else one
+        for one in definitions().definitions(vehicle_values(belief))
+    ]
     if law:
         found = [_with_law(one, law) if one.name == "CTL_LAW" else one for one in found]
     return AutopilotParameters([*found, *brought], belief.layout)

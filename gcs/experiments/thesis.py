@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gcs.analysis.record import Record
-from gcs.errors import GcsError
+from gcs.errors import InputError
 from gcs.experiments.figures.canvas import Scene
 from gcs.experiments.figures.catalogue import Drawn, draw_figures, wanted
 from gcs.experiments.flown import read_flown
@@ -86,18 +86,26 @@ KEY_FIGURES = (
 _COLOURS = 192  # of a line drawing: half the bytes, and the eye sees no difference
 
 
+def around_tables(page: Path) -> tuple[str, str]:
+    """What stands before and behind the markers of a page of the documentation; InputError if it has none."""
+    try:
+        text = page.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"--docs {page}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"--docs {page}: not a text file in UTF-8") from None
+    head, begin, rest = text.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not begin or not end:
+        raise InputError(f"--docs {page}: must hold the lines {BEGIN} and {END}")
+    return head, tail
+
+
 def write_docs(page: Path, out: Path, records: Sequence[Record]) -> None:
     """Put the tables between the markers of `page`, and the key figures into images/thesis beside it."""
     from PIL import Image
 
-    try:
-        text = page.read_text(encoding="utf-8")
-    except OSError as error:
-        raise GcsError(f"--docs {page}: {error.strerror}") from None
-    head, begin, rest = text.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not begin or not end:
-        raise GcsError(f"--docs {page}: must hold the lines {BEGIN} and {END}")
+    head, tail = around_tables(page)
     page.write_text(f"{head}{BEGIN}\n\n{markdown(records)}\n{END}{tail}", encoding="utf-8")
     images = page.parent / "images" / "thesis"
     images.mkdir(parents=True, exist_ok=True)

@@ -30,5 +30,6 @@ def note_flyable(mission: Mission, vehicle: str, shaped: bool) -> None:
 
 
 def _part(mission: Mission, vehicle: str, shaped: bool) -> str:
-    what = (mission.steps, VEHICLES.read(belief_of(vehicle)).text, shaped)
+    texts = [VEHICLES.read(one).text for one in (vehicle, belief_of(vehicle))]
+    what = (mission.steps, texts, shaped)
     return f"flies-{hashlib.sha256(repr(what).encode()).hexdigest()[:16]}"

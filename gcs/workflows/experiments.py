@@ -14,7 +14,7 @@ from gcs.experiments.plan import Experiment, experiments
 from gcs.experiments.run import Ended, fly_missing, missing, start
 from gcs.experiments.store import experiment_origin
 from gcs.experiments.table import tables
-from gcs.experiments.thesis import FLIGHTS, Report, make_directory, write_docs, write_report
+from gcs.experiments.thesis import FLIGHTS, Report, around_tables, make_directory, write_docs, write_report
 from gcs.folders import reserved
 from gcs.shell.display import StepDisplay
 from gcs.shell.processes import Child
@@ -27,6 +27,8 @@ def fly_thesis(out: Path, jobs: int | None, docs: Path | None, fresh: bool, quie
 
     StoppedError if somebody stopped it; what is flown stays. `docs` is a page of the documentation to renew.
     """
+    if docs is not None:
+        around_tables(docs)  # it is told before the flights what would be told behind them
     make_directory(out)
     plan, flights = experiments(), out / FLIGHTS
     with reserved(out, "gcs experiments"), StopRequest(STOPPING) as stop:

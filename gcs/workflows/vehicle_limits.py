@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from autopilot.trajectory.feasibility import VehicleLimits
 from autopilot.vehicle.file import VehicleFileError, load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.errors import input_error
 
 
 def load_limits(name_or_path: str) -> VehicleLimits:
     """The limits of a shipped vehicle or of a vehicle file; GcsError says what is wrong with it."""
     try:
-        return VehicleLimits(load_belief(name_or_path))
+        belief = load_belief(name_or_path)
     except VehicleFileError as error:
         raise input_error(error) from None
+    table = autopilot_parameters(belief)
+    return VehicleLimits(
+        belief,
+        rotor_margin=0.01 * table["MIS_ROTOR_MARG"],
+        when_infeasible=int(table["MIS_INFEASIBLE"]),
+    )

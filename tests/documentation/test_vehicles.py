@@ -34,6 +34,9 @@ of these names or the path of a file of your own; copy one of them. All of them 
   ([realism-plant.md](realism-plant.md)); the heights at which vehicle and load rest are its `EST_GEAR_H` and
   `EST_LOAD_H`.
 * `gcs check` judges missions by it: masses, cable, rotors, and the drag of the vehicle.
+* A table `[parameters]` has parameters of the autopilot with which the vehicle is delivered, as an airframe
+  file of other autopilots. `heavy-real` brings `MIS_ROTOR_MARG` 40 and `MIS_INFEASIBLE` 1: its paths leave
+  room for what nobody knows of it, and are flown slower where they must be. What is set counts before them.
 
 Truth and belief are two values of the same record. Where they are to differ
 
@@ -49,6 +52,9 @@ believed = "bebop"                     # a shipped name, or a file beside this o
 rotor_tau_s = 0.030
 attachment_m = [0.008, -0.004, -0.020]
 downwash = 1.0
+
+[parameters]                           # of the autopilot
+MIS_ROTOR_MARG = 30
 ```
 
 ## Keys
@@ -123,7 +129,7 @@ What is wrong is told like this, by every program:
 WHAT = {
     "bebop-real": "a Bebop as it may really be, believed to be `bebop`: late rotors that drag, sag and blow "
     "on the load, the cable a centimetre off ([realism-plant.md](realism-plant.md))",
-    "heavy-real": "the same of `heavy`",
+    "heavy-real": "the same of `heavy`, whose paths leave room for it",
     "bebop": "the default: a Parrot Bebop with a load, Table 4-1 of the thesis, assumed where that is silent",
     "heavy": "2 kg with a load of 0.5 kg on 2 m of cable: no real vehicle, sizes as such vehicles have them",
     "hexarotor": "5 kg with a load of 1.5 kg on 1 m of cable: no real vehicle either; it lands with its load "
@@ -149,6 +155,7 @@ RANGES = {
     "frame": "`plus` or `x`",
     "spin": "text",
     "rotor": "up to 14 tables",
+    "parameters": "names and values of [parameters.md](parameters.md)",
     "rotors": f"{FEWEST} ... {MOST}",
     "rotor_min_n": f"{-GREATEST_FORCE_N:g} ... {GREATEST_FORCE_N:g}, or -inf",
     "rotor_max_n": f"{LEAST_ROTOR_MAX_N:g} ... {GREATEST_FORCE_N:g}, or inf",
@@ -178,7 +185,7 @@ def row(key: str, field: FieldInfo) -> str:
         default = "the centre"
     elif isinstance(field.default, bool):
         default = f"`{str(field.default).lower()}`"
-    elif key in ("frame", "spin", "rotor", "believed"):
+    elif key in ("frame", "spin", "rotor", "believed", "parameters"):
         default = f"`{field.default}`" if field.default and not field.is_required() else ""
     else:
         default = "" if field.is_required() else f"{field.default:g}"

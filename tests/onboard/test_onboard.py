@@ -327,6 +327,22 @@ def test_the_saved_world_is_set_again_in_the_simulator() -> None:
     assert "SIM_NO_SUCH" not in craft.onboard.parameters
 
 
+def test_what_the_simulator_refuses_is_never_said_to_be_set() -> None:
+    craft = Craft()
+    craft.wait(1.0)
+    for asked, told in ((-5.0, 0.1), (0.2, 0.2), (0.2, 0.2)):
+        craft.heard.clear()
+        message = mavlink.MAVLink_param_set_message(
+            1, 1, b"SIM_LOAD_MASS", asked, mavlink.MAV_PARAM_TYPE_REAL32
+        )
+        craft.send(message)
+        craft.wait(0.1)
+        values = [one.param_value for one in craft.heard if one.get_type() == "PARAM_VALUE"]
+        assert values == [pytest.approx(told)], asked
+        refused = "SIM_LOAD_MASS = -5.0 kg; must be 0.001 ... 10"
+        assert (refused in craft.texts) == (asked < 0.0)
+
+
 def test_the_loss_of_the_link_is_set_and_taken_back_whatever_is_lost_and_not_stored() -> None:
     craft = Craft()
     craft.wait(0.1)

@@ -17,7 +17,7 @@ from autopilot.services.parameter_protocol import (
     TYPE_MISMATCH,
     ParameterService,
 )
-from autopilot.services.records import ParameterChanged, Peer
+from autopilot.services.records import ParameterChanged, Peer, WorldAsked
 from autopilot.services.streams import NEVER_US
 from autopilot.wire.codec import payload_of
 from autopilot.wire.dialect import plumbline as m
@@ -264,6 +264,19 @@ def test_a_real_number_for_a_whole_one_is_taken_if_it_is_whole(rig):
     service.receive_set(set_(b"WHOLE", 5.5), peer, 0, rig.decide)
     service.receive_set(set_(b"LOAD_MASS", bits(1), INT32), peer, 0, rig.decide)
     assert (service.table["WHOLE"], service.table["LOAD_MASS"]) == (5.0, 0.1)
+
+
+def test_what_the_simulator_is_asked_for_is_answered_when_it_has_said_what_holds(rig):
+    rig.table.learn(Parameter("SIM_WIND_E", 0.5, -1e9, 1e9, "", ""))
+    assert rig.replies(set_(b"SIM_WIND_E", 500.0)) == []
+    assert rig.events == [WorldAsked("SIM_WIND_E", 500.0)]
+    assert rig.table["SIM_WIND_E"] == 0.5
+    refusal = {x.get_type() for x in rig.replies(set_(b"SIM_WIND_E", 2e9))}
+    assert refusal == {"STATUSTEXT", "PARAM_ERROR", "PARAM_VALUE"}
+    rig.table.set("SIM_WIND_E", 3.0)
+    rig.send(m.MAVLink_command_long_message(1, 1, m.MAV_CMD_PREFLIGHT_STORAGE, 0, 2, *(0.0,) * 6))
+    assert WorldAsked("SIM_WIND_E", 0.5) in rig.events
+    assert rig.table["SIM_WIND_E"] == 3.0
 
 
 def test_a_list_waits_until_the_table_is_complete(rig):

@@ -13,7 +13,16 @@ from hypothesis import strategies as st
 from autopilot.trajectory import prepare as preparation
 from autopilot.trajectory.convex import NO_ROWS, Goal, Problem
 from autopilot.trajectory.peaks import Body
-from autopilot.trajectory.prepare import AS_ASKED, REFUSE, SLOW_DOWN, Limits, prepare, slow_down, trouble_of
+from autopilot.trajectory.prepare import (
+    AS_ASKED,
+    REFUSE,
+    SLOW_DOWN,
+    Limits,
+    prepare,
+    shaped_path,
+    slow_down,
+    trouble_of,
+)
 from autopilot.trajectory.rotor_demand import COS_TILT, TENSION, Bounds, commanded, demand, slopes
 from autopilot.trajectory.shaping import HELD_M, INTERVAL_S, Shaped, asked_jets, path_jets, unshaped
 from autopilot.trajectory.splines import Array, Basis
@@ -151,6 +160,19 @@ def test_preparation_slows_refuses_or_flies_as_asked() -> None:
             assert_within(made)
         else:
             assert len(made.pieces) == 0
+
+
+def test_what_no_time_makes_flyable_is_found_so_by_few_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+    hasty, tried = edge(*HASTY), []
+    hopeless = replace(unshaped(hasty), reason="no way")
+
+    def never(step: Signals, *_: object) -> Shaped:
+        tried.append(step)
+        return hopeless
+
+    monkeypatch.setattr(preparation, "shape", never)
+    assert shaped_path(hasty, LIMITS._replace(when_infeasible=SLOW_DOWN)) == (hopeless, "no way", "")
+    assert len(tried) == 5, "as asked, and four of eight times as long: the half, and the half of the rest"
 
 
 def test_slowing_down_is_no_slower_than_it_must_be() -> None:

@@ -83,7 +83,7 @@ def test_a_shipped_file_states_every_key_and_is_read_as_written(name):
         assert EFFECTS.keys() - {"air_density_kg_m3", "rotor_radius_m"} <= table.keys()
     read = load_vehicle(name).model_dump()
     assert {key: list(v) if isinstance(v, tuple) else v for key, v in read.items()} == {
-        **{"rotors": 4, "frame": "plus", "spin": "", "rotor": [], "believed": ""},
+        **{"rotors": 4, "frame": "plus", "spin": "", "rotor": [], "believed": "", "parameters": {}},
         **EFFECTS,
         "rotor_radius_m": SHARE_OF_ARM["rotor_radius_m"] * table["arm_m"],
         **CABLE_OF_LINKS,
@@ -100,6 +100,8 @@ def test_a_vehicle_written_out_is_read_back(name, tmp_path):
             return str(list(value))
         if isinstance(value, bool):
             return str(value).lower()
+        if isinstance(value, dict):
+            return f"{{{', '.join(f'{key} = {number}' for key, number in value.items())}}}"
         return f'"{value}"' if isinstance(value, str) else str(value)
 
     text = "\n".join(f"{key} = {toml(value)}" for key, value in vehicle.model_dump().items())
@@ -296,7 +298,7 @@ def test_what_the_file_may_say_both_programs_can_take(numbers, forces, inertia):
 
 
 def test_every_field_of_the_truth_is_the_key_that_begins_with_its_name():
-    beside = ("name", "believed", "rotors", "frame", "spin", "rotor", "inertia_kg_m2")
+    beside = ("name", "believed", "parameters", "rotors", "frame", "spin", "rotor", "inertia_kg_m2")
     elsewhere = {"attachment_m", *AIR_KEYS.values(), *DRIVE_KEYS.values(), *CHAIN_KEYS.values()}
     keys = [key for key in Vehicle.model_fields if key not in beside and key not in elsewhere]
     numbers = {key: float(place) for place, key in enumerate(keys)}  # all different
@@ -352,6 +354,38 @@ def test_a_truth_beside_a_belief_is_flown_and_not_believed(tmp_path):
     assert load_belief(tmp_path / "foo.toml") == load_vehicle("bebop")
     assert belief_of("heavy-real") == "heavy"
     assert belief_of("heavy") == "heavy"
+
+
+def test_a_vehicle_is_delivered_with_parameters(tmp_path):
+    """Its own, before those of what it is believed to be; all else is as anywhere."""
+    (tmp_path / "believed.toml").write_text(BEBOP + "[parameters]\nMIS_SPEED = 2.0\nMIS_ACCEL = 0.5\n")
+    truth = loaded(tmp_path, 'believed = "believed.toml"\n[parameters]\nMIS_SPEED = 1\n')
+    assert truth.parameters == {"MIS_SPEED": 1.0}
+    belief = load_belief(tmp_path / "foo.toml")
+    table = autopilot_parameters(belief)
+    usual = autopilot_parameters(load_vehicle("bebop"))
+    assert (table["MIS_SPEED"], table["MIS_ACCEL"]) == (1.0, 0.5)
+    assert table.describe("MIS_SPEED").default == 1.0, "which a report does not call changed"
+    others = [name for name in usual.values() if name not in ("MIS_SPEED", "MIS_ACCEL")]
+    assert [table[name] for name in others] == [usual[name] for name in others]
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("MIS_SPED = 1.0", "parameters.MIS_SPED: no such parameter; did you mean MIS_SPEED?"),
+        ("MIS_SPEED = 99.0", "parameters.MIS_SPEED = 99.0 m/s; must be 0.05 ... 15"),
+        ("MIS_INFEASIBLE = 0.5", "parameters.MIS_INFEASIBLE = 0.5; must be a whole number"),
+        ('MIS_SPEED = "fast"', 'parameters.MIS_SPEED = "fast"; must be a number'),
+        ("VEH_QUAD_MASS = 0.5", "parameters.VEH_QUAD_MASS: is quad_mass_kg; write that key instead"),
+        ("SIM_WIND_E = 1.0", "parameters.SIM_WIND_E: no such parameter"),
+    ],
+)
+def test_a_parameter_that_cannot_be_delivered_is_told(tmp_path, line, told):
+    with pytest.raises(VehicleFileError) as error:
+        loaded(tmp_path, f"{BEBOP}[parameters]\n{line}\n")
+    (problem,) = error.value.problems
+    assert told in problem
 
 
 WRONG_BELIEFS = [

@@ -57,7 +57,15 @@ def test_the_numbers_of_the_vehicle_are_the_defaults(name):
 
 
 # keys of a vehicle file of which the autopilot makes nothing: names, and what only the plant knows
-OF_THE_ROTORS = {"name", "believed", "rotors", "frame", "spin", "rotor"}  # not numbers, or told by `layout`
+OF_THE_ROTORS = {
+    "name",
+    "believed",
+    "parameters",
+    "rotors",
+    "frame",
+    "spin",
+    "rotor",
+}  # not numbers, or told by `layout`
 OF_THE_WORLD_ALONE = {
     *OF_THE_ROTORS,
     *("spin_drag_n_m_s2", "load_drag_n_s_m", "load_drag_quadratic_n_s2_m2"),

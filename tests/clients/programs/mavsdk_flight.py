@@ -449,4 +449,6 @@ def main(address: str, steps: list[str]) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit("ADDRESS STEP... are missing (steps are the methods of Pilot): udpin://0.0.0.0:14540 ready")
     main(sys.argv[1], sys.argv[2:])

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from gcs.analysis.definitions import METRICS
-from gcs.errors import GcsError
+from gcs.cli import gcs
+from gcs.errors import EXIT_USAGE, InputError
 from gcs.experiments import thesis
 from gcs.experiments.figures.canvas import Scene
 from gcs.experiments.figures.catalogue import FIGURES, Drawn, draw_figures, wanted
@@ -145,7 +148,7 @@ def test_the_page_holds_every_table_and_figure_and_nothing_from_elsewhere(record
 def test_a_page_without_markers_is_refused(tmp_path, records, text):
     page = tmp_path / "page.md"
     page.write_text(text)
-    with pytest.raises(GcsError, match="must hold the lines"):
+    with pytest.raises(InputError, match="must hold the lines"):
         thesis.write_docs(page, tmp_path, records)
     assert page.read_text() == text
 
@@ -173,3 +176,17 @@ def test_reading_order_is_case_vehicle_law():
     ordered = sorted(experiments(), key=in_reading_order)
     assert ordered[:3] == [NGC, LQR, Experiment("case-a", "thesis", "bebop")]
     assert {e.law for e in ordered} == set(LAWS)
+
+
+def test_a_page_that_cannot_take_the_tables_is_told_before_anything_is_flown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gcs.workflows.experiments.fly_missing", lambda *_: pytest.fail("flown"))
+    bare, out = tmp_path / "page.md", tmp_path / "out"
+    bare.write_text("no markers", encoding="utf-8")
+    for page, told in ((tmp_path / "none.md", "No such file or directory"), (bare, "must hold the lines")):
+        words = ["experiments", "thesis", "--docs", str(page), "--out", str(out)]
+        result = CliRunner().invoke(gcs, words, prog_name="gcs")
+        assert result.exit_code == EXIT_USAGE
+        assert result.stderr.startswith(f"gcs: --docs {page}: {told}")
+    assert not out.exists()
