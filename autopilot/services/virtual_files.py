@@ -45,6 +45,11 @@ def parameter_pack(table: ParameterTable, query: Mapping[str, str], integers: bo
     """
     defaults = query.get("withdefaults") == "1"
     start, count = _whole(query.get("start"), 0), _whole(query.get("count"), len(table))
+    part = (PARAMETERS, defaults, start, count, integers)
+    return table.remembered(part, lambda: _packed(table, defaults, start, count, integers))
+
+
+def _packed(table: ParameterTable, defaults: bool, start: int, count: int, integers: bool) -> bytes:
     names = table.names[start : start + count]
     packed = [_HEAD.pack(_MAGIC_WITH_DEFAULTS if defaults else _MAGIC, len(names), len(table))]
     before = b""
@@ -90,6 +95,10 @@ def mission_pack(items: tuple[WireItem, ...]) -> bytes:
 
 def parameter_texts(table: ParameterTable, integers: bool = False) -> bytes:
     """Metadata of the parameters; those of another process without a range, which only it knows."""
+    return table.remembered((PARAMETER_TEXTS, integers), lambda: _texts(table, integers))
+
+
+def _texts(table: ParameterTable, integers: bool) -> bytes:
     listed = []
     for name in table.names:
         known = table.describe(name)

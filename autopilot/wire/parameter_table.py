@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 
 from autopilot.wire.parameter_names import unknown_parameter
 
+_MOST_REMEMBERED = 8
 NAME_LENGTH = 16  # PARAM_VALUE.param_id
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*")
 _FLOAT32 = struct.Struct("<f")
@@ -113,6 +114,8 @@ class ParameterTable:
         self._values = {parameter.name: float(parameter.default) for parameter in listed}
         self._index = {name: index for index, name in enumerate(self.names)}
         self._frozen = False
+        self._remembered: dict[Hashable, bytes] = {}  # made of the table at `_remembered_of`
+        self._remembered_of = self.version
 
     def learn(self, parameter: Parameter) -> None:
         """Add a parameter that another process owns, at its default; all later names move up by one."""
@@ -164,6 +167,14 @@ class ParameterTable:
         self._values[name] = stored
         self.version += 1
         return stored
+
+    def remembered(self, what: Hashable, make: Callable[[], bytes]) -> bytes:
+        """The bytes of `what`, which are made of this table, and made again only once it has changed."""
+        if self._remembered_of != self.version or len(self._remembered) >= _MOST_REMEMBERED:
+            self._remembered, self._remembered_of = {}, self.version
+        if what not in self._remembered:
+            self._remembered[what] = make()
+        return self._remembered[what]
 
     def freeze(self) -> None:
         """From now on parameters marked `fixed` keep their value."""

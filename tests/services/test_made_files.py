@@ -6,11 +6,13 @@ import json
 import re
 from typing import Any
 
+import pytest
+
 from autopilot.services.file_tree import checksum
 from autopilot.services.files import path_of
 from autopilot.services.identity import Identity
 from autopilot.services.mission_store import StoredMission
-from autopilot.services.virtual_files import GENERAL, PARAMETER_TEXTS, made_files
+from autopilot.services.virtual_files import GENERAL, PARAMETER_TEXTS, PARAMETERS, made_files
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.dialect import plumbline as m
@@ -49,6 +51,29 @@ def test_every_parameter_is_described() -> None:
         assert (told["min"], told["max"], told["default"]) == (known.low, known.high, known.default)
         assert told["units"] == known.unit
         assert told["rebootRequired"] == known.fixed
+
+
+def test_they_are_made_again_once_a_parameter_has_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many clients that read them take no time from the loop."""
+    table = autopilot_parameters(load_vehicle("bebop"))
+    files, described = made(table), []
+    describe = table.describe
+    monkeypatch.setattr(table, "describe", lambda name: described.append(name) or describe(name))
+
+    def asked() -> int:
+        described.clear()
+        for path in (PARAMETERS, PARAMETER_TEXTS, GENERAL, PARAMETERS):
+            files[path]({})
+        return len(described)
+
+    first, again = asked(), asked()
+    assert (first, again) == (2 * len(table), 0)
+    before = files[PARAMETERS]({})
+    table.set("MIS_SPEED", 2.0)
+    assert files[PARAMETERS]({}) != before
+    table.learn(Parameter("SIM_WIND_E", 3.0, -1e9, 1e9, "", "Of the simulator"))
+    assert b"SIM_WIND_E" in files[PARAMETER_TEXTS]({})
+    assert files[PARAMETERS]({"start": "3"}) != files[PARAMETERS]({})
 
 
 def test_the_range_of_another_process_parameter_is_not_made_up(rig: Any) -> None:
