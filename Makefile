@@ -13,7 +13,7 @@ UV := VIRTUAL_ENV=$(VENV) $(BIN)/uv pip install --quiet
 install = @{ $(PIP) 'uv>=0.4' && $(UV) --editable '.$(1)'; } || $(PIP) --editable '.$(1)'
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help install fly test lint types docs thesis figures pictures robustness bench clean
+.PHONY: help install fly test lint types docs thesis figures pictures robustness renew bench clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -75,6 +75,9 @@ pictures: $(DEV_STAMP) ## make the pictures of README and docs anew (needs chrom
 robustness: $(DEV_STAMP) ## fly the sweeps of docs/robustness.md and renew its maps and what it says of them
 	$(BIN)/python benchmarks/robustness.py
 	$(BIN)/python tests/documentation/test_robustness.py
+
+renew: thesis figures robustness pictures bench ## fly, draw and measure anew all that README and docs show (hours)
+	$(BIN)/python benchmarks/realism.py --docs docs/realism.md
 
 bench: $(STAMP) ## measure this machine
 	$(BIN)/python benchmarks/plant_convergence.py

@@ -65,7 +65,7 @@ def find_log(source: Path) -> Path:
     tlog = source / TLOG_FILE if source.is_dir() else source
     allowed = f"must be a .tlog, or a directory that holds {TLOG_FILE}"
     if not tlog.is_file():
-        raise InputError(f"{tlog}: no such file; {allowed}")
+        raise InputError(f"{tlog}: {'not a file' if tlog.exists() else 'no such file'}; {allowed}")
     if next(read_tlog(tlog), None) is None:
         raise InputError(f"{tlog}: holds no telemetry; {allowed}")
     return tlog
