@@ -16,6 +16,7 @@ from gcs.commands.options import (
     SettingType,
     json_option,
     law_option,
+    mission_argument,
     own_options,
     page_options,
     print_json,
@@ -46,7 +47,7 @@ _OWN = (
 
 
 @click.command("fly")
-@click.argument("mission")
+@mission_argument
 @law_option
 @own_options
 @sensors_option

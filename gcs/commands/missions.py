@@ -6,7 +6,14 @@ from dataclasses import asdict
 
 import click
 
-from gcs.commands.options import json_option, planner_option, print_json, print_table, vehicle_option
+from gcs.commands.options import (
+    json_option,
+    mission_argument,
+    planner_option,
+    print_json,
+    print_table,
+    vehicle_option,
+)
 from gcs.errors import EXIT_DONE, EXIT_ERROR
 from gcs.shell.display import told_if_slow
 
@@ -36,7 +43,7 @@ def missions_command(as_json: bool) -> None:
 
 
 @click.command("check")
-@click.argument("mission")
+@mission_argument
 @vehicle_option("The vehicle that is to fly it")
 @planner_option
 @click.option("--as-asked", is_flag=True, help="Judge the paths as asked, not shaped.")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from autopilot.shell.options import NamedPath, WholeNumber
 from gcs.errors import InputError
@@ -18,6 +19,30 @@ from gcs.shell.display import keep_stdout_for_results, to_reader, to_results
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+Completing = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+
+
+def names_or_files(names: Callable[[], Iterable[str]]) -> Completing:
+    """What a shell completes of a word that is one of these names, or the path of a file."""
+
+    def complete(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        found = [CompletionItem(name) for name in names() if name.startswith(incomplete)]
+        return [*found, CompletionItem(incomplete, type="file")]
+
+    return complete
+
+
+def mission_argument(function: F) -> F:
+    """MISSION of every command that takes a shipped mission or a mission file."""
+
+    def shipped() -> Iterable[str]:
+        from missions.fileformat import shipped
+
+        return shipped()
+
+    return click.argument("mission", shell_complete=names_or_files(shipped))(function)
 
 
 class AddressType(click.ParamType):  # type: ignore[type-arg]
@@ -169,7 +194,13 @@ def vehicle_option(what: str = "What flies, in truth and by belief") -> Callable
     """--vehicle of every command that reads a vehicle file; its help lists the shipped ones."""
     from autopilot.vehicle.file import VEHICLES
 
-    return click.option("--vehicle", default="bebop", show_default=True, help=f"{what}: {VEHICLES.choice()}.")
+    return click.option(
+        "--vehicle",
+        default="bebop",
+        show_default=True,
+        shell_complete=names_or_files(VEHICLES.names),
+        help=f"{what}: {VEHICLES.choice()}.",
+    )
 
 
 class LawType(click.ParamType):  # type: ignore[type-arg]
@@ -189,6 +220,13 @@ class LawType(click.ParamType):  # type: ignore[type-arg]
             except OwnError as error:
                 raise _unusable(error, param) from None
         return law
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        from autopilot.vehicle.parameters import LAWS
+
+        return names_or_files(lambda: LAWS)(ctx, param, incomplete)
 
 
 def law_help() -> str:
@@ -266,7 +304,13 @@ def sensors_option(function: F) -> F:
     from sitl.sensors.shipped import PROFILES
 
     help_text = f"What the vehicle senses with: {PROFILES.choice()}."
-    return click.option("--sensors", default="lab", show_default=True, help=help_text)(function)
+    return click.option(
+        "--sensors",
+        default="lab",
+        show_default=True,
+        shell_complete=names_or_files(PROFILES.names),
+        help=help_text,
+    )(function)
 
 
 def require_options(function: F) -> F:
@@ -305,9 +349,9 @@ def json_option(function: F) -> F:
     )(function)
 
 
-def _json_alone(_ctx: click.Context, _param: click.Parameter, as_json: bool) -> bool:
+def _json_alone(ctx: click.Context, _: click.Parameter, as_json: bool) -> bool:
     # what a law prints that a sweep flies in this process comes from flights of which nobody reads
-    if as_json or _ctx.info_name == "sweep":
+    if (as_json or ctx.info_name == "sweep") and not ctx.resilient_parsing:  # which a shell asks to complete
         keep_stdout_for_results()
     return as_json
 

@@ -18,6 +18,7 @@ from gcs.commands.options import (
     fresh_option,
     json_option,
     law_help,
+    mission_argument,
     own_options,
     print_json,
     require_options,
@@ -29,7 +30,7 @@ from gcs.shell.display import say, to_results
 
 
 @click.command("sweep")
-@click.argument("mission")
+@mission_argument
 @click.option(
     "--law",
     "laws",

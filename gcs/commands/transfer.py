@@ -15,6 +15,7 @@ from gcs.commands.options import (
     OUTPUT_FILE,
     connect_option,
     json_option,
+    mission_argument,
     print_json,
     print_table,
     vehicle_option,
@@ -31,7 +32,7 @@ _RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 
 
 @click.command("upload")
-@click.argument("mission")
+@mission_argument
 @vehicle_option("Vehicle against which it is checked")
 @click.option("--force", is_flag=True, help="Upload even what the vehicle cannot do.")
 @click.option(

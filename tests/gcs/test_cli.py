@@ -32,8 +32,6 @@ from gcs.workflows import status as status_module
 from missions.model import Land, Signals, Sine, Takeoff, Term
 
 ROOT = Path(__file__).resolve().parents[2]
-HELP_LIMIT_S = 0.3  # of `gcs --help`, on an idle machine; the test takes the best of several
-HELP_TRIES = 8
 
 
 def run(*arguments):
@@ -98,19 +96,30 @@ def test_all_commands_are_listed():
 def test_a_shell_can_complete_words(monkeypatch):
     words = {"_GCS_COMPLETE": "bash_complete", "COMP_WORDS": "gcs sta", "COMP_CWORD": "1"}
     assert "_GCS_COMPLETE=bash_source gcs" in (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
-    told = CliRunner().invoke(gcs, [], prog_name="gcs", env=words).stdout
-    assert told.split() == ["plain,status", "plain,start"]
+
+    def completed(line):
+        env = {**words, "COMP_WORDS": f"gcs {line}", "COMP_CWORD": str(len(line.split()))}
+        return CliRunner().invoke(gcs, [], prog_name="gcs", env=env).stdout.split()
+
+    assert completed("sta") == ["plain,status", "plain,start"]
+    for line, found in (
+        ("fly case-b", ["plain,case-b", "plain,case-b-extended"]),
+        ("check deli", ["plain,delivery"]),
+        ("fly hover --vehicle heavy-", ["plain,heavy-real"]),
+        ("sweep hover --sensors lab-r", ["plain,lab-real"]),
+        ("fly hover --law th", ["plain,thesis"]),
+    ):
+        assert completed(line) == [*found, f"file,{line.split()[-1]}"]
 
 
-def test_help_is_quick():
-    best = float("inf")
-    for _ in range(HELP_TRIES):
-        began = time.perf_counter()
-        subprocess.run([sys.executable, "-m", "gcs", "--help"], check=True, capture_output=True, cwd=ROOT)
-        best = min(best, time.perf_counter() - began)
-        if best < HELP_LIMIT_S:
-            break
-    assert best < HELP_LIMIT_S
+def test_help_needs_nothing_but_click():
+    """Whatever is loaded before help can be shown, whoever asks for it waits for."""
+    program = "import sys, gcs.cli\nprint(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    found = {name for name in told.stdout.split() if name not in sys.stdlib_module_names}
+    ours = {name for name in found if (ROOT / name).is_dir()}
+    assert ours == {"gcs", "missions"}
+    assert not found & {"numpy", "numba", "scipy", "pydantic", "pymavlink", "rich", "pyarrow", "matplotlib"}
 
 
 def test_version():
