@@ -42,7 +42,7 @@ def vehicle_status(address: Address, truth_at: Address | None = None, quiet: boo
     with (
         TruthLink(truth_at) as truth,
         Session(address) as session,
-        told_if_slow("listening to the vehicle, which says little", quiet),
+        told_if_slow("listening to the vehicle", quiet),
     ):
         session.find_with_truth(truth)
         told = {"SIM_STATUS"} if truth.heard else set()
