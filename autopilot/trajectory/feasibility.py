@@ -202,13 +202,23 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
                 elif low:
                     found += low
                 else:
-                    text = f"items[{entry.item}] (signals): {trouble}"
+                    text = f"{_named(entry)}: {trouble}; {_within(limits)}"
                     found.append(Violation(entry.item, "shaping", inf, SHAPING_M, 0.0, text))
                 continue
         along = _survey(entry, limits)
         if along is not None:
             found += _judge(entry, along, limits)
     return found
+
+
+def _within(limits: VehicleLimits) -> str:
+    """What a path must keep to, and what mends one that cannot."""
+    reserve = f"{100.0 * limits.rotor_margin:.0f} % of the rotors' range free at either limit"
+    return (
+        f"a path must leave {reserve} (MIS_ROTOR_MARG), the cable taut and the tilt below "
+        f"{degrees(limits.tilt_max_rad):.0f} deg; lower amplitude_m, lengthen rise_s or period_s, or let it "
+        "be flown slower (MIS_INFEASIBLE 1)"
+    )
 
 
 def _too_heavy(limits: VehicleLimits) -> list[Violation]:

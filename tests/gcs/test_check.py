@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from autopilot.trajectory import feasibility
 from autopilot.trajectory.feasibility import PathReport
+from autopilot.trajectory.prepare import ShapedPath
+from autopilot.trajectory.shaping import unshaped
 from gcs.cli import gcs
 from gcs.errors import EXIT_USAGE, InputError
 from gcs.workflows.check_mission import Check, check_mission, flown_alone, reels_too_far, remarks_on
@@ -82,3 +85,13 @@ def test_a_law_is_not_checked_and_its_paths_are() -> None:
     result = CliRunner().invoke(gcs, ["check", "case-a", "--law", "thesis"], prog_name="gcs")
     assert result.exit_code == EXIT_USAGE
     assert "--as-asked checks them as the laws thesis and lqr fly them" in result.stderr
+
+
+def test_a_path_that_cannot_be_had_is_told_with_what_it_must_keep_to_and_what_mends_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(feasibility, "shaped_path", lambda step, _: ShapedPath(unshaped(step), "no way"))
+    (line,) = check_mission("case-a", "bebop", as_asked=False).lines()
+    assert line.startswith("items[2] (signals): no way; a path must leave 15 % of the rotors' range free")
+    for mends in ("amplitude_m", "rise_s", "MIS_ROTOR_MARG", "MIS_INFEASIBLE 1"):
+        assert mends in line
