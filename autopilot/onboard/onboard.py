@@ -696,7 +696,10 @@ class Onboard:
 
     def take_silence(self, silent: bool) -> None:
         """Whether the simulator has fallen silent: until it is back the vehicle is not armed, and takes no
-        command that is to be flown."""
+        command that is to be flown, and no parameter of the simulator is set."""
+        self.endpoint.world_silent(silent)
+        if silent:
+            self._world.forget_asked()
         self._hinder(_SIMULATOR, ("the simulator is silent",) if silent else ())
 
     def _hinder(self, source: str, reasons: tuple[str, ...]) -> None:

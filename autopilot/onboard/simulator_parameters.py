@@ -35,6 +35,10 @@ class WorldParameters:
         """Set a parameter in the simulator."""
         self._wanted[name] = (value, 0)
 
+    def forget_asked(self) -> None:
+        """Set nothing of what was asked for and not answered: whoever asked will have given up."""
+        self._wanted.clear()
+
     def restore(self, values: Mapping[str, float]) -> None:
         """Set these in the simulator as soon as it has told that it has them."""
         self._restored = values

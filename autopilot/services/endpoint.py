@@ -325,6 +325,10 @@ class VehicleEndpoint:
         """More parameters will be learned soon: lists of them wait until `parameters_complete`."""
         self._parameters.expect_more()
 
+    def world_silent(self, silent: bool) -> None:
+        """Whether the simulator has fallen silent: none of its parameters can be set then."""
+        self._parameters.world_silent = silent
+
     def parameters_complete(self, now_us: int) -> None:
         """The parameter table is complete."""
         self._parameters.complete(now_us)

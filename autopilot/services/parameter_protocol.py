@@ -40,6 +40,7 @@ LIST_BURST = 8  # of them at once, where ticks are longer than that
 # MAV_PARAM_ERROR; the last is newer than the dialect's copy of the enum
 DOES_NOT_EXIST = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
 OUT_OF_RANGE = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+OUT_OF_REACH = mavlink.MAV_PARAM_ERROR_COMPONENT_NOT_FOUND
 READ_ONLY = mavlink.MAV_PARAM_ERROR_READ_ONLY
 TYPE_MISMATCH = 7
 HASH_NAME = "_HASH_CHECK"
@@ -63,6 +64,7 @@ class ParameterService:
 
     def __init__(self, table: ParameterTable, encoding: ParameterEncoding = ALL_REAL) -> None:
         self.table = table
+        self.world_silent = False  # the simulator, so that nothing can be set in it
         self._encoding = encoding
         self._lists: dict[Link, tuple[int, int]] = {}  # next index, and when
         self._complete = True  # the table: no more parameters will be learned
@@ -103,6 +105,8 @@ class ParameterService:
             self.table.describe(name).checked(value)
         except ParameterError as error:
             return self._refused(name, OUT_OF_RANGE, str(error), peer)
+        if name in self.table.learned and self.world_silent:
+            return self._refused(name, OUT_OF_REACH, f"{name} not set: the simulator is silent", peer)
         if name in self.table.learned:
             return [WorldAsked(name, value)]
         try:

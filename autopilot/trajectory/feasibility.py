@@ -58,8 +58,10 @@ class VehicleLimits:
     """The vehicle that is to fly, and what is asked of it at most.
 
     `thrust_reserve` is the share of the total thrust kept free for control, `rotor_margin` that of each
-    rotor's range beside either limit along shaped paths. `speed_m_s` (until the mission sets its own) and
-    `accel_m_s2` are the peaks of transfers; `when_infeasible` is what becomes of a path that cannot be had.
+    rotor's range beside either limit along shaped paths, `least_tension` the share of the load's weight that
+    the cable bears there, `shaping_m` how far they may be from what is asked. `speed_m_s` (until the mission
+    sets its own) and `accel_m_s2` are the peaks of transfers; `when_infeasible` is what becomes of a path
+    that cannot be had.
     """
 
     vehicle: Vehicle
@@ -67,6 +69,8 @@ class VehicleLimits:
     tilt_max_rad: float = radians(45.0)
     speed_m_s: float = 1.5
     accel_m_s2: float = 1.5
+    least_tension: float = LEAST_TENSION
+    shaping_m: float = SHAPING_M
     rotor_margin: float = ROTOR_MARGIN
     when_infeasible: int = REFUSE
 
@@ -109,7 +113,7 @@ class VehicleLimits:
         bounds = Bounds(
             vehicle.rotor_min_n + margin if vehicle.limited else -inf,
             vehicle.rotor_max_n - margin if vehicle.limited else inf,
-            LEAST_TENSION * vehicle.load_mass_kg * vehicle.gravity_m_s2,
+            self.least_tension * vehicle.load_mass_kg * vehicle.gravity_m_s2,
             cos(self.tilt_max_rad),
             vehicle.rotor_tau_s,
         )
@@ -117,7 +121,7 @@ class VehicleLimits:
             self.body,
             bounds,
             True,
-            SHAPING_M,
+            self.shaping_m,
             self.when_infeasible,
             self.speed_m_s,
             self.accel_m_s2,
@@ -203,7 +207,7 @@ def check(mission: Mission, limits: VehicleLimits, shaped: bool = False) -> list
                     found += low
                 else:
                     text = f"{_named(entry)}: {trouble}; {_within(limits)}"
-                    found.append(Violation(entry.item, "shaping", inf, SHAPING_M, 0.0, text))
+                    found.append(Violation(entry.item, "shaping", inf, limits.shaping_m, 0.0, text))
                 continue
         along = _survey(entry, limits)
         if along is not None:

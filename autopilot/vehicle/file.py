@@ -65,7 +65,9 @@ def _wrong_parameters(vehicle: Vehicle) -> Iterator[str]:
 
     known = definitions().parameters
     for name, value in vehicle.parameters.items():
-        if name not in known:
+        if name not in known and name.startswith("SIM_"):
+            yield f"{name}: is the simulator's, and these are the autopilot's; other keys say what is true"
+        elif name not in known:
             yield unknown_parameter(name, known)
         elif known[name].from_vehicle:
             yield f"{name}: is {known[name].from_vehicle}; write that key instead"

@@ -21,6 +21,7 @@ class VehicleSocket:
         self._socket: UdpSocket = open_address(address)
         self._vehicle: Sender | None = None
         self._heard_us = 0
+        self._autopilots: dict[Sender, int] = {}  # that spoke before there was a vehicle, and their systems
         self._others: dict[Sender, int] = {}  # vehicles that are not heard, and their systems
         self._told: set[Sender] = set()
 
@@ -47,13 +48,17 @@ class VehicleSocket:
             self._heard_us = now_us
             self._tell_of_others()
             return True
-        system = _vehicle_in(datagram)
+        system, autopilot = _speaks_in(datagram)
         if self._vehicle is not None and now_us - self._heard_us < GONE_US:
-            if system is not None:
-                self._others[sender] = system
+            if autopilot is not None:
+                self._others[sender] = autopilot
             return sender not in self._others
+        if self._vehicle is None and autopilot is not None:
+            self._autopilots[sender] = autopilot
         if system is not None:
             self._vehicle, self._heard_us = sender, now_us
+            self._others |= self._autopilots
+            self._autopilots.clear()
             self._others.pop(sender, None)
         if system is not None or self._vehicle is None:
             self._socket.answer_to(sender)
@@ -64,19 +69,23 @@ class VehicleSocket:
         for sender, system in self._others.items():
             if sender not in self._told:
                 self._told.add(sender)
-                host, port = sender
+                other, ours = (f"{host}:{port}" for host, port in (sender, self._vehicle or sender))
                 say(
-                    f"another vehicle (system {system}) speaks on UDP {self._address} from {host}:{port} and"
-                    " is not heard; give each a port of its own: autopilot --gcs"
+                    f"another vehicle (system {system}) speaks on UDP {self._address} from {other} and is "
+                    f"not heard, nor does it hear what is said to that at {ours}; give each a port of its own: "
+                    "autopilot --gcs"
                 )
 
     def close(self) -> None:
         self._socket.close()
 
 
-def _vehicle_in(datagram: bytes) -> int | None:
-    """The system of the vehicle whose heartbeat it holds."""
+def _speaks_in(datagram: bytes) -> tuple[int | None, int | None]:
+    """The systems of the vehicle whose heartbeat it holds, and of the autopilot whose message."""
+    vehicle = autopilot = None
     for one in messages(datagram)[0]:
         if one.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and is_vehicle(one.message):
-            return one.system
-    return None
+            vehicle = autopilot = one.system
+        elif one.component == mavlink.MAV_COMP_ID_AUTOPILOT1 and one.id != mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            autopilot = one.system
+    return vehicle, autopilot

@@ -10,7 +10,7 @@ from autopilot.shell.options import unknown_setting
 from autopilot.wire.parameter_table import ParameterError, parse_text
 from gcs.clients.operation import Result, Target
 from gcs.clients.parameter_transfer import ParameterGet, ParameterList, ParameterSet
-from gcs.errors import GcsError, InputError, RefusedError
+from gcs.errors import GcsError, InputError, NoVehicleError, RefusedError
 from gcs.formats.params import QGC_ENDING, lines_of, qgc_of
 from gcs.shell.display import StepDisplay, say
 from gcs.shell.link import Address
@@ -109,6 +109,10 @@ def load_parameters(file: Path, address: Address) -> tuple[int, int]:
             except RefusedError as error:
                 refused += 1
                 say(str(error))
+            except NoVehicleError as error:
+                raise NoVehicleError(
+                    f"{error}; {done - refused} of {len(values)} parameters were set"
+                ) from None
     return len(values) - refused, len(values)
 
 

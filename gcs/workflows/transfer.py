@@ -12,9 +12,10 @@ from gcs.errors import GcsError
 from gcs.formats.missions import PLAN_ENDING, Judged, is_foreign, judge, read_foreign, write_foreign
 from gcs.formats.plan import Plan
 from gcs.mission_items import items_of
-from gcs.shell.display import say
+from gcs.shell.display import say, told_if_slow
 from gcs.shell.link import Address
 from gcs.shell.session import Session
+from gcs.workflows.before_flight import CHECKING
 from gcs.workflows.check_mission import check_items, load_checked
 from gcs.workflows.running_flight import vehicle_home
 
@@ -43,7 +44,8 @@ def checked_upload(
     if is_foreign(path):
         plan = read_foreign(path)
         return lambda session: _upload_foreign(session, path, plan, vehicle, force, skip, tell)
-    loaded = load_checked(mission, vehicle, force)
+    with told_if_slow(CHECKING):
+        loaded = load_checked(mission, vehicle, force)
 
     def send(session: Session) -> None:
         items = items_of(loaded, vehicle_home(session))
@@ -57,7 +59,8 @@ def _upload_foreign(
 ) -> None:
     items = _flown(path, judge(plan, home := vehicle_home(session)), skip)
     if not force:
-        check_items(path.name, items, home, vehicle)
+        with told_if_slow(CHECKING):
+            check_items(path.name, items, home, vehicle)
     # the fence first: the vehicle judges the mission by it
     for kind, area in ((_FENCE, plan.fence), (_RALLY, plan.rally)):
         if area is not None:

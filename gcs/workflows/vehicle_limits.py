@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import radians
+
 from autopilot.trajectory.feasibility import VehicleLimits
 from autopilot.vehicle.file import VehicleFileError, load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -17,6 +19,11 @@ def load_limits(name_or_path: str) -> VehicleLimits:
     table = autopilot_parameters(belief)
     return VehicleLimits(
         belief,
+        tilt_max_rad=radians(table["MIS_TILT_DEG"]),
+        speed_m_s=table["MIS_SPEED"],
+        accel_m_s2=table["MIS_ACCEL"],
+        least_tension=0.01 * table["MIS_TENSION"],
+        shaping_m=table["MIS_SHAPE_ERR"],
         rotor_margin=0.01 * table["MIS_ROTOR_MARG"],
         when_infeasible=int(table["MIS_INFEASIBLE"]),
     )

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from math import radians
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+from autopilot.supervisor.settings import limits_from
 from autopilot.trajectory import feasibility
 from autopilot.trajectory.feasibility import PathReport
 from autopilot.trajectory.prepare import ShapedPath
 from autopilot.trajectory.shaping import unshaped
+from autopilot.vehicle.file import load_belief
+from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
 from gcs.errors import EXIT_USAGE, InputError
 from gcs.workflows.check_mission import Check, check_mission, flown_alone, reels_too_far, remarks_on
+from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
 
 CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
@@ -95,3 +100,20 @@ def test_a_path_that_cannot_be_had_is_told_with_what_it_must_keep_to_and_what_me
     assert line.startswith("items[2] (signals): no way; a path must leave 15 % of the rotors' range free")
     for mends in ("amplitude_m", "rise_s", "MIS_ROTOR_MARG", "MIS_INFEASIBLE 1"):
         assert mends in line
+
+
+def test_a_vehicle_is_judged_by_the_parameters_it_is_delivered_with(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    given = {"MIS_TILT_DEG": 5, "MIS_SPEED": 1.0, "MIS_ACCEL": 0.5, "MIS_TENSION": 40, "MIS_SHAPE_ERR": 0.1}
+    given |= {"MIS_ROTOR_MARG": 30, "MIS_INFEASIBLE": 1}
+    lines = "\n".join(f"{name} = {value}" for name, value in given.items())
+    file.write_text(f'believed = "bebop"\n[parameters]\n{lines}\n', encoding="utf-8")
+    found = load_limits(str(file))
+    assert found.tilt_max_rad == pytest.approx(radians(5.0))
+    table = autopilot_parameters(load_belief(file))
+    assert found.shaping == limits_from(table, True)
+
+
+def test_limits_are_those_that_the_autopilot_shapes_to() -> None:
+    shaping = load_limits("heavy-real").shaping
+    assert shaping == limits_from(autopilot_parameters(load_belief("heavy-real")), True)

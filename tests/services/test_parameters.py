@@ -279,6 +279,19 @@ def test_what_the_simulator_is_asked_for_is_answered_when_it_has_said_what_holds
     assert rig.table["SIM_WIND_E"] == 3.0
 
 
+def test_nothing_is_set_in_a_simulator_that_is_silent(rig):
+    rig.table.learn(Parameter("SIM_WIND_E", 0.5, -1e9, 1e9, "", ""))
+    rig.endpoint.world_silent(True)
+    told = {x.get_type(): x for x in rig.replies(set_(b"SIM_WIND_E", 3.0))}
+    assert told["PARAM_ERROR"].error == m.MAV_PARAM_ERROR_COMPONENT_NOT_FOUND
+    assert told["PARAM_VALUE"].param_value == 0.5
+    assert told["STATUSTEXT"].text == "SIM_WIND_E not set: the simulator is silent"
+    assert rig.events == []
+    rig.endpoint.world_silent(False)
+    rig.send(set_(b"SIM_WIND_E", 3.0))
+    assert rig.events == [WorldAsked("SIM_WIND_E", 3.0)]
+
+
 def test_a_list_waits_until_the_table_is_complete(rig):
     """A client that fetches while parameters are learned would keep those of the first count."""
     rig.endpoint.expect_parameters()

@@ -378,7 +378,7 @@ def test_a_vehicle_is_delivered_with_parameters(tmp_path):
         ("MIS_INFEASIBLE = 0.5", "parameters.MIS_INFEASIBLE = 0.5; must be a whole number"),
         ('MIS_SPEED = "fast"', 'parameters.MIS_SPEED = "fast"; must be a number'),
         ("VEH_QUAD_MASS = 0.5", "parameters.VEH_QUAD_MASS: is quad_mass_kg; write that key instead"),
-        ("SIM_WIND_E = 1.0", "parameters.SIM_WIND_E: no such parameter"),
+        ("SIM_WIND_E = 1.0", "parameters.SIM_WIND_E: is the simulator's, and these are"),
     ],
 )
 def test_a_parameter_that_cannot_be_delivered_is_told(tmp_path, line, told):

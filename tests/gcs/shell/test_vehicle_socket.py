@@ -19,6 +19,10 @@ def heartbeat(kind: int = mavlink.MAV_AUTOPILOT_PX4, of: int = mavlink.MAV_TYPE_
     return FrameWriter(1, 1).frame(mavlink.MAVLink_heartbeat_message(of, kind, 0, 0, 0, 3))
 
 
+def telemetry() -> bytes:
+    return FrameWriter(1, 1).frame(mavlink.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0))
+
+
 class Clock:
     """Ours, in us."""
 
@@ -79,6 +83,32 @@ def test_of_two_vehicles_the_first_is_heard_and_answered(
     wait([first], WAIT_S)
     assert first.drain() == [b"answer"]
     assert not second.waiting
+
+
+def test_another_autopilot_is_named_by_any_message_of_it(
+    ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its heartbeat may come when what was asked of the first one is done already."""
+    first, second = two
+    heard(ground, second, telemetry())
+    heard(ground, first, heartbeat())
+    heard(ground, first, telemetry())
+    told = capsys.readouterr().err
+    assert (
+        f"from {second.address} and is not heard, nor does it hear what is said to that at {first.address}"
+        in told
+    )
+    assert heard(ground, second, telemetry()) == []
+
+
+def test_an_autopilot_that_begins_to_speak_is_named_by_its_first_message(
+    ground: VehicleSocket, two: tuple[UdpSocket, UdpSocket], clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = two
+    heard(ground, first, heartbeat())
+    assert heard(ground, second, telemetry()) == []
+    heard(ground, first, telemetry())
+    assert f"from {second.address} and is not heard" in capsys.readouterr().err
 
 
 def test_a_vehicle_that_starts_again_is_heard_at_its_new_port(
