@@ -72,7 +72,7 @@ class VehicleSocket:
                 other, ours = (f"{host}:{port}" for host, port in (sender, self._vehicle or sender))
                 say(
                     f"another vehicle (system {system}) speaks on UDP {self._address} from {other} and is "
-                    f"not heard, nor does it hear what is said to that at {ours}; give each a port of its own: "
+                    f"not heard, nor does it hear what is said to {ours}; give each a port of its own: "
                     "autopilot --gcs"
                 )
 

@@ -94,10 +94,7 @@ def test_another_autopilot_is_named_by_any_message_of_it(
     heard(ground, first, heartbeat())
     heard(ground, first, telemetry())
     told = capsys.readouterr().err
-    assert (
-        f"from {second.address} and is not heard, nor does it hear what is said to that at {first.address}"
-        in told
-    )
+    assert f"from {second.address} and is not heard, nor does it hear what is said to {first.address}" in told
     assert heard(ground, second, telemetry()) == []
 
 
