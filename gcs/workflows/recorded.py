@@ -10,7 +10,7 @@ import numpy as np
 
 from gcs.errors import InputError, input_error, not_written
 from gcs.folders import TLOG_FILE
-from gcs.shell.display import StepDisplay
+from gcs.shell.display import StepDisplay, told_if_slow
 
 if TYPE_CHECKING:
     from gcs.recorded.column_map import ColumnMap
@@ -77,8 +77,7 @@ def replay(
     from gcs.recorded.scoring import HORIZONS_S, score_ahead, score_pose_alone
 
     path = find_recording(path)
-    with StepDisplay("estimating the load", quiet) as display:
-        display.update(0, 0)
+    with told_if_slow("estimating the load", quiet):
         _, motion, model = _read(path, columns)
         rows = rows_of(motion, model)
         seen = bool(np.isfinite(motion.load).all())
