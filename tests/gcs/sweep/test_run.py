@@ -294,7 +294,7 @@ def test_a_sweep_with_a_part_that_is_not_compiled_says_that_it_compiles(
     command = ("-n", "1", "-r", "1", "pass")  # of the standard library
     cold = Part("the sweep's flight", "timeit", command, Path(__file__), "cold", 8.0)
 
-    def prepare(plan: SweepPlan, warm: Callable[[list[Part]], None]) -> None:
+    def prepare(plan: SweepPlan, warm: Callable[[list[Part]], None], quiet: bool) -> None:
         warm([cold])
         raise PlanError("not flown")
 
