@@ -105,9 +105,9 @@ class ParameterService:
             self.table.describe(name).checked(value)
         except ParameterError as error:
             return self._refused(name, OUT_OF_RANGE, str(error), peer)
-        if name in self.table.learned and self.world_silent:
-            return self._refused(name, OUT_OF_REACH, f"{name} not set: the simulator is silent", peer)
         if name in self.table.learned:
+            if self.world_silent:
+                return self._refused(name, OUT_OF_REACH, f"{name} not set: the simulator is silent", peer)
             return [WorldAsked(name, value)]
         try:
             after = self.table.set(name, value)

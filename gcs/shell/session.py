@@ -73,7 +73,6 @@ class Session:
         except RefusedError:  # another firmware, or a vehicle that flies in no simulator
             truth.of_vehicle(None)
         except GcsError:
-            self.deaf = self.signing_trouble
             truth.of_vehicle(None, silent=self.deaf or _STANDS_STILL)
         self._truth = truth
         if not self.deaf:
@@ -138,6 +137,7 @@ class Session:
         if result is None:
             raise NoVehicleError(f"{label or 'the exchange'}: the vehicle fell silent")
         if result.status is Status.UNANSWERED:
+            self.deaf = self.signing_trouble
             raise NoVehicleError(result.silence(self.signing_trouble))
         if result.status is Status.REFUSED:
             self.watch(lambda: False, REASON_S)

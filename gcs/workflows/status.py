@@ -100,10 +100,8 @@ def _ask_for_texts(session: Session) -> _Asked:
     if keeps:
         try:
             session.run(command.request_message(session.target, mavlink.MAVLINK_MSG_ID_STATUSTEXT))
-        except RefusedError:
+        except (RefusedError, NoVehicleError):
             keeps = False
-        except NoVehicleError:
-            keeps, session.deaf = False, session.signing_trouble
     return _Asked(session.view, keeps)
 
 
