@@ -387,8 +387,8 @@ STREAMS: dict[int, Stream] = {
     ),
     mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: Stream(_AUTOPILOT, _rate(10), _attitude_target),
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: Stream(_AUTOPILOT, _rate(5), _servo_output_raw),
-    mavlink.MAVLINK_MSG_ID_DEBUG_VECT: Stream(_AUTOPILOT, _rate(10), _debug_vect),
-    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Stream(_AUTOPILOT, _rate(10), _named_value_float),
+    mavlink.MAVLINK_MSG_ID_DEBUG_VECT: Stream(_AUTOPILOT, _rate(5), _debug_vect),
+    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Stream(_AUTOPILOT, _rate(5), _named_value_float),
     mavlink.MAVLINK_MSG_ID_WINCH_STATUS: Stream(WINCH_COMPONENT, _rate(2), _winch_status),
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: Stream(_AUTOPILOT, OFF, _autopilot_version),
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Stream(_AUTOPILOT, OFF, _gps_global_origin),
@@ -397,9 +397,9 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_CURRENT_MODE: Stream(_AUTOPILOT, OFF, _current_mode),
     mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: Stream(_AUTOPILOT, OFF, _available_modes_monitor),
     mavlink.MAVLINK_MSG_ID_LOAD_STATE: Stream(_DIALECT, _rate(20), _load_state),
-    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: Stream(_DIALECT, _rate(20), _load_setpoint),
-    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: Stream(_DIALECT, _rate(20), _cascade_errors),
-    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _rate(20), _rotor_state),
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT: Stream(_DIALECT, _rate(10), _load_setpoint),
+    mavlink.MAVLINK_MSG_ID_CASCADE_ERRORS: Stream(_DIALECT, _rate(5), _cascade_errors),
+    mavlink.MAVLINK_MSG_ID_ROTOR_STATE: Stream(_DIALECT, _rate(5), _rotor_state),
     mavlink.MAVLINK_MSG_ID_FILTER_STATE: Stream(_DIALECT, _rate(50), _filter_state),
 }
 

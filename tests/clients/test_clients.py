@@ -32,6 +32,8 @@ pytestmark = [
 ]
 HOME = Home()
 SPEED = 2.0
+# MAVProxy takes a millisecond a message, and what it has no time for it loses: its clock is that of the wall
+MAVPROXY_SPEED = 1.0
 SURVEY = Path(__file__).with_name("survey.plan")
 FLOWN = [
     "Cable taut, lifting the load",
@@ -41,7 +43,7 @@ FLOWN = [
 ]
 FAILSAFE = m.PLUMBLINE_PHASE_FAILSAFE
 # A text is said once, and a busy MAVProxy can miss it; this it takes from the heartbeats.
-DISARMED = "DISARMED"
+ARMED, DISARMED = "Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED", "DISARMED"
 
 
 @pytest.mark.parametrize(
@@ -74,7 +76,7 @@ class Watched(NamedTuple):
 
 @staged
 def mavsdk_and_two_ground_stations(stage: Stage) -> Watched:
-    stage.begin("--set", "MAV_LOAD_SYS_ID=2", "--set", "MAV_PARAM_INT=1", speed=SPEED)
+    stage.begin("--set", "MAV_LOAD_SYS_ID=2", "--set", "MAV_PARAM_INT=1", speed=MAVPROXY_SPEED)
     stays = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     vanishes = stage.mavproxy(f"tcp:{LOOPBACK}:{stage.tcp}")
     for program in (stays, vanishes):
@@ -201,7 +203,7 @@ class Surveyed(NamedTuple):
 
 def _fly_by_hand(program: Mavproxy, directory: Path) -> None:
     program.expect("parameters (ftp)")
-    program.type("param set MIS_SPEED 1.25")
+    program.insist("param set MIS_SPEED 1.25\nparam fetch MIS_SPEED", "MIS_SPEED = 1.25")
     # home row, then items, as `wp save` writes them
     rows = [
         "QGC WPL 110",
@@ -213,29 +215,22 @@ def _fly_by_hand(program: Mavproxy, directory: Path) -> None:
     (directory / "mission.txt").write_text("\n".join(rows) + "\n")
     program.type(f"wp load {directory / 'mission.txt'}")
     program.expect("Got MISSION_ACK: TYPE_MISSION: ACCEPTED")
-    program.type("wp list")
-    program.expect("Requesting 4 waypoints")
-    program.type("param fetch MIS_SPEED")
-    program.expect("MIS_SPEED = 1.25")
+    program.insist("wp list", "Requesting 4 waypoints")
     program.type("param set MIS_SPEED 1.5")
 
 
 @staged
 def mavproxy_and_a_survey(stage: Stage) -> Surveyed:
-    stage.begin(speed=SPEED)
+    stage.begin(speed=MAVPROXY_SPEED)
     program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     _fly_by_hand(program, stage.directory)
-    program.type("long DO_SET_MODE 129 4 4")
-    program.expect("MISSION>")
-    program.type("arm throttle")
-    program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
+    program.insist("long DO_SET_MODE 129 4 4", "MISSION>")
+    program.insist("arm throttle", ARMED)
     stage.wait_for("Cable taut, lifting the load")
-    program.type("setyaw 0 30 0")
-    program.expect("Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
+    program.insist("setyaw 0 30 0", "Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
     program.expect(DISARMED)
-    program.type("ftp list /fs/microsd/log")
-    program.expect(".ulg")
-    program.insist("log list", "numLogs 1")  # it asks once, and a busy MAVProxy can miss the answer
+    program.insist("ftp list /fs/microsd/log", ".ulg")
+    program.insist("log list", "numLogs 1")
     program.type("log download 0 flown.ulg")
     program.expect("Finished downloading flown.ulg")
     stage.witness.load.clear()
@@ -329,8 +324,7 @@ def _ask_for_home_and_the_fence(program: Mavproxy) -> None:
     program.type("gethome")
     program.insist("param set GF_MAX_HOR_DIST 50", "fence present")
     for command, said in (("disable", "fence disabled"), ("enable", "fence enabled")):
-        program.type(f"fence {command}")
-        program.expect(said)
+        program.insist(f"fence {command}", said)
 
 
 def _push_forward(stage: Stage, program: Mavproxy) -> None:
@@ -366,15 +360,13 @@ class Looped(NamedTuple):
 
 @staged
 def mavproxy_in_a_loop(stage: Stage) -> Looped:
-    stage.begin(speed=SPEED)
+    stage.begin(speed=MAVPROXY_SPEED)
     program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     program.expect("parameters (ftp)")
     _ask_for_home_and_the_fence(program)
     _load_a_loop(program, stage.directory, "1\t0\t3\t22\t0\t0\t0\t0\t47.397742\t8.545594\t1.5\t1")
-    program.type("long DO_SET_MODE 129 4 4")
-    program.expect("MISSION>")
-    program.type("arm throttle")
-    program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
+    program.insist("long DO_SET_MODE 129 4 4", "MISSION>")
+    program.insist("arm throttle", ARMED)
     for item in (4, 2, 3):
         program.expect(f"waypoint {item}")
     for _ in range(3):
@@ -406,35 +398,28 @@ class Ardupilot(NamedTuple):
 
 @staged
 def clients_of_ardupilot(stage: Stage) -> Ardupilot:
-    stage.begin("--set", "MAV_IDENTITY=1", speed=SPEED)
+    stage.begin("--set", "MAV_IDENTITY=1", speed=MAVPROXY_SPEED)
     dronekit = stage.program("dronekit_flight.py", f"tcp:{LOOPBACK}:{stage.tcp}", "ardupilot")()
     program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     program.expect("parameters (ftp)")
     _ask_for_home_and_the_fence(program)
     _load_a_loop(program, stage.directory)
     for name in ("GUIDED", "LOITER", "GUIDED"):
-        program.type(f"mode {name}")
-        program.expect(f"{name}>")
-    program.type("arm throttle")
-    program.expect("Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED")
+        program.insist(f"mode {name}", f"{name}>")
+    program.insist("arm throttle", ARMED)
     program.type("takeoff 1.5")
     program.expect("Got COMMAND_ACK: NAV_TAKEOFF: ACCEPTED")
     stage.wait_until(lambda: stage.witness.phases[-1] == m.PLUMBLINE_PHASE_HOLD)
-    program.type("setyaw 0 30 0")
-    program.expect("Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
+    program.insist("setyaw 0 30 0", "Got COMMAND_ACK: CONDITION_YAW: ACCEPTED")
     stage.wait_until(lambda: abs(stage.witness.yaw) < 0.05)
-    program.type("mode AUTO")
-    program.expect("AUTO>")
+    program.insist("mode AUTO", "AUTO>")
     for item in (3, 1, 2):
         program.expect(f"waypoint {item}")
-    program.type("mode LOITER")
-    program.expect("LOITER>")
-    program.type("mode GUIDED")
-    program.expect("GUIDED>")
+    program.insist("mode LOITER", "LOITER>")
+    program.insist("mode GUIDED", "GUIDED>")
     _push_forward(stage, program)
     program.type("guided 47.397745 8.545594 1.5")
-    program.type("mode RTL")
-    program.expect("RTL>")
+    program.insist("mode RTL", "RTL>")
     program.expect(DISARMED)
     said = program.end()
     return Ardupilot(dronekit, said, acknowledged(program, m.MAV_CMD_GET_HOME_POSITION), stage.witness)
