@@ -71,10 +71,10 @@ def test_mavflighttime_counts_the_fast_part_of_the_flight(flight: Path) -> None:
     times_s = np.array([state.time_usec * 1e-6 for state in truth])
     speeds = np.array([np.hypot(state.vx, state.vy) * 0.01 for state in truth])
     fast_s = float(np.diff(times_s)[speeds[1:] > COUNTED_M_S].sum())
-    assert fast_s > 10.0
+    assert fast_s > 4.0
     # it counts in whole seconds, out and back
     assert 60 * int(minutes) + int(seconds) == pytest.approx(fast_s, abs=2.0)
-    assert float(metres) == pytest.approx(80.0, abs=2.0)
+    assert float(metres) == pytest.approx(48.0, abs=2.0)
 
 
 def test_mavtomfile_writes_all_of_the_log_for_common_tools(flight: Path, tmp_path: Path) -> None:
