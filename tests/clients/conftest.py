@@ -36,7 +36,7 @@ from gcs.shell.link import LOOPBACK, free_port
 PROGRAMS = Path(__file__).with_name("programs")
 LONG_S = 300.0  # of a busy machine
 END_S = 10.0
-AT_ONCE = 3  # flights: what two cores fly without any client waiting for its heartbeat
+AT_ONCE = 2  # flights: what two cores fly, beside other tests, without a client that loses messages
 
 # What no client may say, whatever it means by it
 COMPLAINT = re.compile(
@@ -51,6 +51,14 @@ def complaints(text: str) -> list[str]:
 
 
 Place = tuple[float, float, float]  # east, north, up
+
+# what the witness takes; the others it does not even decode, for the processor is the clients'
+TAKEN = {
+    mavlink.MAVLINK_MSG_ID_LOAD_STATE,
+    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE,
+    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+}
 
 
 @dataclass
@@ -73,12 +81,14 @@ class Witness:
         while not self._over.is_set():
             for sock in select.select([self.truth, self.ground], [], [], 0.2)[0]:
                 for one in decode(sock.recv(65535))[0]:
-                    self._take(one.message)
+                    if one.id in TAKEN:
+                        self._take(one.id, one.message)
 
-    def _take(self, message: Any) -> None:
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_LOAD_STATE if message.source == mavlink.PLUMBLINE_SOURCE_TRUTH:
-                self.load.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
+    def _take(self, message_id: int, message: Any) -> None:
+        match message_id:
+            case mavlink.MAVLINK_MSG_ID_LOAD_STATE:
+                if message.source == mavlink.PLUMBLINE_SOURCE_TRUTH:
+                    self.load.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
             case mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
                 if message.phase in CARRIED:
                     self.asked.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
