@@ -31,6 +31,8 @@ from click.testing import CliRunner
 from pyarrow import Table, parquet
 
 import plumbline
+from autopilot.own.chosen import Own
+from autopilot.own.law import law_number
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -38,10 +40,13 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import encode_mission
 from gcs.cli import gcs
 from gcs.clients.flight import Outcome
+from gcs.closed_loop import Conditions
 from gcs.formats.missions import write_foreign
 from gcs.recorded.column_map import MAPS, ColumnMap
 from gcs.shell.link import free_port
 from gcs.sweep import plan as plans
+from gcs.sweep.flight import boarding
+from gcs.sweep.flight import fly as fly_swept
 from gcs.workflows.before_flight import check_mission, check_options
 from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.fly import Flight
@@ -91,14 +96,11 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @cache
-def flies_with(
-    law: str, estimator: str, planner: str, sensors: str, vehicle: str, settings: tuple[str, ...]
-) -> str:
-    """How the short mission ends under these options."""
-    given = dict(map(setting_of, settings))
-    options = {"law": law, "sensors": sensors, "vehicle": vehicle, "settings": given}
-    options |= {"estimator": estimator or None, "planner": planner or None}
-    return plumbline.fly(SHORT, quiet=True, force=True, **options).outcome  # type: ignore[arg-type]
+def flies_with(own: Own, law: str, sensors: str, vehicle: str, settings: tuple[str, ...]) -> str:
+    """How the short mission ends under these options: as a sweep flies it, which is the same flight."""
+    given = {"CTL_LAW": float(law_number(law)), **dict(map(setting_of, settings))}
+    conditions = Conditions(vehicle, sensors, 1, given, own)
+    return fly_swept(SHORT, conditions, boarding(SHORT, conditions)).outcome
 
 
 @pytest.fixture
@@ -116,8 +118,7 @@ def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
             sensors = (
                 str(Path(options.sensors).resolve()) if Path(options.sensors).is_file() else options.sensors
             )
-            own = (options.law, options.estimator, options.planner)
-            assert flies_with(*own, sensors, vehicle, options.settings) == "completed"
+            assert flies_with(options.own, options.law, sensors, vehicle, options.settings) == "completed"
         number = len(list(Path("flights").glob("*")))
         out = options.out or Path("flights") / f"{mission.name}-20260101-12000{number}"
         shutil.copytree(flown, out, dirs_exist_ok=True)
