@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import MissionItemError, WireItem, encode_mission, step_of
 from gcs.errors import InputError
 from missions.model import KINDS, Mission
+
+_ITEM = re.compile(r"\bitem (\d+)\b", re.IGNORECASE)
 
 
 def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
@@ -16,3 +20,14 @@ def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:
         at = step_of(error.seq, mission.steps)
         kind = KINDS[type(mission.steps[at])]
         raise InputError(f"{mission.name}: items[{at}] ({kind}): {error.text}") from None
+
+
+def of_mission(said: str, mission: Mission) -> str:
+    """What the vehicle says of its items, which it counts as they are uploaded: where the mission counts
+    them in another way, for signals are uploaded as several items, with its number beside."""
+
+    def named(found: re.Match[str]) -> str:
+        at = step_of(int(found[1]), mission.steps)
+        return found[0] if at == int(found[1]) else f"{found[0]} (items[{at}] of the mission)"
+
+    return _ITEM.sub(named, said)

@@ -36,8 +36,10 @@ class WorldParameters:
         self._wanted[name] = (value, 0)
 
     def forget_asked(self) -> None:
-        """Set nothing of what was asked for and not answered: whoever asked will have given up."""
-        self._wanted.clear()
+        """Set nothing of what was asked for and not answered: whoever asked will have given up. What is
+        restored is still wanted."""
+        wanted = self._wanted.items()
+        self._wanted = {name: due for name, due in wanted if self._restored.get(name) == due[0]}
 
     def restore(self, values: Mapping[str, float]) -> None:
         """Set these in the simulator as soon as it has told that it has them."""

@@ -32,6 +32,8 @@ from gcs.clients.missions import MissionUpload
 from gcs.clients.operation import Operation, Result, Status
 from gcs.clients.parameter_transfer import ParameterList
 from gcs.clients.vehicle_view import VehicleView
+from gcs.mission_items import of_mission
+from missions.model import Mission
 
 REPORT_INTERVAL_US = 8_000
 REPORT_MESSAGES = (
@@ -60,6 +62,10 @@ class Outcome:
     def because(self, why: str) -> Outcome:
         """The outcome with another reason beside its own, if there is one."""
         return replace(self, reason="; ".join(filter(None, (why, self.reason)))) if why else self
+
+    def of_mission(self, mission: Mission) -> Outcome:
+        """With its reason in the mission's terms; the vehicle counts items as they are uploaded."""
+        return replace(self, reason=of_mission(self.reason, mission))
 
 
 class Stage(Enum):

@@ -38,10 +38,11 @@ def fly_here(
                 display.update(client.progress)
             return True
 
-        return fly(
+        outcome = fly(
             mission,
             Conditions(options.vehicle, options.sensors, options.seed, settings, options.own),
             log,
             watch,
             client,
         )
+    return outcome.of_mission(mission)

@@ -196,6 +196,8 @@ def _end(
     from gcs.clients.flight import Outcome
 
     outcome = client.outcome or Outcome("interrupted")
+    if options.firmware is None:  # which has its own way to count
+        outcome = outcome.of_mission(mission)
     tlog = out / TLOG_FILE
     if tlog.stat().st_size == 0:
         if stop:

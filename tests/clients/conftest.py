@@ -176,8 +176,8 @@ class Mavproxy:
         self.text = self.text.partition(text)[2]
 
     def insist(self, line: str, text: str) -> None:
-        """Type `line` every few seconds until it has said `text`. It asks once and a busy MAVProxy misses the
-        answer; and it takes what it hears before the first HEARTBEAT for the parameters of another vehicle."""
+        """Type `line` every few seconds until it has said `text`: a busy MAVProxy misses answers; and what it
+        hears before the first HEARTBEAT it takes for the parameters of another vehicle."""
         until = time.monotonic() + LONG_S
         while text not in self.text:
             assert time.monotonic() < until, f"MAVProxy did not say {text!r} but {self.all[-2000:]!r}"

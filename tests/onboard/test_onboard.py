@@ -11,8 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.onboard.onboard import Onboard
+from autopilot.onboard.simulator_parameters import WorldParameters
 from autopilot.services.mission_store import StoredMission
 from autopilot.supervisor.state import Phase
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home, geodetic_from_enu
 from autopilot.wire.convert.simulator import hil_sensor_message, read_hil_actuator_controls, read_hil_sensor
@@ -325,6 +328,17 @@ def test_the_saved_world_is_set_again_in_the_simulator() -> None:
     craft.wait(1.0)
     assert craft.onboard.parameters["SIM_WIND_E"] == 2.5
     assert "SIM_NO_SUCH" not in craft.onboard.parameters
+
+
+def test_a_simulator_that_falls_silent_gets_the_saved_world_and_nothing_that_was_asked_for() -> None:
+    world = WorldParameters(autopilot_parameters(load_vehicle("bebop")))
+    world.restore({"SIM_WIND_E": 2.5})
+    for name, index in (("SIM_WIND_E", 0), ("SIM_LOAD_MASS", 1)):
+        world.receive(mavlink.MAVLink_param_value_message(name.encode(), 0.0, 9, 2, index))
+    world.ask("SIM_LOAD_MASS", 0.2)
+    world.forget_asked()
+    sent = [one for one in world.messages(0) if one.get_type() == "PARAM_SET"]
+    assert [(one.param_id, one.param_value) for one in sent] == [("SIM_WIND_E", 2.5)]
 
 
 def test_what_the_simulator_refuses_is_never_said_to_be_set() -> None:
