@@ -19,7 +19,7 @@ from numba.extending import register_jitable
 
 from autopilot.geometry.compiler import Kernel
 from autopilot.geometry.jitable import register_with
-from autopilot.geometry.machine_code import CHOSEN_BY_USER, ROOT, folder_of, sources_hash
+from autopilot.geometry.machine_code import CHOSEN_BY_USER, ROOT, folder_of, note_use, sources_hash
 
 _LONGEST_S = 600.0  # that another process is waited for; then we compile what it does not deliver
 
@@ -54,6 +54,7 @@ class _ContentLocator:
     def ensure_cache_path(self) -> None:
         """Make the directory."""
         self.get_cache_path().mkdir(parents=True, exist_ok=True)
+        note_use(folder_of(self._path))
 
     def get_cache_path(self) -> Path:
         """Directory of the machine code."""

@@ -14,6 +14,7 @@ import hashlib
 import os
 import platform
 import re
+import shutil
 from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
@@ -24,6 +25,8 @@ from tempfile import NamedTemporaryFile
 from platformdirs import user_cache_path
 
 ROOT = Path(__file__).resolve().parents[2]
+KEPT_S = 90.0 * 86400.0  # that machine code is kept without being used
+_MARKS = "ready"
 CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
 # it begins with letters, which are found fast: what is found in a text too does no harm
 _IMPORT = re.compile(
@@ -82,9 +85,35 @@ def sources_hash(path: Path, root: Path = ROOT) -> str:
     return digest.hexdigest()[:16]
 
 
+def _kernels() -> Path:
+    return user_cache_path("plumbline") / "kernels"
+
+
 def folder_of(path: Path) -> Path:
     """Where the machine code of the kernels in this source file is kept."""
-    return user_cache_path("plumbline") / "kernels" / sources_hash(path)
+    return _kernels() / sources_hash(path)
+
+
+@cache
+def note_use(folder: Path) -> None:
+    """Remember, once a program, that what is kept in this folder is used."""
+    with suppress(OSError):
+        os.utime(folder)
+
+
+def drop_unused(now_s: float) -> None:
+    """Delete what has not been used for so long: most of it is of sources that have changed since.
+
+    `now_s` is of the clock by which files are dated. A mark goes before what it promises, which is kept a
+    day longer: no flight finds a mark without the code.
+    """
+    with suppress(OSError):
+        for one in [*(_kernels() / _MARKS).iterdir(), *_kernels().iterdir()]:
+            age_s = now_s - one.stat().st_mtime
+            if one.parent.name == _MARKS and age_s > KEPT_S:
+                one.unlink()
+            elif one.is_dir() and one.name != _MARKS and age_s > KEPT_S + 86400.0:
+                shutil.rmtree(one, ignore_errors=True)
 
 
 @cache
@@ -99,8 +128,7 @@ def _machine() -> str:
 
 
 def _marks() -> Path:
-    base = Path(CHOSEN_BY_USER) if CHOSEN_BY_USER else user_cache_path("plumbline") / "kernels"
-    return base / "ready"
+    return (Path(CHOSEN_BY_USER) if CHOSEN_BY_USER else _kernels()) / _MARKS
 
 
 def _mark(source: Path, part: str) -> Path:
@@ -126,7 +154,12 @@ def is_ready(source: Path, parts: Iterable[str]) -> bool:
 
 def is_marked(source: Path, part: str) -> bool:
     """True if `mark_ready` was called for this part with these very sources, on this machine."""
-    return _mark(source, part).is_file()
+    mark = _mark(source, part)
+    if not mark.is_file():
+        return False
+    with suppress(OSError):
+        os.utime(mark)
+    return True
 
 
 def mark_ready(source: Path, parts: Iterable[str]) -> None:

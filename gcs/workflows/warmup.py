@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from autopilot.geometry.machine_code import ROOT, why_not_kept
+from autopilot.geometry.machine_code import ROOT, drop_unused, why_not_kept
 from autopilot.shell.compiling import SIMULATOR, Part, autopilot_parts
 from autopilot.vehicle.parameters import LAWS
 from gcs.errors import GcsError
@@ -104,3 +104,4 @@ def warm_up(parts: Iterable[Part], quiet: bool = False) -> None:
                 now_s = time.monotonic()
                 done.append((part.cost_s, now_s - begun_s))
                 display.done(title, now_s - begun_s, left(now_s))
+    drop_unused(time.time())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -117,6 +118,31 @@ def test_what_is_ready_is_known_by_its_sources_and_its_part(
     assert not machine_code.is_ready(Path(model.__file__), ("tick",))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
     assert not machine_code.is_ready(source, ("tick",))
+
+
+def test_what_is_not_used_for_long_is_deleted_and_its_mark_before_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(machine_code, "CHOSEN_BY_USER", "")
+    source = Path(__file__)
+    folder = machine_code.folder_of(source)
+    other = folder.with_name("0123")
+    for one in (folder, other):
+        (one / "code").mkdir(parents=True)
+        os.utime(one, (0.0, 0.0))
+    machine_code.mark_ready(source, ("used", "unused"))
+    marks = sorted((folder.parent / "ready").iterdir())
+    for one in marks:
+        os.utime(one, (0.0, 0.0))
+    assert machine_code.is_marked(source, "used")
+    machine_code.note_use(folder)
+
+    machine_code.drop_unused(machine_code.KEPT_S + 43200.0)  # half a day too long
+    assert machine_code.is_marked(source, "used") and not machine_code.is_marked(source, "unused")
+    assert (folder / "code").is_dir() and (other / "code").is_dir()
+    machine_code.drop_unused(time.time())
+    assert (folder / "code").is_dir() and not other.exists()
 
 
 def test_nothing_is_to_be_compiled_where_numba_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
