@@ -588,12 +588,10 @@ class VehicleEndpoint:
                         self._consequences.append(self._parameters.world())
                     return _ACCEPTED
                 case FailParts(parameter, bits, fail):
-                    outputs = self._parameters.fail_parts(parameter, bits, fail)
-                    if outputs is None:
-                        return Verdict(
-                            mavlink.MAV_RESULT_DENIED, f"Failure: the simulator has told of no {parameter}"
-                        )
-                    self._consequences += outputs
+                    asked = self._parameters.fail_parts(parameter, bits, fail)
+                    if isinstance(asked, str):
+                        return Verdict(mavlink.MAV_RESULT_DENIED, f"Failure: {asked}")
+                    self._consequences.append(asked)
                     return _ACCEPTED
                 case RequestCapabilities():
                     return self._request_message(

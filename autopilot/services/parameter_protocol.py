@@ -140,13 +140,17 @@ class ParameterService:
             text += f"; {kept} are fixed while running"
         return [*outputs, Say(mavlink.MAV_SEVERITY_NOTICE, text)]
 
-    def fail_parts(self, name: str, bits: int, fail: bool) -> list[Output] | None:
-        """Let fail or work what these bits of a simulator's parameter stand for; None: it has none such."""
+    def fail_parts(self, name: str, bits: int, fail: bool) -> WorldAsked | str:
+        """Let fail or work what these bits of a simulator's parameter stand for; a text says why it cannot.
+
+        The value is in our table at once, so that commands which follow each other at once add up.
+        """
         if name not in self.table.learned:
-            return None
+            return f"the simulator has told of no {name}"
+        if self.world_silent:
+            return "the simulator is silent"
         before = int(self.table[name])
-        after = self.table.set(name, before | bits if fail else before & ~bits)
-        return [WorldAsked(name, after)]
+        return WorldAsked(name, self.table.set(name, before | bits if fail else before & ~bits))
 
     def world(self) -> WorldSaved:
         """What the simulator's parameters are now."""

@@ -42,8 +42,9 @@ FLOWN = [
     "Landed, disarmed",
 ]
 FAILSAFE = m.PLUMBLINE_PHASE_FAILSAFE
+ARMED = "Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED"
 # A text is said once, and a busy MAVProxy can miss it; this it takes from the heartbeats.
-ARMED, DISARMED = "Got COMMAND_ACK: COMPONENT_ARM_DISARM: ACCEPTED", "DISARMED"
+DISARMED = "DISARMED"
 
 
 @pytest.mark.parametrize(

@@ -530,6 +530,15 @@ def test_sensors_fail_and_work_again_by_the_simulators_parameter(rig):
         assert rig.events[-1] == WorldAsked("SIM_SENS_FAIL", failed)
 
 
+def test_nothing_fails_in_a_simulator_that_is_silent(rig):
+    rig.table.learn(Parameter("SIM_ENGINE_FAIL", 0.0, 0.0, 15.0, "", ""))
+    rig.endpoint.world_silent(True)
+    told = {x.get_type(): x for x in rig.replies(long(420, (101, 1, 2)))}
+    assert told["COMMAND_ACK"].result == mavlink.MAV_RESULT_DENIED
+    assert told["STATUSTEXT"].text == "Failure: the simulator is silent"
+    assert rig.table["SIM_ENGINE_FAIL"] == 0.0 and rig.events == []
+
+
 def test_the_simulators_parameters_are_saved_on_request_alone(rig):
     rig.table.learn(Parameter("SIM_WIND_E", 0.0, -100.0, 100.0, "", ""))
     rig.send(mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_E", 3.0, mavlink.MAV_PARAM_TYPE_REAL32))
