@@ -32,8 +32,8 @@ pytestmark = [
 ]
 HOME = Home()
 SPEED = 2.0
-# MAVProxy takes a millisecond a message, and what it has no time for it loses: its clock is that of the wall
-MAVPROXY_SPEED = 1.0
+# clients in Python take a millisecond a message, by the wall's clock, and lose what they have no time for
+PYTHON_SPEED = 1.0
 SURVEY = Path(__file__).with_name("survey.plan")
 FLOWN = [
     "Cable taut, lifting the load",
@@ -77,7 +77,7 @@ class Watched(NamedTuple):
 
 @staged
 def mavsdk_and_two_ground_stations(stage: Stage) -> Watched:
-    stage.begin("--set", "MAV_LOAD_SYS_ID=2", "--set", "MAV_PARAM_INT=1", speed=MAVPROXY_SPEED)
+    stage.begin("--set", "MAV_LOAD_SYS_ID=2", "--set", "MAV_PARAM_INT=1", speed=PYTHON_SPEED)
     stays = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     vanishes = stage.mavproxy(f"tcp:{LOOPBACK}:{stage.tcp}")
     for program in (stays, vanishes):
@@ -222,7 +222,7 @@ def _fly_by_hand(program: Mavproxy, directory: Path) -> None:
 
 @staged
 def mavproxy_and_a_survey(stage: Stage) -> Surveyed:
-    stage.begin(speed=MAVPROXY_SPEED)
+    stage.begin(speed=PYTHON_SPEED)
     program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     _fly_by_hand(program, stage.directory)
     program.insist("long DO_SET_MODE 129 4 4", "MISSION>")
@@ -361,7 +361,7 @@ class Looped(NamedTuple):
 
 @staged
 def mavproxy_in_a_loop(stage: Stage) -> Looped:
-    stage.begin(speed=MAVPROXY_SPEED)
+    stage.begin(speed=PYTHON_SPEED)
     program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     program.expect("parameters (ftp)")
     _ask_for_home_and_the_fence(program)
@@ -399,7 +399,7 @@ class Ardupilot(NamedTuple):
 
 @staged
 def clients_of_ardupilot(stage: Stage) -> Ardupilot:
-    stage.begin("--set", "MAV_IDENTITY=1", speed=MAVPROXY_SPEED)
+    stage.begin("--set", "MAV_IDENTITY=1", speed=PYTHON_SPEED)
     dronekit = stage.program("dronekit_flight.py", f"tcp:{LOOPBACK}:{stage.tcp}", "ardupilot")()
     program = stage.mavproxy(f"udpin:{LOOPBACK}:{stage.gcs}")
     program.expect("parameters (ftp)")
@@ -445,7 +445,7 @@ def test_mavproxy_flies_an_ardupilot_by_the_names_of_its_modes(
 
 @staged
 def scripts(stage: Stage) -> tuple[Told, Told, Witness]:
-    stage.begin(speed=SPEED)
+    stage.begin(speed=PYTHON_SPEED)
     told = stage.program("pymavlink_flight.py", f"udpin:{LOOPBACK}:{stage.gcs}")()
     return told, stage.program("dronekit_flight.py", f"tcp:{LOOPBACK}:{stage.tcp}", "px4")(), stage.witness
 

@@ -7,11 +7,13 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from pymavlink import mavutil
 
 LONG_S = 120.0  # of a busy machine
+AGAIN_S = 3.0  # after which a question is asked again: who has no time to read loses answers
 RELATIVE_INT = mavutil.mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 POSITION_ONLY = 0b110111111000
 MISSION, FENCE, RALLY = 0, 1, 2
@@ -26,10 +28,19 @@ class Script:
         self.link.wait_heartbeat(timeout=LONG_S)
         self.to = (self.link.target_system, self.link.target_component)
 
-    def await_(self, kind: str, condition: Callable[[Any], Any] = lambda message: True) -> Any:
-        """The next message of a kind that is such."""
+    def await_(
+        self,
+        kind: str | list[str],
+        condition: Callable[[Any], Any] = lambda message: True,
+        ask: Callable[[], None] = lambda: None,
+    ) -> Any:
+        """The next message of a kind that is such; `ask` asks for it, as often as that takes."""
+        asked = -math.inf
         until = time.monotonic() + LONG_S
         while time.monotonic() < until:
+            if time.monotonic() > asked + AGAIN_S:
+                asked = time.monotonic()
+                ask()
             message = self.link.recv_match(type=kind, blocking=True, timeout=1.0)
             if message is not None and condition(message):
                 return message
@@ -37,39 +48,52 @@ class Script:
 
     def command(self, number: int, *params: float) -> int:
         """COMMAND_LONG; its result."""
-        self.link.mav.command_long_send(*self.to, number, 0, *(*params, *[0.0] * 7)[:7])
-        return int(self.await_("COMMAND_ACK", lambda ack: ack.command == number).result)
+
+        def ask() -> None:
+            self.link.mav.command_long_send(*self.to, number, 0, *(*params, *[0.0] * 7)[:7])
+
+        return int(self.await_("COMMAND_ACK", lambda ack: ack.command == number, ask).result)
 
     def mode(self, name: str) -> None:
         """By its name, as `mavutil` has it."""
-        self.link.set_mode(name)
-        assert self.await_("COMMAND_ACK", lambda ack: ack.command == 176).result == 0
+        ask = partial(self.link.set_mode, name)
+        assert self.await_("COMMAND_ACK", lambda ack: ack.command == 176, ask).result == 0
         self.await_("HEARTBEAT", lambda beat: beat.get_srcComponent() == 1 and self.link.flightmode == name)
 
     def parameter(self, name: str, value: float) -> float:
         """Set, then read by its name."""
-        self.link.param_set_send(name, value)
-        self.await_("PARAM_VALUE", lambda answer: answer.param_id == name and answer.param_value == value)
-        self.link.param_fetch_one(name)
-        return float(self.await_("PARAM_VALUE", lambda answer: answer.param_id == name).param_value)
+        ask = partial(self.link.param_set_send, name, value)
+        self.await_(
+            "PARAM_VALUE", lambda answer: answer.param_id == name and answer.param_value == value, ask
+        )
+        ask = partial(self.link.param_fetch_one, name)
+        return float(self.await_("PARAM_VALUE", lambda answer: answer.param_id == name, ask).param_value)
 
     def send_items(self, kind: int, items: list[Any]) -> int:
         """Upload; the result."""
         self.link.mav.mission_count_send(*self.to, len(items), kind)
         while True:
-            asked = self.await_(["MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"])
+            asked = self.await_(
+                ["MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"],
+                lambda one: one.mission_type == kind,
+            )
             if asked.get_type() == "MISSION_ACK":
                 return int(asked.type)
             self.link.mav.send(items[asked.seq])
 
     def fetch_items(self, kind: int) -> list[Any]:
         """Download."""
-        self.link.mav.mission_request_list_send(*self.to, kind)
-        count = self.await_("MISSION_COUNT", lambda answer: answer.mission_type == kind).count
+        ask = partial(self.link.mav.mission_request_list_send, *self.to, kind)
+        count = self.await_("MISSION_COUNT", lambda answer: answer.mission_type == kind, ask).count
         items = []
         for seq in range(count):
-            self.link.mav.mission_request_int_send(*self.to, seq, kind)
-            items.append(self.await_("MISSION_ITEM_INT", lambda item, seq=seq: item.seq == seq))
+            ask = partial(self.link.mav.mission_request_int_send, *self.to, seq, kind)
+            this = (kind, seq)
+            items.append(
+                self.await_(
+                    "MISSION_ITEM_INT", lambda item, it=this: (item.mission_type, item.seq) == it, ask
+                )
+            )
         self.link.mav.mission_ack_send(*self.to, 0, kind)
         return items
 
@@ -83,10 +107,11 @@ def main(address: str) -> None:
     script = Script(address)
     link, told = script.link, {}
     told["modes"] = sorted(link.mode_mapping())
-    link.param_fetch_all()
     names: set[str] = set()
     script.await_(
-        "PARAM_VALUE", lambda answer: names.add(answer.param_id) or len(names) == answer.param_count
+        "PARAM_VALUE",
+        lambda answer: names.add(answer.param_id) or len(names) == answer.param_count,
+        link.param_fetch_all,
     )
     told["parameters"] = len(names)
     told["real"], told["whole"] = script.parameter("MIS_SPEED", 1.25), script.parameter("MIS_SHAPE", 1.0)
@@ -125,8 +150,7 @@ def main(address: str) -> None:
     script.await_("MISSION_ITEM_REACHED", lambda item: item.seq == 2)
     script.mode("RTL")
     link.motors_disarmed_wait()
-    link.mav.log_request_list_send(*script.to, 0, 0xFFFF)
-    entry = script.await_("LOG_ENTRY")
+    entry = script.await_("LOG_ENTRY", ask=partial(link.mav.log_request_list_send, *script.to, 0, 0xFFFF))
     told["logs"] = [entry.num_logs, entry.size]
     print(json.dumps(told))
 
