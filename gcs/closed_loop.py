@@ -98,4 +98,4 @@ def fly(
         if answer is not None:
             simulator.receive(answer)
         simulator.advance()
-    return client.outcome
+    return client.outcome.of_mission(mission)

@@ -9,7 +9,8 @@ from autopilot.wire.items import MissionItemError, WireItem, encode_mission, ste
 from gcs.errors import InputError
 from missions.model import KINDS, Mission
 
-_ITEM = re.compile(r"\bitem (\d+)\b", re.IGNORECASE)
+# "item 2 of 3" counts the items of the upload, and says so
+_ITEM = re.compile(r"\bitem (\d+)\b(?! of \d)", re.IGNORECASE)
 
 
 def items_of(mission: Mission, home: Home) -> tuple[WireItem, ...]:

@@ -53,8 +53,9 @@ class _ContentLocator:
 
     def ensure_cache_path(self) -> None:
         """Make the directory."""
-        self.get_cache_path().mkdir(parents=True, exist_ok=True)
-        note_use(folder_of(self._path))
+        path = self.get_cache_path()
+        path.mkdir(parents=True, exist_ok=True)
+        note_use(path.parent)
 
     def get_cache_path(self) -> Path:
         """Directory of the machine code."""

@@ -25,7 +25,8 @@ from tempfile import NamedTemporaryFile
 from platformdirs import user_cache_path
 
 ROOT = Path(__file__).resolve().parents[2]
-KEPT_S = 90.0 * 86400.0  # that machine code is kept without being used
+_DAY_S = 86400.0
+KEPT_S = 90.0 * _DAY_S  # that machine code is kept without being used
 _MARKS = "ready"
 CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
 # it begins with letters, which are found fast: what is found in a text too does no harm
@@ -108,12 +109,12 @@ def drop_unused(now_s: float) -> None:
     day longer: no flight finds a mark without the code.
     """
     with suppress(OSError):
-        for one in [*(_kernels() / _MARKS).iterdir(), *_kernels().iterdir()]:
-            age_s = now_s - one.stat().st_mtime
-            if one.parent.name == _MARKS and age_s > KEPT_S:
-                one.unlink()
-            elif one.is_dir() and one.name != _MARKS and age_s > KEPT_S + 86400.0:
-                shutil.rmtree(one, ignore_errors=True)
+        for mark in (_kernels() / _MARKS).iterdir():
+            if now_s - mark.stat().st_mtime > KEPT_S:
+                mark.unlink()
+        for folder in _kernels().iterdir():
+            if folder.name != _MARKS and now_s - folder.stat().st_mtime > KEPT_S + _DAY_S:
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 @cache

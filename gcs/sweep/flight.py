@@ -31,7 +31,6 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
-from gcs.mission_items import of_mission
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of_autopilot, code_of_world, fly_stretch
 from gcs.sweep.wire import most_readings, wire_rate
@@ -104,8 +103,8 @@ def boarding(mission: Mission, conditions: Conditions) -> Boarding:
     if Phase.TAUTEN not in times:
         raise ValueError(
             f"{mission.name} does not start under the conditions of the sweep: "
-            f"{of_mission(outcome.reason, mission)} (MIS_INFEASIBLE says what becomes of a path that cannot "
-            "be flown: 0 as asked, 1 slower)"
+            f"{outcome.reason} (MIS_INFEASIBLE says what becomes of a path that cannot be flown: 0 as asked, "
+            "1 slower)"
         )
     return Boarding(times.get(Phase.ARMED, times[Phase.TAUTEN]), times[Phase.TAUTEN])
 

@@ -38,11 +38,10 @@ def fly_here(
                 display.update(client.progress)
             return True
 
-        outcome = fly(
+        return fly(
             mission,
             Conditions(options.vehicle, options.sensors, options.seed, settings, options.own),
             log,
             watch,
             client,
         )
-    return outcome.of_mission(mission)

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from autopilot.wire.codec import decode
+from autopilot.wire.codec import Received, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.samples import CARRIED
 from gcs.shell.link import LOOPBACK, free_port
@@ -52,14 +52,6 @@ def complaints(text: str) -> list[str]:
 
 Place = tuple[float, float, float]  # east, north, up
 
-# what the witness takes; the others it does not even decode, for the processor is the clients'
-TAKEN = {
-    mavlink.MAVLINK_MSG_ID_LOAD_STATE,
-    mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE,
-    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
-}
-
 
 @dataclass
 class Witness:
@@ -81,25 +73,28 @@ class Witness:
         while not self._over.is_set():
             for sock in select.select([self.truth, self.ground], [], [], 0.2)[0]:
                 for one in decode(sock.recv(65535))[0]:
-                    if one.id in TAKEN:
-                        self._take(one.id, one.message)
+                    self._take(one)
 
-    def _take(self, message_id: int, message: Any) -> None:
-        match message_id:
+    def _take(self, one: Received) -> None:
+        """Of other messages it does not even decode the fields: the processor is the clients'."""
+        match one.id:
             case mavlink.MAVLINK_MSG_ID_LOAD_STATE:
+                message = one.message
                 if message.source == mavlink.PLUMBLINE_SOURCE_TRUTH:
                     self.load.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
             case mavlink.MAVLINK_MSG_ID_LOAD_SETPOINT:
+                message = one.message
                 if message.phase in CARRIED:
                     self.asked.append((message.time_usec * 1e-6, (message.y, message.x, -message.z)))
                 if self.phases[-1:] != [message.phase]:
                     self.phases.append(message.phase)
             case mavlink.MAVLINK_MSG_ID_ATTITUDE:
+                message = one.message
                 self.attitudes.append((time.monotonic(), 1e-3 * message.time_boot_ms))
                 self.tilt = max(self.tilt, abs(message.roll), abs(message.pitch))
                 self.yaw = message.yaw
             case mavlink.MAVLINK_MSG_ID_STATUSTEXT:
-                self.texts.append(message.text)
+                self.texts.append(one.message.text)
 
     def nearest(self, place: Place) -> float:
         """How near the load truly came to a place, m; between two samples it is taken to go straight."""
@@ -179,12 +174,14 @@ class Mavproxy:
         """Type `line` every few seconds until it has said `text`: a busy MAVProxy misses answers; and what it
         hears before the first HEARTBEAT it takes for the parameters of another vehicle."""
         until = time.monotonic() + LONG_S
-        while text not in self.text:
-            assert time.monotonic() < until, f"MAVProxy did not say {text!r} but {self.all[-2000:]!r}"
+        while True:
             self.type(line)
             again = time.monotonic() + 3.0
             while text not in self.text and time.monotonic() < again:
                 self._read(again - time.monotonic())
+            if text in self.text:
+                break
+            assert time.monotonic() < until, f"MAVProxy did not say {text!r} but {self.all[-2000:]!r}"
         self.text = self.text.partition(text)[2]
 
     def _read(self, timeout_s: float) -> bool:

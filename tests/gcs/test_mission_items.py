@@ -20,6 +20,7 @@ CASE_C = load_mission("case-c")  # signals are its items[2], and items 2 ... 7 o
         ),
         ("Item 2 flown 1.31 times as long", "Item 2 flown 1.31 times as long"),
         ("Item 8, then item 1", "Item 8 (items[3] of the mission), then item 1"),
+        ("disarmed at item 7 of 10", "disarmed at item 7 of 10"),
         ("the last is 17", "the last is 17"),
         ("", ""),
     ],
