@@ -54,6 +54,7 @@ from autopilot.services.records import (
     ParameterChanged,
     Verdict,
     WorldAsked,
+    WorldSaved,
 )
 from autopilot.services.requests import (
     FLOWN,
@@ -581,7 +582,13 @@ class Onboard:
                     self._world.ask(name, value)
                 case _:
                     pass  # the shell waits for it, stores it, or shows it
-        return [event for event in events if self._outlives(event)]
+        return [self._as_asked(event) for event in events if self._outlives(event)]
+
+    def _as_asked(self, event: Event) -> Event:
+        """The event; a world that is to be saved with what the simulator has not answered yet."""
+        if isinstance(event, WorldSaved) and event.values:
+            return WorldSaved({**event.values, **self._world.asked})
+        return event
 
     def _outlives(self, event: Event) -> bool:
         """Whether the shell is to store it: not what is asked of the world, nor the loss of the link."""

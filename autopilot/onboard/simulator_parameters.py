@@ -35,6 +35,11 @@ class WorldParameters:
         """Set a parameter in the simulator."""
         self._wanted[name] = (value, 0)
 
+    @property
+    def asked(self) -> dict[str, float]:
+        """What is to be set in the simulator, which has not answered yet."""
+        return {name: value for name, (value, _) in self._wanted.items()}
+
     def forget_asked(self) -> None:
         """Set nothing of what was asked for and not answered: whoever asked will have given up. What is
         restored is still wanted."""

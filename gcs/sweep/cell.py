@@ -38,6 +38,7 @@ from sitl.vehicles.truth import truth_of
 class Cell:
     """All of a flight but its seed."""
 
+    mission: Mission
     setup: Setup
     plan: MissionPlan
     items: int  # of the mission
@@ -79,6 +80,7 @@ def _cell(
     setup = build_setup(table, every, own)
     items = tuple(encode_mission(mission, home))
     return Cell(
+        mission=mission,
         setup=setup,
         plan=_plan(items, setup.settings.limits) if setup.planner is None else _own_plan(items, setup),
         items=len(items),

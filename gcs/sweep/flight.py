@@ -31,6 +31,7 @@ from autopilot.wire.dialect import plumbline as mavlink
 from gcs.clients.flight import READY_LIMIT_US
 from gcs.closed_loop import Conditions
 from gcs.closed_loop import fly as fly_with_wire
+from gcs.mission_items import of_mission
 from gcs.sweep.cell import Cell, cell_of
 from gcs.sweep.kernel import NO_FIGURES, Code, Figures, code_of_autopilot, code_of_world, fly_stretch
 from gcs.sweep.wire import most_readings, wire_rate
@@ -250,9 +251,15 @@ class SweptFlight:
     def _ask(self, request: Arm | StartMission, now_us: int) -> None:
         verdict = self.core.ask(request, now_us)
         if verdict.result != mavlink.MAV_RESULT_ACCEPTED:
-            self.flown.outcome, self.flown.reason = "refused", verdict.text or ""
+            self._end("refused", verdict.text or "")
 
     # ---- how it ends
+
+    def _end(self, outcome: str, reason: str, lost_phase: str = "") -> None:
+        """The flight is over, for a reason that is told in the mission's terms."""
+        flown = self.flown
+        flown.outcome, flown.reason = outcome, of_mission(reason, self.cell.mission)
+        flown.lost_phase = lost_phase
 
     def _hear(self, texts: tuple[tuple[int, str], ...], phase: Phase) -> None:
         if phase == Phase.MISSION:
@@ -262,31 +269,27 @@ class SweptFlight:
             if severity <= mavlink.MAV_SEVERITY_WARNING:
                 self._warned.append(text)
             if severity <= mavlink.MAV_SEVERITY_CRITICAL and self.airborne_us >= 0:
-                self.flown.outcome, self.flown.reason = "diverged", text
-                self.flown.lost_phase = phase.name.lower()
+                self._end("diverged", text, phase.name.lower())
 
     def _judge(self, now_us: int) -> None:
-        flown, flight = self.flown, self.core.flight
-        if flown.outcome:
+        flight = self.core.flight
+        if self.flown.outcome:
             return
         if self.airborne_us >= 0 and flight.phase == Phase.DISARMED:
             self._landed()
         elif self.airborne_us >= 0 and now_us - self.airborne_us > self.cell.limit_us:
             where: str = flight.phase.name.lower()
-            flown.outcome, flown.lost_phase = "timeout", where
-            flown.reason = (
-                f"not landed after {self.cell.limit_us * 1e-6:.0f} s of flight: still in phase {where}"
-            )
+            limit_s = self.cell.limit_us * 1e-6
+            self._end("timeout", f"not landed after {limit_s:.0f} s of flight: still in phase {where}", where)
 
     def _landed(self) -> None:
         """The vehicle is disarmed; said as `gcs fly` says it."""
         if self.core.flight.mission.done:
-            self.flown.outcome = "completed"
+            self._end("completed", "")
             return
         where = f"item {self.item} of {self.cell.items - 1}"
-        self.flown.outcome = "interrupted"
         ended = f"the vehicle was disarmed before the end of the mission, at {where}"
-        self.flown.reason = "; ".join([*dict.fromkeys(self._warned), ended])
+        self._end("interrupted", "; ".join([*dict.fromkeys(self._warned), ended]))
 
     def conclude(self) -> Flown:
         """What became of the flight."""

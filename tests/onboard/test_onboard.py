@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from autopilot.onboard.onboard import Onboard
 from autopilot.onboard.simulator_parameters import WorldParameters
 from autopilot.services.mission_store import StoredMission
+from autopilot.services.records import WorldSaved
 from autopilot.supervisor.state import Phase
 from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
@@ -355,6 +356,20 @@ def test_what_the_simulator_refuses_is_never_said_to_be_set() -> None:
         assert values == [pytest.approx(told)], asked
         refused = "SIM_LOAD_MASS = -5.0 kg; must be 0.001 ... 10"
         assert (refused in craft.texts) == (asked < 0.0)
+
+
+def test_what_the_simulator_has_not_answered_yet_is_saved_as_it_was_asked_for() -> None:
+    craft = Craft()
+    craft.wait(1.0)
+    before = craft.onboard.parameters["SIM_WIND_N"]
+    message = mavlink.MAVLink_param_set_message(1, 1, b"SIM_WIND_E", 2.5, mavlink.MAV_PARAM_TYPE_REAL32)
+    save = mavlink.MAVLink_command_long_message(
+        1, 1, mavlink.MAV_CMD_PREFLIGHT_STORAGE, 0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+    ground = FrameWriter(255, 190)
+    events = craft.onboard.receive_ground(ground.frame(message) + ground.frame(save), GCS)
+    (saved,) = (event for event in events if isinstance(event, WorldSaved))
+    assert (saved.values["SIM_WIND_E"], saved.values["SIM_WIND_N"]) == (2.5, before)
 
 
 def test_the_loss_of_the_link_is_set_and_taken_back_whatever_is_lost_and_not_stored() -> None:

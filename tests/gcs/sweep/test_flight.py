@@ -149,6 +149,12 @@ def test_same_end_at_the_fence(swung: str, action: float, outcome: str) -> None:
         assert np.hypot(states[:, 0], states[:, 1]).max() < FENCE_M + 0.05
 
 
+def test_a_refusal_names_the_item_of_the_mission_and_not_of_the_upload() -> None:
+    mission = load_mission("case-c")
+    found = fly(mission, Conditions(settings={"GF_MAX_HOR_DIST": 10.0}), boarding(mission, Conditions()))
+    assert "item 7 (items[2] of the mission) leads beyond the fence" in found.reason
+
+
 def test_a_mission_that_leads_over_the_fence_is_refused(short: str) -> None:
     mission = load_mission(short)
     arms = boarding(mission, Conditions())
