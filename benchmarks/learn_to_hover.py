@@ -1,6 +1,6 @@
 """Teach a policy to hover the load: PPO of Stable-Baselines3 on the compiled environments.
 
-    pip install 'plumbline[learn]'
+    pip install -e '.[learn]'
     python benchmarks/learn_to_hover.py out/hover-policy.npz
 
 prints what is learned as it goes, and how well the policy hovers at the end; the file flies as a law.

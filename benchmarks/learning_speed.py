@@ -1,6 +1,6 @@
 """How many physics steps a second the environments take, beside mujoco.rollout of the same vehicle.
 
-    pip install 'plumbline[peers]'
+    pip install -e '.[peers]'
     python benchmarks/learning_speed.py
 
 A physics step is one Runge-Kutta step of the plant of 4 ms. The environments are stepped as a learner does:

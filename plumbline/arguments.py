@@ -23,6 +23,10 @@ _PHRASES = (  # of the command line, and what they are in Python
     (r"; see gcs [a-z ]*--help$", ""),
     (r"Invalid value for '--([a-z]+)'", r"\1"),
     (r"--set ", "settings: "),
+    (
+        r"\(other addresses: --connect (\d+) or --connect HOST:PORT\)",
+        r'(another address: connect("udpin:127.0.0.1:\1"))',
+    ),
     (r"--connect (?=[A-Z0-9])", "connect to "),
     (r"(?<![\w-])--([a-z]+)", r"\1"),
 )

@@ -52,7 +52,9 @@ def require_libraries() -> None:
     try:
         import mcap_protobuf.writer  # noqa: F401
     except ImportError:
-        raise GcsError("flight.mcap needs more libraries: pip install 'plumbline[mcap]'") from None
+        raise GcsError(
+            "flight.mcap needs more libraries: pip install -e '.[mcap]' in the clone of Plumbline"
+        ) from None
 
 
 def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layout) -> None:

@@ -115,7 +115,9 @@ def dask_cluster(address: str) -> Iterator[tuple[Executor, int]]:
     try:
         from distributed import Client
     except ImportError:
-        raise GcsError("--scheduler needs Dask; install it with: pip install 'plumbline[dask]'") from None
+        raise GcsError(
+            "--scheduler needs Dask; install it with: pip install -e '.[dask]' in the clone of Plumbline"
+        ) from None
     try:
         client = Client(address, timeout="10s", set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:

@@ -5,7 +5,7 @@
     env = gymnasium.make("plumbline/Hover-v0")
     envs = gymnasium.make_vec("plumbline/LoadTracking-v0", num_envs=256)
 
-This module registers them. It needs the extra: pip install 'plumbline[gym]'.
+This module registers them. It needs the extra: pip install -e '.[gym]'.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gcs.errors import GcsError
 try:
     import gymnasium
 except ModuleNotFoundError:
-    raise GcsError("gymnasium is not installed; pip install 'plumbline[gym]'") from None
+    raise GcsError("gymnasium is not installed; pip install -e '.[gym]' in the clone of Plumbline") from None
 
 HOVER, LOAD_TRACKING = "plumbline/Hover-v0", "plumbline/LoadTracking-v0"
 _STEPS = 500  # of an episode of hovering: 10 s at 50 Hz

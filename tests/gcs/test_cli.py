@@ -280,7 +280,7 @@ def test_a_busy_port_is_one_line():
 def test_a_file_that_cannot_be_written_is_told_before_the_report_is_made(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap_protobuf.writer", None)
     line = one_line(run("report", str(tmp_path), "--mcap"), EXIT_ERROR)
-    assert line == "gcs: flight.mcap needs more libraries: pip install 'plumbline[mcap]'"
+    assert line == "gcs: flight.mcap needs more libraries: pip install -e '.[mcap]' in the clone of Plumbline"
 
 
 def test_a_report_of_nothing_is_one_line(tmp_path):

@@ -223,5 +223,5 @@ def test_what_is_wrong_is_told_in_one_line(options: dict[str, Any], told: str) -
 def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     monkeypatch.delitem(sys.modules, "plumbline.learning")
-    with pytest.raises(plumbline.Error, match=r"pip install 'plumbline\[gym\]'"):
+    with pytest.raises(plumbline.Error, match=r"pip install -e '.\[gym\]' in the clone"):
         import_module("plumbline.learning")

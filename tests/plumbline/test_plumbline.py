@@ -89,7 +89,10 @@ def test_a_library_that_is_missing_is_named_before_anything_is_flown(
         with pytest.raises(plumbline.Error, match="polars is not installed; pip install polars"):
             call()
     for call in (flight.telemetry, lambda: plumbline.sweep("hover")):
-        with pytest.raises(plumbline.Error, match=r"pandas is not .*; pip install 'plumbline\[pandas\]', or"):
+        with pytest.raises(
+            plumbline.Error,
+            match=r"pandas is not .*; pip install -e '.\[pandas\]' in the clone of Plumbline, or",
+        ):
             call()
     assert capsys.readouterr().err == ""
 

@@ -14,7 +14,8 @@ WRONG: dict[str, tuple[Any, str]] = {
     "address": (lambda: plumbline.connect("14550x"), "address '14550x'; must be PORT, HOST:PORT, udpin:"),
     "nobody": (
         lambda: plumbline.connect(f"udpin:127.0.0.1:{free_port()}", timeout_s=0.1),
-        "within 0.1 s; is autopilot running, with its simulator, and sending there?",
+        "within 0.1 s; is autopilot running, with its simulator, and sending there? "
+        '(another address: connect("udpin:127.0.0.1:14540"))',
     ),
     "nobody to speak to": (
         lambda: plumbline.connect(f"udpout:127.0.0.1:{free_port()}", timeout_s=0.1),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("mcap_protobuf", reason="pip install 'plumbline[mcap]'")
+pytest.importorskip("mcap_protobuf", reason="pip install -e '.[mcap]'")
 
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
