@@ -18,9 +18,11 @@ from gcs.clients.connection import Connection
 from gcs.clients.operation import Target
 from gcs.clients.vehicle_view import VehicleView
 from gcs.view.link_quality import LinkQuality
+from gcs.view.tether import Tether
 from gcs.view.truth import Place, Truth
 
 _LONGEST_SHOWN = 1.25  # of its cable: a load that is further from its vehicle has left it
+_BEYOND_M = 0.2  # the same of an estimate, which need not see a load that has left
 _ESTIMATES = 8  # that wait for the truth of their time
 _NOT_CARRIED = {mavlink.PLUMBLINE_PHASE_DISARMED, mavlink.PLUMBLINE_PHASE_ARMED}
 
@@ -33,7 +35,7 @@ class WatchedVehicle:
         self.connection = connection
         self.origin: Home | None = None  # of the picture
         self._home: Home | None = None
-        self._cable: float | None = None
+        self._tether = Tether(_BEYOND_M)  # as the vehicle believes
         self.view = VehicleView()
         self.truth = Truth()
         self.link = LinkQuality()
@@ -59,6 +61,7 @@ class WatchedVehicle:
         self.view.update(one, now_us)
         if one.id == mavlink.MAVLINK_MSG_ID_LOAD_STATE:
             load = one.message
+            self._tether.see(load)
             self._believed.append((load.time_usec, (load.x, load.y, load.z)))
         if one.id == mavlink.MAVLINK_MSG_ID_PARAM_VALUE:
             message = one.message
@@ -146,15 +149,20 @@ class WatchedVehicle:
         if message is None or not math.isfinite(message.x):
             return None, None
         taut = bool(message.taut)
-        if taut and math.isfinite(message.distance):
-            self._cable = message.distance
-        attached = taut or not message.distance > _LONGEST_SHOWN * self.cable
+        far = message.distance > _LONGEST_SHOWN * self.cable
+        attached = taut or (self._known_tether.attached and not far)
         return {"position": _moved((message.x, message.y, message.z), offset), "attached": attached}, taut
 
     @property
     def cable(self) -> float:
         """How long the cable was when it was taut last; a winch may have changed it since take-off."""
-        return self._cable or self.layout()["cable"]
+        return self._known_tether.length_m or self.layout()["cable"]
+
+    @property
+    def _known_tether(self) -> Tether:
+        """In truth, where that is known."""
+        true = self.truth.message(mavlink.MAVLINK_MSG_ID_LOAD_STATE)
+        return self._tether if true is None else self.truth.tether
 
     def _pose(self) -> tuple[Sequence[float] | None, Sequence[float] | None]:
         true = self.truth.pose(self.home)

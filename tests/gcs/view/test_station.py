@@ -302,24 +302,49 @@ def test_whatever_numbers_a_vehicle_says_the_page_gets_json(sent: list[Any]) -> 
     json.dumps([station.news(), station.greeting()], allow_nan=False)
 
 
-def test_the_error_of_the_estimator_is_that_of_one_time() -> None:
+TRUTH, ESTIMATE = mavlink.PLUMBLINE_SOURCE_TRUTH, mavlink.PLUMBLINE_SOURCE_ESTIMATED
+
+
+def load(time_us: int, east: float, source: int, distance: float = 0.7, taut: int = 1) -> bytes:
+    zero = (0.0,) * 3
+    message = mavlink.MAVLink_load_state_message(
+        time_us, 0.0, east, -1.0, *zero, 0.0, 0.0, 1.0, *zero, distance, 1.0, 0, taut, source
+    )
+    return FrameWriter(1, 25).frame(message)
+
+
+@pytest.mark.parametrize("source", [TRUTH, ESTIMATE])
+def test_a_load_that_has_left_its_cable_is_not_on_it_again_because_the_vehicle_lands_beside_it(
+    source: int,
+) -> None:
     station = Station()
     station.receive(heartbeat(1), 0)
 
-    def load(time_us: int, east: float, source: int) -> bytes:
-        zero = (0.0,) * 3
-        message = mavlink.MAVLink_load_state_message(
-            time_us, 0.0, east, -1.0, *zero, 0.0, 0.0, 1.0, *zero, 0.7, 1.0, 0, 1, source
-        )
-        return FrameWriter(1, 25).frame(message)
+    def attached(time_us: int, distance: float, taut: int) -> bool:
+        frame = load(time_us, 0.0, source, distance, taut)
+        if source == TRUTH:
+            station.receive_truth(frame)
+        else:
+            station.receive(frame, time_us)
+        found: bool = station.state(time_us)["vehicles"][0]["load"]["attached"]
+        return found
 
-    truth, estimate = mavlink.PLUMBLINE_SOURCE_TRUTH, mavlink.PLUMBLINE_SOURCE_ESTIMATED
+    assert attached(1000, 0.7, taut=1)
+    assert attached(2000, 0.5, taut=0), "slack"
+    assert not attached(3000, 0.95, taut=0), "released"
+    assert not attached(4000, 0.3, taut=0), "the vehicle has landed beside it"
+    assert attached(5000, 0.7, taut=1), "and carries it again"
+
+
+def test_the_error_of_the_estimator_is_that_of_one_time() -> None:
+    station = Station()
+    station.receive(heartbeat(1), 0)
     for time_us in (0, 8000, 16_000):  # 2 m/s east
-        station.receive_truth(load(time_us, 2e-6 * time_us, truth))
-    station.receive(load(12_000, 0.024 + 0.003, estimate), 0)
+        station.receive_truth(load(time_us, 2e-6 * time_us, TRUTH))
+    station.receive(load(12_000, 0.024 + 0.003, ESTIMATE), 0)
     (state,) = station.state(0)["vehicles"]
     assert state["estimator_error"] == pytest.approx(0.003, abs=1e-4)  # as it is rounded
-    station.receive(load(24_000, 9.0, estimate), 0)  # its truth has not come yet
+    station.receive(load(24_000, 9.0, ESTIMATE), 0)  # its truth has not come yet
     (state,) = station.state(0)["vehicles"]
     assert state["estimator_error"] == pytest.approx(0.003, abs=1e-4)
     assert not math.isnan(state["tension"])
