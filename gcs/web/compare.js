@@ -110,8 +110,12 @@
     group.onHover((t) => { if (!transport.playing) show(t === null ? transport.time : t); });
     group.onPick((t) => transport.set(t, true));
     byId("whole").addEventListener("click", () => group.reset());
-    const mission = bands.filter((band) => band.kind === "busy");
-    if (mission.length) group.zoom(mission[0].from - 0.5, mission[mission.length - 1].to + 0.5);
+    // the missions of all flights: the first may have ended early
+    const missions = flights.flatMap((flight) => flight.phases.filter((phase) => phase.kind === "busy").map(
+      (phase) => ({ from: phase.from - flight.begin, to: phase.to - flight.begin })));
+    if (missions.length) {
+      group.zoom(Math.min(...missions.map((one) => one.from)) - 0.5, Math.max(...missions.map((one) => one.to)) + 0.5);
+    }
     if (stage) {
       draw(stage, flights);
       stage.fit(flights.flatMap((flight) => flight.corners()));
