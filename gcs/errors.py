@@ -27,6 +27,12 @@ class GcsError(Exception):
         self.lines = lines
 
 
+def from_clone(extra: str) -> str:
+    """What pip is to install where only some need it: from the clone, as PyPI's `plumbline` is another
+    project."""
+    return f"-e '.[{extra}]' in the clone of Plumbline"
+
+
 class InputError(GcsError):
     """The command line names something that there is not, or a value or a file that cannot be."""
 

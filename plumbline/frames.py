@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import Any
 
-from gcs.errors import GcsError
+from gcs.errors import GcsError, from_clone
 
 
 def check_kind(kind: str) -> None:
@@ -13,7 +13,7 @@ def check_kind(kind: str) -> None:
     if kind not in ("pandas", "polars", "arrow"):
         raise GcsError(f"kind={kind!r}: there is none; must be pandas, polars or arrow")
     if kind != "arrow" and find_spec(kind) is None:
-        package = "-e '.[pandas]' in the clone of Plumbline" if kind == "pandas" else kind
+        package = from_clone(kind) if kind == "pandas" else kind
         raise GcsError(f"{kind} is not installed; pip install {package}, or ask for kind='arrow'")
 
 

@@ -572,6 +572,7 @@ class Onboard:
         if self._received_loss.drops(datagram, self.parameters[LOSS_PARAMETER]):
             return []
         events = self.endpoint.receive(datagram, link, self.now_us, self._decide, program)
+        kept: list[Event] = []
         for event in events:
             match event:
                 case MissionChanged(mission):
@@ -580,15 +581,14 @@ class Onboard:
                     self.take_areas(kind, items)
                 case WorldAsked(name, value):
                     self._world.ask(name, value)
+                case WorldSaved(values) if values:  # with what the simulator has not answered yet
+                    kept.append(WorldSaved({**values, **self._world.asked}))
+                    continue
                 case _:
                     pass  # the shell waits for it, stores it, or shows it
-        return [self._as_asked(event) for event in events if self._outlives(event)]
-
-    def _as_asked(self, event: Event) -> Event:
-        """The event; a world that is to be saved with what the simulator has not answered yet."""
-        if isinstance(event, WorldSaved) and event.values:
-            return WorldSaved({**event.values, **self._world.asked})
-        return event
+            if self._outlives(event):
+                kept.append(event)
+        return kept
 
     def _outlives(self, event: Event) -> bool:
         """Whether the shell is to store it: not what is asked of the world, nor the loss of the link."""

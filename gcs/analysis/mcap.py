@@ -24,7 +24,7 @@ from gcs.analysis.axes import Floats
 from gcs.analysis.parquet import flight_columns
 from gcs.analysis.samples import PHASE_NAMES, Samples
 from gcs.analysis.tracks import Telemetry
-from gcs.errors import GcsError
+from gcs.errors import GcsError, from_clone
 
 _WORLD, _VEHICLE, _LOAD = "world", "vehicle", "load"
 _EVERY_S = 0.04  # of the cable
@@ -52,9 +52,7 @@ def require_libraries() -> None:
     try:
         import mcap_protobuf.writer  # noqa: F401
     except ImportError:
-        raise GcsError(
-            "flight.mcap needs more libraries: pip install -e '.[mcap]' in the clone of Plumbline"
-        ) from None
+        raise GcsError(f"flight.mcap needs more libraries: pip install {from_clone('mcap')}") from None
 
 
 def write_mcap(path: Path, telemetry: Telemetry, samples: Samples, layout: Layout) -> None:

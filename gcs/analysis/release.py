@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gcs.analysis.tracks import LoadTrack
 
-_BEYOND_M = 0.02  # a slack cable is shorter than when it was taut; more than noise and single precision
+BEYOND_M = 0.02  # a slack cable is shorter than when it was taut; more than noise and single precision
 
 
 def attached(load: LoadTrack) -> NDArray[np.bool_]:
@@ -24,7 +24,7 @@ def attached(load: LoadTrack) -> NDArray[np.bool_]:
     last = np.searchsorted(taut, np.arange(n), side="right") - 1  # which of them, -1 before the first
     length_m = load.distance_m[taut[np.maximum(last, 0)]]
     slack = (load.taut != 1) & (last >= 0)
-    apart = slack & (load.distance_m > length_m + _BEYOND_M)
+    apart = slack & (load.distance_m > length_m + BEYOND_M)
     lost = np.zeros(len(taut) + 1, dtype=np.bool_)
     lost[last[apart]] = True
     return np.asarray(~(slack & lost[last]))

@@ -15,7 +15,7 @@ from multiprocessing import get_context, parent_process
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from gcs.batch.runner import Running
-from gcs.errors import GcsError
+from gcs.errors import GcsError, from_clone
 
 F = TypeVar("F")
 R = TypeVar("R")
@@ -115,9 +115,7 @@ def dask_cluster(address: str) -> Iterator[tuple[Executor, int]]:
     try:
         from distributed import Client
     except ImportError:
-        raise GcsError(
-            "--scheduler needs Dask; install it with: pip install -e '.[dask]' in the clone of Plumbline"
-        ) from None
+        raise GcsError(f"--scheduler needs Dask; install it with: pip install {from_clone('dask')}") from None
     try:
         client = Client(address, timeout="10s", set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:

@@ -10,11 +10,11 @@ from autopilot.wire.codec import Received
 from autopilot.wire.convert.axes import ned_from_enu
 from autopilot.wire.convert.geodesy import Home, enu_from_geodetic
 from autopilot.wire.dialect import plumbline as mavlink
+from gcs.analysis.release import BEYOND_M
 from gcs.view.tether import Tether
 
 Place = tuple[float, float, float]  # NED, m
 
-_BEYOND_M = 0.02  # more than a slack cable is longer than a taut one
 _KEPT = 80  # positions of the load: half a second of the fastest truth
 
 
@@ -23,7 +23,7 @@ class Truth:
 
     def __init__(self) -> None:
         self.newest: dict[int, Received] = {}
-        self.tether = Tether(_BEYOND_M)
+        self.tether = Tether(BEYOND_M)
         self._times_us: deque[int] = deque(maxlen=_KEPT)
         self._places: deque[Place] = deque(maxlen=_KEPT)
 
@@ -36,7 +36,7 @@ class Truth:
         if self._times_us and message.time_usec <= self._times_us[-1]:  # the world began anew
             self._times_us.clear()
             self._places.clear()
-            self.tether = Tether(_BEYOND_M)
+            self.tether = Tether(BEYOND_M)
         self.tether.see(message)
         self._times_us.append(message.time_usec)
         self._places.append((message.x, message.y, message.z))

@@ -84,7 +84,9 @@
     byId("explore").hidden = false;
     paint();
     const grid = gridOf(flights), first = flights[0];
-    const bands = first.phases.map((phase) => ({ ...phase, from: phase.from - first.begin, to: phase.to - first.begin }));
+    const phasesOf = (flight) => flight.phases.map(
+      (phase) => ({ ...phase, from: phase.from - flight.begin, to: phase.to - flight.begin }));
+    const bands = phasesOf(first);
     // of all flights, by the clock that begins with the mission
     const farthest = flights.filter((flight) => flight.worst).sort((a, b) => b.worst.error_m - a.worst.error_m)[0];
     const worst = farthest && { time: farthest.worst.time - farthest.begin };
@@ -111,8 +113,7 @@
     group.onPick((t) => transport.set(t, true));
     byId("whole").addEventListener("click", () => group.reset());
     // the missions of all flights: the first may have ended early
-    const missions = flights.flatMap((flight) => flight.phases.filter((phase) => phase.kind === "busy").map(
-      (phase) => ({ from: phase.from - flight.begin, to: phase.to - flight.begin })));
+    const missions = flights.flatMap(phasesOf).filter((phase) => phase.kind === "busy");
     if (missions.length) {
       group.zoom(Math.min(...missions.map((one) => one.from)) - 0.5, Math.max(...missions.map((one) => one.to)) + 0.5);
     }

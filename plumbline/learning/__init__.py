@@ -10,12 +10,12 @@ This module registers them. It needs the extra: pip install -e '.[gym]'.
 
 from __future__ import annotations
 
-from gcs.errors import GcsError
+from gcs.errors import GcsError, from_clone
 
 try:
     import gymnasium
 except ModuleNotFoundError:
-    raise GcsError("gymnasium is not installed; pip install -e '.[gym]' in the clone of Plumbline") from None
+    raise GcsError(f"gymnasium is not installed; pip install {from_clone('gym')}") from None
 
 HOVER, LOAD_TRACKING = "plumbline/Hover-v0", "plumbline/LoadTracking-v0"
 _STEPS = 500  # of an episode of hovering: 10 s at 50 Hz
