@@ -17,6 +17,7 @@ from gcs.errors import InputError
 from gcs.folders import check_writable
 from gcs.shell.display import keep_stdout_for_results, to_reader, to_results
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
+from missions.units import split_unit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -372,28 +373,10 @@ def _plain(value: Any) -> Any:
     return value
 
 
-_UNITS = {
-    "_n_s2_m2": "N s^2/m^2",
-    "_n_s_m": "N s/m",
-    "_m_s2": "m/s^2",
-    "_m_s": "m/s",
-    "_1_s": "1/s",
-    "_n": "N",
-    "_m": "m",
-    "_s": "s",
-    "_us": "us",
-    "_v": "V",
-    "_hz": "Hz",
-    "_kg": "kg",
-    "_deg": "deg",
-    "_rad": "rad",
-}
-
-
 def spoken(key: str) -> str:
     """A key of a record as people read it: `cable_tension_n` is `cable tension (N)`."""
-    unit = max((one for one in _UNITS if key.endswith(one)), key=len, default="")
-    return key.removesuffix(unit).replace("_", " ") + (f" ({_UNITS[unit]})" if unit else "")
+    name, unit = split_unit(key)
+    return name.replace("_", " ") + (f" ({unit.sign})" if unit else "")
 
 
 def print_table(rows: Sequence[Sequence[str]], header: Sequence[str] = ()) -> None:
