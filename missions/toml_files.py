@@ -232,12 +232,12 @@ def _toml_hint(line: str) -> str:
         return f"; a number is written without its unit, which the key names: {key} = {number}"
     if found := _DECIMAL_COMMA.match(line):
         key, whole, decimals = found.groups()
-        return f"; decimals are set off by a point: {key} = {whole}.{decimals}"
+        return f"; a decimal point is needed: {key} = {whole}.{decimals}"
     if _CAPITAL_TRUTH.match(line):
-        return "; true and false are written in small letters"
+        return "; true and false are written in lower case"
     if found := _BARE_TEXT.match(line):
         key, text = found.groups()
-        return f"; a text is written in quotes: {key} = {shown(text)}"
+        return f"; text is written in quotes: {key} = {shown(text)}"
     return ""
 
 

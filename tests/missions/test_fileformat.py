@@ -194,16 +194,16 @@ def test_several_problems_are_all_told() -> None:
         (
             'title = "T"\naltitude_m = -1,5 # up',
             "x.toml:2:16: not TOML: Expected newline or end of document after a statement; "
-            "decimals are set off by a point: altitude_m = -1.5",
+            "a decimal point is needed: altitude_m = -1.5",
         ),
         (
             "title = My mission # here",
-            'x.toml:1:9: not TOML: Invalid value; a text is written in quotes: title = "My mission"',
+            'x.toml:1:9: not TOML: Invalid value; text is written in quotes: title = "My mission"',
         ),
-        ("law = steady", 'x.toml:1:7: not TOML: Invalid value; a text is written in quotes: law = "steady"'),
+        ("law = steady", 'x.toml:1:7: not TOML: Invalid value; text is written in quotes: law = "steady"'),
         (
             "relative = True",
-            "x.toml:1:12: not TOML: Invalid value; true and false are written in small letters",
+            "x.toml:1:12: not TOML: Invalid value; true and false are written in lower case",
         ),
         ("x = nan\nx = nan", "x.toml:2:8: not TOML: x is given twice in this table"),
         (
