@@ -65,7 +65,8 @@ from autopilot.supervisor.state import Flight, Report, Text, View, carries, leg_
 from autopilot.vehicle.layout import PLUS, Layout
 from autopilot.vehicle.rotors import allocate, sizes
 
-LAID_OUT = 250  # setpoints that a process lays out at once, a second of them; a sweep takes more
+LAID_OUT = 250  # setpoints that are laid out at once, a second of them: it must not cost a tick
+LAID_OUT_WAITING = 4000  # where the clock waits, as in lockstep and in a sweep
 LAID_OUT_BRAKING = 50  # of a stop, which takes 20 us each: whoever commands one must not cost a tick
 _NO_ROWS = np.zeros((1, COLUMNS))
 _NOTHING = Report()

@@ -21,7 +21,13 @@ from autopilot.control.believed import (
     believed_vehicle,
 )
 from autopilot.control.laws import build_law, chosen_law, is_own
-from autopilot.core.flight_core import FlightCore, Setup, commanded_rate
+from autopilot.core.flight_core import (
+    LAID_OUT,
+    LAID_OUT_WAITING,
+    FlightCore,
+    Setup,
+    commanded_rate,
+)
 from autopilot.core.health import Condition, battery_constants
 from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse
@@ -237,7 +243,8 @@ class Onboard:
         self._world_told = False  # what parameters it has
         self.endpoint.expect_parameters()
         self._reboot = False  # the simulator is asked to begin anew
-        self.core = FlightCore(build_setup(parameters, 1, options.own))
+        laid_out = LAID_OUT_WAITING if options.clock_waits else LAID_OUT
+        self.core = FlightCore(build_setup(parameters, 1, options.own), laid_out)
         self._sensors = SensorInbox(options.home, self.core.rows.inbox)
         self._moments = Moments(self.core, options, parameters, self._health, self._sensors)
         # what waits for `finish`
@@ -440,8 +447,8 @@ class Onboard:
 
     @property
     def said(self) -> list[bytes]:
-        """What machine code has said to the ground station, for the shell to send: each window that ends with
-        a question, and what belongs to the one that is open."""
+        """What machine code has not sent to the ground station: each window that ends with a question, and
+        what belongs to the one that is open."""
         return self._runner.said
 
     def _miss_ground(self) -> None:

@@ -7,6 +7,7 @@ does it (`autopilot.shell.tick_loop`), `Onboard.ran` takes over what has come of
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,8 +45,8 @@ SEQUENCE, SYSTEM, COMPONENT, ARMED, LOCKSTEP, RELEASED, LENGTH, SENSED = range(9
 OWN_SYSTEM, OWN_COMPONENT, OWN_SEQUENCE, DIALECT_COMPONENT, DIALECT_SEQUENCE, SAID = range(17, 23)
 # of what is flown, as `put_instant` is told
 TRACKS, FIRST_US, MODE, SINCE_US, PHASE, SEQ, CARRYING, CARRIES, ROTORS = range(23, 32)
-# of the questions: when the next is due, and how long a window is; `Questions`; how many were asked, and when
-# the last was; who asks
+# of the questions: when the next is due, and how long a window is; `Questions`; how many windows wait to be
+# sent, and when the last question was; who asks
 QUESTION_US, WINDOW_US, ASKED_UNTIL_US, ALONE_US, MOST_ASKED = range(32, 37)
 ASKED, ASKED_US, ASIDE_COMPONENT, ASIDE_SEQUENCE = range(37, 41)
 # of the flight log: when it is due, how often, bytes that were written, which bytes are the inertial sample's
@@ -79,11 +80,12 @@ class Questions(NamedTuple):
     """What the shell lets machine code ask the ground station."""
 
     until_us: int  # those before are not waited for
-    alone_us: int  # from then on Python is to send what was said with each
-    most: int  # before, so many are sent together
+    alone_us: int  # from then on what was said is sent with each
+    most: int  # before, so many windows are sent together
+    unsent: tuple[bytes, ...]  # windows that are over, and what belongs to the one that is open
 
 
-NO_QUESTIONS = Questions(0, 0, 0)
+NO_QUESTIONS = Questions(0, 0, 0, (b"",))
 
 
 class Log(NamedTuple):
@@ -134,7 +136,7 @@ class Running(NamedTuple):
     targets: Array
     asked: Array
     streams: Streams
-    windows: Ints  # how far what is said goes in each window that is over
+    windows: Ints  # how far what is said goes in each window that is over and not sent
     log: Log
     code: Code
 
@@ -165,7 +167,7 @@ class Runner:
 
     @property
     def said(self) -> list[bytes]:
-        """The frames of these streams: each window that is over, and what belongs to the one that is open."""
+        """What is not sent yet: each window that is over, and what belongs to the one that is open."""
         said = self._said[: self._numbers[SAID]].tobytes()
         ends = self._windows[: self._numbers[ASKED]].tolist()
         return [said[begin:end] for begin, end in zip((0, *ends), (*ends, len(said)), strict=True)]
@@ -197,14 +199,19 @@ class Runner:
         """What the next ticks work with; `times`: the time now (us), the number of this tick, how long one
         lasts (us), when the first comes that is left to Python (us). `seq`: the mission item under way;
         `asked`: when the next question is due, how long a window is (us), and what may be asked. None where
-        nothing is compiled."""
+        nothing is compiled, or too much waits to be sent."""
         moments = self._moments
         core, frames, writer = moments.core, written.frames, self._writer
         if log is not None:
             self._records = log.records
         code = self._code = self._code or self._addresses(known)
-        if code is None:
+        questions = asked[2]
+        unsent = b"".join(questions.unsent)
+        if code is None or len(unsent) + STREAMS_ROOM + FRAME_ROOM > _MOST_SAID:
             return None
+        ends = list(accumulate(map(len, questions.unsent[:-1])))
+        self._said[: len(unsent)] = np.frombuffer(unsent, np.uint8)
+        self._windows[: len(ends)] = ends
         flight, laid, own, dialect = core.flight, core.laid, frames.autopilot, frames.dialect
         carrying, carries, rotor_min, rotor_max, rotors = known.facts
         first_us = 0 if laid is None else laid.first_us
@@ -214,10 +221,10 @@ class Runner:
             *(0, 0, 0, 0),
             *(writer.sequence, writer.system, writer.component),
             *(flight.phase not in UNARMED, self._lockstep, flight.cable.released, 0, 0),
-            *(own.system, own.component, own.sequence, dialect.component, dialect.sequence, 0),
+            *(own.system, own.component, own.sequence, dialect.component, dialect.sequence, len(unsent)),
             *(known.tracks, first_us, known.control_mode, known.since_us, known.phase, seq),
             *(carrying, carries, rotors),
-            *(*asked[:2], asked[2].until_us, asked[2].alone_us, min(asked[2].most, _MOST_WINDOWS), 0, 0),
+            *(*asked[:2], questions.until_us, questions.alone_us, questions.most, len(ends), 0),
             *(written.aside.component, written.aside.sequence),
             *((NEVER_US, 1) if log is None else (log.due_us, log.period_us)),
             *(0, *self._records.sensed),

@@ -263,7 +263,10 @@ class Moments:
         """What a flight record with a mission of so many items says."""
         if flight is not self._flight or items != self._items:
             self.sortie = sortie_after(self.sortie, self._flight, flight)
-            self._flight, self._items, self._told = flight, items, told(flight, items)
+            self._flight, self._items = flight, items
+            says = told(flight, items)
+            if says != self._told:  # else it stays the same record, by which a change is noticed
+                self._told = says
         return self._told
 
     def standing(self, flight: Flight) -> Standing:

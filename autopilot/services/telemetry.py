@@ -359,7 +359,7 @@ STREAMS: dict[int, Stream] = {
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(_AUTOPILOT, _rate(1), _system_time),
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Stream(_AUTOPILOT, _rate(1), _extended_sys_state),
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: Stream(_AUTOPILOT, _rate(1), _battery_status),
-    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(_AUTOPILOT, _rate(5), _gps_raw_int),
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(_AUTOPILOT, _rate(2), _gps_raw_int),
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: Stream(_AUTOPILOT, _rate(1), _home_position),
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(_AUTOPILOT, _rate(1), _mission_current),
     mavlink.MAVLINK_MSG_ID_FENCE_STATUS: Stream(_AUTOPILOT, _rate(1), _fence_status),

@@ -177,6 +177,7 @@ class GroundInStep:
     def __init__(self, address: Address) -> None:
         self._socket = open_socket(address, "ground station")
         self._address = address
+        self.way = self._socket, address  # by which machine code sends
         self._silent_until_us = 0  # it says nothing before
         self._waits_s = 0.0  # a receive that waits
         self._said: list[bytes] = []  # in this window
@@ -228,18 +229,18 @@ class GroundInStep:
     @property
     def questions(self) -> Questions:
         """What may be asked without `exchange`, as nobody waits for an answer."""
-        alone_us = self._silent_until_us - _TOGETHER * GROUND_WINDOW_US
-        return Questions(self._silent_until_us, alone_us, _TOGETHER - len(self._windows))
+        unsent = (*self._windows, b"".join(self._said))
+        return Questions(self._silent_until_us, self._alone_us, _TOGETHER, unsent)
 
-    def say(self, said: list[bytes], now_us: int) -> None:
-        """What was said without `exchange`: windows that ended with a question, and one that is open."""
-        for window in said[:-1]:
-            self._say(window)
-            self._close_window()
-        if len(said) > 1:
-            self._send_together(now_us)
-        if said[-1]:
-            self._say(said[-1])
+    def take_back(self, unsent: list[bytes]) -> None:
+        """What of `questions.unsent`, and of what was said without `exchange`, is not sent."""
+        *self._windows, last = unsent
+        self._said, self._size = [last], len(last)
+
+    @property
+    def _alone_us(self) -> int:
+        """When windows are sent one by one, as the ground station will soon be waited for."""
+        return self._silent_until_us - _TOGETHER * GROUND_WINDOW_US
 
     def _wait(self, seconds: float) -> None:
         """How long a receive waits."""
@@ -261,7 +262,7 @@ class GroundInStep:
     def _send_together(self, now_us: int) -> None:
         """Send the windows that are over, once there are enough of them, or the ground will soon be waited
         for."""
-        if len(self._windows) >= _TOGETHER or now_us >= self.questions.alone_us:
+        if len(self._windows) >= _TOGETHER or now_us >= self._alone_us:
             for datagram in self._windows:
                 self._send(datagram)
             self._windows.clear()

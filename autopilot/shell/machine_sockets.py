@@ -19,6 +19,7 @@ from numba.extending import intrinsic
 
 SUPPORTED = sys.platform == "linux"  # as far as it is tried
 SYSTEM_ADDRESS_BYTES = 16  # of an IPv4 address with its port
+NOWHERE = bytes(SYSTEM_ADDRESS_BYTES)
 
 _INT, _WIDE = ir.IntType(32), ir.IntType(64)
 _POINTER = cgutils.voidptr_t

@@ -153,12 +153,15 @@ class Program:
         self._say(f"looking for the simulator at {shown(self._simulator)}")
         self._greet()
         receive_from_simulator = self._socket.recv
-        ticks = TickLoop(self._socket)
+        ground = self._ground
+        ticks = TickLoop(self._socket, *ground.way) if isinstance(ground, GroundInStep) else None
         while True:
             stop.check()
             self._aside.attend(self.onboard)
             self._storing.attend()
-            met = NOTHING if silent or lost else self._run_on(ticks)
+            met = NOTHING
+            if isinstance(ground, GroundInStep) and ticks is not None and not (silent or lost):
+                met = self._run_on(ticks, ground)
             if met.ran:
                 heard = time.monotonic()
             if met.more:
@@ -220,15 +223,12 @@ class Program:
                 refused = why
                 self._say(f"the simulator at {shown(self._simulator)} does not serve this one: {why}")
 
-    def _run_on(self, ticks: TickLoop) -> Met:
-        """Fly ticks without Python, if the next are such and the ground station shares our clock."""
-        ground = self._ground
-        if not isinstance(ground, GroundInStep):
-            return NOTHING
+    def _run_on(self, ticks: TickLoop, ground: GroundInStep) -> Met:
+        """Fly ticks without Python, if the next are such."""
         met = ticks.run(self.onboard, ground.questions)
         if met.ran:
             self.cost.pause()
-            ground.say(self.onboard.said, self.onboard.now_us)
+            ground.take_back(self.onboard.said)
             if self.onboard.logged:
                 self._keep_log(_LOG_BYTES)
         return met

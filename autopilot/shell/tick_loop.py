@@ -77,8 +77,16 @@ from autopilot.onboard.running import (
     ask_streams,
 )
 from autopilot.services.stream_frames import STREAMS_ROOM
-from autopilot.shell.machine_sockets import SUPPORTED, receive_at, send_at, usable
-from autopilot.shell.options import LARGEST_DATAGRAM
+from autopilot.shell.machine_sockets import (
+    NOWHERE,
+    SUPPORTED,
+    receive_at,
+    send_at,
+    send_to_at,
+    system_address,
+    usable,
+)
+from autopilot.shell.options import LARGEST_DATAGRAM, Address
 from autopilot.wire.compiled import FRAME_ROOM, Bytes, Origin, put_frame
 
 # why `fly_on` returns
@@ -86,11 +94,13 @@ UNTIL, SILENCE, HEARD, DECIDE = range(4)
 
 
 class Wire(NamedTuple):
-    """The socket towards the simulator, and what came by it."""
+    """The socket towards the simulator, what came by it, and the way to the ground station."""
 
     fd: int
     heard: Bytes
     size: Ints  # (1,) of `heard`
+    ground_fd: int
+    ground: Bytes  # its address, as the system has it
 
 
 class Met(NamedTuple):
@@ -106,9 +116,10 @@ NOTHING = Met(False)
 
 
 @kernel
-def _tell(run: Running, now_us: int, sane: bool) -> None:
+def _tell(run: Running, now_us: int, sane: bool) -> bool:
     """Write the streams and the records of the flight log that are due at this tick, behind those of the
-    ticks before; ask the ground station at the end of a window. `sane`: the inertial sample is."""
+    ticks before; ask the ground station at the end of a window, and return whether it is one. `sane`: the
+    inertial sample is."""
     numbers, streams = run.numbers, run.streams
     bits = 0
     for k in range(streams.due.shape[0]):
@@ -120,7 +131,8 @@ def _tell(run: Running, now_us: int, sane: bool) -> None:
         _put_instant(run, now_us)
     if bits != 0:
         _put_streams(run, bits)
-    if now_us >= numbers[QUESTION_US]:
+    ends = now_us >= numbers[QUESTION_US]
+    if ends:
         numbers[QUESTION_US] = now_us - now_us % numbers[WINDOW_US] + numbers[WINDOW_US]
         origin = Origin(numbers[ASIDE_SEQUENCE], numbers[OWN_SYSTEM], numbers[ASIDE_COMPONENT])
         values = (0, now_us * 1000)
@@ -131,6 +143,7 @@ def _tell(run: Running, now_us: int, sane: bool) -> None:
         numbers[ASIDE_SEQUENCE] = (numbers[ASIDE_SEQUENCE] + 1) & 0xFF
     if logs:
         _put_records(run, now_us, sane)
+    return bool(ends)
 
 
 @kernel
@@ -202,14 +215,26 @@ def _put_streams(run: Running, bits: int) -> None:
 
 
 @kernel
+def _send_windows(wire: Wire, run: Running) -> None:
+    """Send the windows that are over, once they are enough or the ground will soon be waited for."""
+    numbers, said = run.numbers, run.streams.said.ctypes.data
+    if numbers[ASKED] < numbers[MOST_ASKED] and numbers[ASKED_US] < numbers[ALONE_US]:
+        return
+    begin = 0
+    for i in range(numbers[ASKED]):
+        end = run.windows[i]
+        send_to_at(wire.ground_fd, said + begin, end - begin, wire.ground.ctypes.data, len(wire.ground))
+        begin = end
+    if begin > 0:  # what was said last was a question: nothing is left
+        numbers[ASKED] = numbers[SAID] = 0
+
+
+@kernel
 def _goes_on(run: Running, next_us: int) -> bool:
     """Whether there is nothing else to be done at the next tick, and room for what is."""
     numbers = run.numbers
     asks = next_us >= numbers[QUESTION_US]
     if next_us >= numbers[UNTIL_US] or (asks and next_us >= numbers[ASKED_UNTIL_US]):
-        return False
-    together = numbers[ASKED] < numbers[MOST_ASKED] and numbers[ASKED_US] < numbers[ALONE_US]
-    if numbers[ASKED] > 0 and not together:
         return False
     said, logged = numbers[SAID] + STREAMS_ROOM + FRAME_ROOM, numbers[LOGGED] + len(run.log.records)
     return bool(said <= len(run.streams.said) and logged <= len(run.log.logged))
@@ -275,17 +300,21 @@ def fly_on(wire: Wire, run: Running) -> int:
         numbers[NOW_US], numbers[TICK] = now_us, tick
         numbers[EVER_FIXED] |= fixed
         numbers[RAN] += 1
-        _tell(run, now_us, sane)
+        if _tell(run, now_us, sane):
+            _send_windows(wire, run)
         send_at(wire.fd, run.frame.ctypes.data, length)
     return UNTIL
 
 
 class TickLoop:
-    """Runs `fly_on` where it can be run; its socket is connected to the simulator."""
+    """Runs `fly_on` where it can be run."""
 
-    def __init__(self, sock: socket.socket) -> None:
-        self._usable = usable(sock)
-        self._wire = Wire(sock.fileno(), np.zeros(LARGEST_DATAGRAM, np.uint8), np.zeros(1, np.int64))
+    def __init__(self, sock: socket.socket, ground: socket.socket, address: Address) -> None:
+        """`sock` is connected to the simulator; `ground` sends to the ground station at `address`."""
+        at = system_address(address)
+        self._usable = usable(sock) and usable(ground) and at is not None
+        heard, to = np.zeros(LARGEST_DATAGRAM, np.uint8), np.frombuffer(at or NOWHERE, np.uint8).copy()
+        self._wire = Wire(sock.fileno(), heard, np.zeros(1, np.int64), ground.fileno(), to)
         self._fly_on: Any = None  # machine code, once it was asked for
 
     def run(self, onboard: Onboard, questions: Questions) -> Met:
@@ -310,5 +339,6 @@ class TickLoop:
 def rehearse(onboard: Onboard) -> None:
     """Have the machine code of `fly_on` ready, where it is used."""
     if SUPPORTED:
-        wire = Wire(-1, np.zeros(1, np.uint8), np.zeros(1, np.int64))
+        none = np.zeros(1, np.uint8)
+        wire = Wire(-1, none, np.zeros(1, np.int64), -1, none)
         entry_of(fly_on, wire, onboard.rehearsed_running())

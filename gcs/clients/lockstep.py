@@ -2,7 +2,7 @@
 
 The vehicle stands still between its question (tc1 = 0, ts1 = its time in ns) and our answer (tc1 > ts1), so
 whatever we send before the answer is handled at that very tick. A later tc1 is a promise that we send nothing
-before that time: until then the vehicle asks, but does not wait for our answers.
+before that time: until then the vehicle asks, but does not wait for answers, and gets none.
 """
 
 from __future__ import annotations

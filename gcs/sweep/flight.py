@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from autopilot.core.flight_core import FlightCore, commanded_rate
+from autopilot.core.flight_core import LAID_OUT_WAITING, FlightCore, commanded_rate
 from autopilot.core.tick import any_law
 from autopilot.estimation.inbox import new_inbox
 from autopilot.geometry.entry import entry_of
@@ -42,7 +42,6 @@ from sitl.plant.records import PlantState
 from sitl.world import Floats, World, new_world
 
 GROUND_WINDOW_US = 20_000  # between two turns of the ground station
-LAID_OUT = 4000  # setpoints laid out at once
 TRACE_COLUMNS = 14
 _NO_ROWS = np.zeros((0, COLUMNS))
 _NEVER = 2**62
@@ -116,7 +115,7 @@ class SweptFlight:
     def __init__(self, cell: Cell, seed: int, boarding: Boarding, trace: Floats | None = None) -> None:
         self.cell = cell
         self.tick_us = cell.settings.tick_us
-        self.core = FlightCore(cell.setup, LAID_OUT)
+        self.core = FlightCore(cell.setup, LAID_OUT_WAITING)
         self.item = 0  # of the mission, last flown
         self.core.change(with_plan(self.core.flight, cell.plan))
         self.world = new_world(cell.truth, cell.profile, cell.settings, seed, cell.layout)

@@ -128,8 +128,10 @@ def run_lockstep(
                 for sent in page.turn(client, capture, told, pending, now_us, now_us >= promised_us):
                     vehicle.send(sent)
             pending.clear()
+            answer = turns.answer(question_ns, client.silent_until_us)
+            if now_us >= promised_us:  # before, the vehicle waits for none
+                vehicle.send(answer)
             promised_us = max(promised_us, client.silent_until_us)
-            vehicle.send(turns.answer(question_ns, client.silent_until_us))
             capture.flush(now_us)
             _show(display, client)
             if client.outcome is not None:

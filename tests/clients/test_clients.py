@@ -1,7 +1,7 @@
 """The programs that people use, in real time against running processes; none of them may complain.
 
-Each flight below is one vehicle with whoever flies it; three are flown at once, most of them twice as fast as
-the clock, which none of the clients minds. Loss of the link is the vehicle's own, SIM_LOSS_PCT, each way.
+Each flight below is one vehicle with whoever flies it; two are flown at once, those of MAVSDK alone at twice
+real time. Loss of the link is the vehicle's own, SIM_LOSS_PCT, each way.
 """
 
 from __future__ import annotations

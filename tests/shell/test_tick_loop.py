@@ -17,7 +17,9 @@ from autopilot.shell.machine_sockets import SUPPORTED
 from autopilot.shell.options import set_timeout
 from autopilot.shell.tick_loop import TickLoop
 from autopilot.trajectory.timeline import expected_duration_s
+from autopilot.wire.codec import decode
 from autopilot.wire.convert.geodesy import Home
+from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.items import encode_mission
 from gcs.clients.flight import FlightClient
 from gcs.clients.lockstep import LockstepTurns
@@ -30,7 +32,7 @@ pytestmark = pytest.mark.skipif(
 TICK_US = 4000
 GROUND = "ground"
 IN_FLIGHT = 2503  # ticks, when the vehicle hovers, and the next says nothing out of the way
-ALWAYS = Questions(NEVER_US, NEVER_US, 4)  # may be asked
+ALWAYS = Questions(NEVER_US, NEVER_US, 4, (b"",))  # may be asked
 
 
 class Said(NamedTuple):
@@ -78,23 +80,29 @@ class Rig:
     """An autopilot in flight behind a socket, and what the simulator sends there."""
 
     def __init__(self, flight: list[Said]) -> None:
-        self.simulator, self.socket = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
-        for one in (self.simulator, self.socket):
+        self.simulator, self.socket, self.ground = self._sockets = [
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(3)
+        ]
+        for one in self._sockets:
             one.bind(("127.0.0.1", 0))
         self.simulator.settimeout(5.0)
         self.simulator.connect(self.socket.getsockname())
         self.socket.connect(self.simulator.getsockname())
         set_timeout(self.socket, 0.05)
-        self.loop = TickLoop(self.socket)
+        self.loop = TickLoop(self.socket, self.socket, self.ground.getsockname())
         self.onboard = build_onboard(Conditions(), Home())
         self.onboard.add_link(GROUND)
         for said in flight[:IN_FLIGHT]:
             step(self.onboard, said)
         self.flight = flight[IN_FLIGHT:]
 
+    def heard(self) -> list[bytes]:
+        """What has come to the ground station, datagram by datagram."""
+        return drain(self.ground)
+
     def close(self) -> None:
-        self.simulator.close()
-        self.socket.close()
+        for one in self._sockets:
+            one.close()
 
 
 def step(onboard: Onboard, said: Said) -> None:
@@ -116,42 +124,74 @@ def rig(flight: list[Said]) -> Iterator[Rig]:
 
 def test_ticks_without_python_are_those_with_it_to_the_byte(rig: Rig) -> None:
     alone = done = 0
+    heard: list[bytes] = []
+    unsent = [b""]
     while done < len(rig.flight):
         for said in rig.flight[done : done + 40]:
             rig.simulator.send(said.sensors)
         before = rig.onboard.tick
-        met = rig.loop.run(rig.onboard, ALWAYS)
+        met = rig.loop.run(rig.onboard, ALWAYS._replace(unsent=tuple(unsent)))
         ran = rig.onboard.tick - before
         assert met.ran == (ran > 0)
         if met.ran:
-            assert b"".join(rig.onboard.said) == b"".join(one.told for one in rig.flight[done : done + ran])
+            unsent = rig.onboard.said
+            heard += rig.heard()
+            told = b"".join(one.told for one in rig.flight[: done + ran])
+            assert b"".join((*heard, *unsent)) == told
             for said in rig.flight[done : done + ran]:
                 assert rig.simulator.recv(65535) == said.answer
         done, alone = done + ran, alone + ran
         drain(rig.socket)
         if met.decide is not None:
             assert rig.onboard.complete(met.decide) == rig.flight[done].answer
-            assert b"".join(told_at(rig.onboard)) == rig.flight[done].told
+            unsent += told_in_python(rig.onboard, rig.flight[done], unsent.pop())
             done += 1
         elif not met.more and done < len(rig.flight):
             assert met.datagram is None
             assert rig.onboard.receive_sensors(rig.flight[done].sensors) == rig.flight[done].answer
-            assert b"".join(told_at(rig.onboard)) == rig.flight[done].told
+            unsent += told_in_python(rig.onboard, rig.flight[done], unsent.pop())
             done += 1
     assert alone > 0.8 * len(rig.flight)
+    assert len(heard) + len(unsent) - 1 == len(rig.flight) * TICK_US // 20_000, "a datagram for each window"
 
 
-def told_at(onboard: Onboard) -> list[bytes]:
+def told_in_python(onboard: Onboard, said: Said, before: bytes) -> list[bytes]:
+    """The window that is open, of which `before` was said already, and the next if this tick ends it."""
     told = [datagram for _, datagram in onboard.ground_datagrams()]
     question = onboard.question(GROUND)
-    return told if question is None else [*told, question]
+    assert b"".join([*told, question or b""]) == said.told
+    return [before + said.told] if question is None else [before + said.told, b""]
 
 
-def drain(sock: socket.socket) -> None:
-    """Forget what has come and was not looked at."""
+def drain(sock: socket.socket) -> list[bytes]:
+    """What has come and was not looked at."""
+    come = []
     with suppress(BlockingIOError):
         while True:
-            sock.recv(65535, socket.MSG_DONTWAIT)
+            come.append(sock.recv(65535, socket.MSG_DONTWAIT))
+    return come
+
+
+def test_windows_are_sent_some_at_a_time_and_one_by_one_where_the_ground_will_be_waited_for(rig: Rig) -> None:
+    for said in rig.flight[:20]:
+        rig.simulator.send(said.sensors)
+    together = ALWAYS._replace(most=3, unsent=(b"one", b"two", b"op"))
+    rig.loop.run(rig.onboard, together)
+    first, second, third, *later = rig.heard()
+    assert (first, second, third[:2]) == (b"one", b"two", b"op")
+    assert (len(later), len(rig.onboard.said)) == (3, 1)
+    for said in rig.flight[20:25]:
+        rig.simulator.send(said.sensors)
+    rig.loop.run(rig.onboard, ALWAYS._replace(alone_us=rig.onboard.now_us))
+    (window,) = rig.heard()
+    assert decode(window)[0][-1].id == mavlink.MAVLINK_MSG_ID_TIMESYNC
+    assert len(rig.onboard.said) == 1
+
+
+def test_more_than_there_is_room_for_is_left_to_python(rig: Rig) -> None:
+    rig.simulator.send(rig.flight[0].sensors)
+    much = ALWAYS._replace(unsent=(bytes(60_000), b""))
+    assert rig.loop.run(rig.onboard, much) == (False, False, None, None)
 
 
 @pytest.mark.parametrize(
