@@ -144,7 +144,7 @@
     // where every flight completes there is nothing to see but the errors
     const every = map.completed.every((share) => share === null || share === 100);
     (every ? choice.lastChild : choice.firstChild).click();
-    const fade = () => { // the cells cover what the style of the frame would show at its edges
+    const fade = () => { // the cells would cover a shadow like that of other cards
       const { scrollLeft: before, scrollWidth, clientWidth } = frame;
       frame.classList.toggle("before", before > 1);
       frame.classList.toggle("after", scrollWidth - clientWidth - before > 1);

@@ -205,7 +205,8 @@ def test_what_is_wider_than_the_window_scrolls_and_no_button_is_out_of_it(
     assert browser.run("return document.documentElement.scrollWidth") <= width
     out = browser.run(
         """return [...document.querySelectorAll("main *")]
-            .filter((one) => !one.closest(".scrolls *, .frame *") && one.getBoundingClientRect().right > innerWidth)
+            .filter((one) => !one.closest(".scrolls *, .frame *"))
+            .filter((one) => one.getBoundingClientRect().right > innerWidth)
             .map((one) => one.outerHTML.slice(0, 80))"""
     )
     assert out == []
