@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -157,7 +158,8 @@ def test_no_range_is_claimed_of_what_was_not_flown(
     store_plan(tmp_path, plan, "gcs sweep", sweep_origin(plan))
     page = write_report(tmp_path, plan).read_text(encoding="utf-8")
     assert "Not finished: 6 are planned." in page
-    assert "<td>0 … 4</td><td>0</td><td>0</td>" in page, "flown, all complete, all seeds complete"
+    cells = re.sub("<td [^>]*>", "<td>", page)
+    assert "<td>0 … 4</td><td>0</td><td>0</td>" in cells, "flown, all complete, all seeds complete"
 
 
 def test_flights_that_stand_out_are_those_of_the_table(whole: tuple[SweepPlan, Path, run.Swept]) -> None:
