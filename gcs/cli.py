@@ -19,10 +19,10 @@ from missions.nearest import nearest
 # name: (module in gcs.commands, summary)
 COMMANDS = {
     "fly": ("fly", "Fly a mission from start to report."),
-    "new": ("new", "Write a commented file of your own that flies as it is."),
+    "new": ("new", "Write a commented template that flies as it is, for you to edit."),
     "missions": ("missions", "List the shipped missions."),
     "check": ("missions", "Check whether a vehicle can fly a mission."),
-    "report": ("report", "Make the report of a captured flight again."),
+    "report": ("report", "Write the report of a captured flight again."),
     "compare": ("compare", "Compare flights: figures, settings, tracks and errors."),
     "identify": ("recorded", "Find cable, load and drag from a recorded flight."),
     "replay": ("recorded", "Estimate the load of a recorded flight, and score it."),
@@ -43,9 +43,9 @@ COMMANDS = {
     "disarm": ("control", "Stop the rotors."),
     "start": ("control", "Fly the mission on the vehicle from its first item."),
     "pause": ("control", "Hold the load where it is."),
-    "resume": ("control", "Go on with a paused mission."),
+    "resume": ("control", "Continue a paused mission."),
     "takeoff": ("control", "Lift the load and hold it."),
-    "goto": ("control", "Take the load to a place and hold it there."),
+    "goto": ("control", "Move the load to a position and hold it there."),
     "land": ("control", "Set the load down, and the vehicle beside it."),
     "mode": ("control", "Change the flight mode."),
     "param": ("param", "Read and write parameters."),
@@ -134,13 +134,13 @@ def _signing_key(text: str) -> bytes:
     type=_signing_key,
     is_eager=True,
     envvar="PLUMBLINE_SIGNING_KEY",
-    help="Sign what is said to a running vehicle: a file with 64 hexadecimal digits, or a pass phrase.",
+    help="Sign all messages to a running vehicle; FILE holds 64 hexadecimal digits or a pass phrase.",
 )
 @click.version_option(package_name="plumbline", prog_name="gcs")
 def gcs(signing_key: bytes | None) -> None:
-    """Plumbline's ground station: fly missions in which the load on the cable is what is commanded.
+    """Plumbline's ground station: fly missions that command the load on the cable.
 
-    gcs fly case-b flies a shipped mission with a simulator and an autopilot of its own and ends in a report.
+    gcs fly case-b starts a simulator and an autopilot, flies a shipped mission and writes a report.
     gcs upload, arm, start, status, param and the like command a vehicle that is running already (sitl and
     autopilot, or gcs fly --speed 1).
 

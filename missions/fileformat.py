@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
@@ -27,6 +28,8 @@ _MISPLACED = {
     "factors": "not a key of the file; write [[items.terms.factors]] behind its [[items.terms]]",
 }
 
+_HEADER = re.compile(r"[ \t]*\[\[[ \t]*items[ \t]*\]\]")
+
 MISSIONS = TomlFiles("mission", MissionFileError)
 
 
@@ -43,36 +46,59 @@ def load_mission(name_or_path: str | PathLike[str]) -> Mission:
 
 def parse_mission(text: str, name: str, where: str) -> Mission:
     """The mission that a TOML text describes. `where` begins each line of a MissionFileError."""
-    return mission_of(MISSIONS.table(text, where), name, where)
+    return mission_of(MISSIONS.table(text, where), name, where, text)
 
 
-def mission_of(table: Mapping[str, Any], name: str, where: str) -> Mission:
-    """The mission of these keys and values. `where` begins each line of a MissionFileError."""
+def mission_of(table: Mapping[str, Any], name: str, where: str, text: str = "") -> Mission:
+    """The mission of these keys and values. `where` begins each line of a MissionFileError.
+
+    `text` is the file that has them, if there is one: what is wrong in an item is told with the line of its
+    [[items]].
+    """
     misplaced = [f"{where}: {key}: {says}" for key, says in _MISPLACED.items() if key in table]
     if isinstance(table.get("items"), Mapping):
         misplaced.append(
             f"{where}: items is a single table; write [[items]], in two brackets, before each item"
         )
+    misplaced += [
+        f"{where}: {key}: not a table of the file; write [[items]], in two brackets, before each item"
+        for key, value in table.items()
+        if key not in FileSpec.model_fields and _is_misnamed_item(key, value)
+    ]
     if misplaced:
         raise MissionFileError(misplaced)
     head = MISSIONS.record(FileSpec, table, where)
+    places = _places(text, where, len(head.items))
     items: list[Item] = []
     wrong: list[str] = []
     for index, item in enumerate(head.items):
         at = f"items[{index}]"
         kind = item.get("type")
         if not isinstance(kind, str) or kind not in ITEMS:
-            wrong.append(f"{where}: {at}.type {_kind_problem(item)}")
+            wrong.append(f"{places[index]}: {at}.type {_kind_problem(item)}")
             continue
         try:
             items.append(ITEMS[kind].model_validate({k: v for k, v in item.items() if k != "type"}))
         except ValidationError as error:
-            wrong += problems(error, ITEMS[kind], where, at, item)
-    wrong = wrong or _order_problems([item["type"] for item in head.items], where)
+            wrong += problems(error, ITEMS[kind], places[index], at, item)
+    wrong = wrong or _order_problems([item["type"] for item in head.items], places)
     if wrong:
         raise MissionFileError(wrong)
     steps = tuple(item.step() for item in items)
     return Mission(name, head.title, head.description, tuple(head.assumptions), steps)
+
+
+def _is_misnamed_item(key: str, value: Any) -> bool:
+    """Whether a key at the top of a file has tables that are rather items: [[item]], [[waypoint]]."""
+    tables = value if isinstance(value, list) and value else [value]
+    has_tables = all(isinstance(one, Mapping) for one in tables)
+    return has_tables and key.isprintable() and bool(nearest(key, ("items", *ITEMS)))
+
+
+def _places(text: str, where: str, count: int) -> list[str]:
+    """`FILE:LINE` of each item, by the lines that are `[[items]]`; `where` alone if they are not so many."""
+    lines = [number for number, line in enumerate(text.split("\n"), 1) if _HEADER.match(line)]
+    return [f"{where}:{line}" for line in lines] if len(lines) == count else [where] * count
 
 
 def _kind_problem(table: Mapping[str, Any]) -> str:
@@ -85,12 +111,12 @@ def _kind_problem(table: Mapping[str, Any]) -> str:
     return f"= {shown(kind)}; must be one of {allowed}{hint}"
 
 
-def _order_problems(kinds: Sequence[str], where: str) -> list[str]:
+def _order_problems(kinds: Sequence[str], places: Sequence[str]) -> list[str]:
     """The rules between items: the flight begins on the ground with a take-off and ends with a landing."""
     last = len(kinds) - 1
     wrong = []
     for index, kind in enumerate(kinds):
-        at = f'{where}: items[{index}].type = "{kind}"; '
+        at = f'{places[index]}: items[{index}].type = "{kind}"; '
         if index == 0 and kind != "takeoff":
             wrong.append(at + 'must be "takeoff": a mission begins on the ground')
         elif index > 0 and kind == "takeoff":

@@ -21,6 +21,7 @@ from pydantic.fields import FieldInfo
 
 from missions.nearest import did_you_mean, nearest
 from missions.text_files import TextFileError, text_of
+from missions.units import split_unit
 
 Spec = TypeVar("Spec", bound=BaseModel)
 
@@ -30,25 +31,13 @@ _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _NUMBER_WITH_UNIT = re.compile(
     r"\s*(\w+)\s*=\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*[A-Za-z%/][\w%/^*]*\s*(?:#.*)?$"
 )
+_DECIMAL_COMMA = re.compile(r"\s*(\w+)\s*=\s*([-+]?\d+),(\d+)\s*(?:#.*)?$")
+_CAPITAL_TRUTH = re.compile(r"\s*(\w+)\s*=\s*(?i:true|false)\s*(?:#.*)?$")
+_BARE_TEXT = re.compile(r"\s*(\w+)\s*=\s*([^\W\d][^\"'#\\\x00-\x1f]*?)\s*(?:#.*)?$")
 # what the parser says in its own terms
 _TWICE = {
     "Cannot overwrite": "{key} is given twice in this table",
     "Cannot declare": "[{key}] stands there twice; each table of a list is written [[{key}]]",
-}
-# last part of a key: its unit in words; the longest that fits counts
-_UNITS = {
-    "_m_s": "metres per second",
-    "_rad_s": "radians per second",
-    "_n_s_m": "newtons per metre per second",
-    "_1_s": "per second",
-    "_m": "metres",
-    "_s": "seconds",
-    "_ms": "milliseconds",
-    "_deg": "degrees",
-    "_rad": "radians",
-    "_kg": "kilograms",
-    "_n": "newtons",
-    "_hz": "hertz",
 }
 
 
@@ -230,18 +219,25 @@ def _toml_problem(error: tomllib.TOMLDecodeError, text: str, where: str) -> str:
     lines = text.splitlines()
     at = lines[int(line) - 1] if 0 < int(line) <= len(lines) else ""
     said = message.split(" (at ", maxsplit=1)[0]
-    key = re.split(r"[\]=]", at.lstrip(" \t["), maxsplit=1)[0].strip()
-    for begins, instead in _TWICE.items():
-        said = instead.format(key=key) if said.startswith(begins) else said
-    return f"{where}:{line}:{column}: not TOML: {said}{_toml_hint(at)}"
+    twice = next((instead for begins, instead in _TWICE.items() if said.startswith(begins)), "")
+    if twice:
+        said = twice.format(key=re.split(r"[\]=]", at.lstrip(" \t["), maxsplit=1)[0].strip())
+    return f"{where}:{line}:{column}: not TOML: {said}{'' if twice else _toml_hint(at)}"
 
 
 def _toml_hint(line: str) -> str:
     """What to write instead, for mistakes whose kind the line shows."""
-    found = _NUMBER_WITH_UNIT.match(line)
-    if found:
+    if found := _NUMBER_WITH_UNIT.match(line):
         key, number = found.groups()
         return f"; a number is written without its unit, which the key names: {key} = {number}"
+    if found := _DECIMAL_COMMA.match(line):
+        key, whole, decimals = found.groups()
+        return f"; a decimal point is needed: {key} = {whole}.{decimals}"
+    if _CAPITAL_TRUTH.match(line):
+        return "; true and false are written in lower case"
+    if found := _BARE_TEXT.match(line):
+        key, text = found.groups()
+        return f"; text is written in quotes: {key} = {shown(text)}"
     return ""
 
 
@@ -311,8 +307,8 @@ def _unknown_key(near: str, owner: type[BaseModel], listed: bool) -> str:
 
 
 def _unit_note(key: str) -> str:
-    fitting = [suffix for suffix in _UNITS if key.endswith(suffix)]
-    return f" (in {_UNITS[max(fitting, key=len)]})" if fitting else ""
+    _, unit = split_unit(key)
+    return f" (in {unit.words})" if unit else ""
 
 
 def _allowed(error: dict[str, Any], field: FieldInfo | None) -> str:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import wraps
+from inspect import signature
 from operator import index
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from gcs.errors import GcsError
+from missions.nearest import did_you_mean
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 _LONGEST_SHOWN = 80  # characters of a value
 _PHRASES = (  # of the command line, and what they are in Python
@@ -30,6 +36,22 @@ _PHRASES = (  # of the command line, and what they are in Python
     (r"--connect (?=[A-Z0-9])", "connect to "),
     (r"(?<![\w-])--([a-z]+)", r"\1"),
 )
+
+
+def knows_its_arguments(function: Callable[P, R]) -> Callable[P, R]:
+    """The function; a name of an argument that it does not have is a TypeError that tells which was meant."""
+    names = tuple(signature(function).parameters)
+
+    @wraps(function)
+    def called(*values: P.args, **named: P.kwargs) -> R:
+        for name in named:
+            if name not in names:
+                hint = did_you_mean(name, names)
+                known = ", ".join(names)
+                raise TypeError(f"{function.__name__}: no argument {name!r}; {hint}must be one of {known}")
+        return function(*values, **named)
+
+    return called
 
 
 @contextmanager

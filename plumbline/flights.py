@@ -18,7 +18,16 @@ from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
 from missions import model
 from missions.nearest import did_you_mean
-from plumbline.arguments import file_path, in_python, positive, setting_words, text, told_in_python, whole
+from plumbline.arguments import (
+    file_path,
+    in_python,
+    knows_its_arguments,
+    positive,
+    setting_words,
+    text,
+    told_in_python,
+    whole,
+)
 from plumbline.frames import as_frame
 from plumbline.made_files import name_or_path
 from plumbline.missions import Mission
@@ -35,6 +44,7 @@ if TYPE_CHECKING:
 Settings = Mapping[str, float]  # parameters of simulator (SIM_) and autopilot by name
 
 
+@knows_its_arguments
 def fly(
     mission: str | Path | model.Mission,
     *,
@@ -98,7 +108,7 @@ def fly(
 
 def _doubt(line: str) -> None:
     """What can be flown, but may not be meant so: a warning at the line that called `fly`."""
-    warnings.warn(in_python(line), stacklevel=4)
+    warnings.warn(in_python(line), stacklevel=5)
 
 
 class Flight:

@@ -32,7 +32,15 @@ from gcs.workflows.running_flight import vehicle_home
 from gcs.workflows.transfer import checked_upload
 from missions import model
 from missions.nearest import did_you_mean
-from plumbline.arguments import number, parameter_name, positive, shown, text, told_in_python
+from plumbline.arguments import (
+    knows_its_arguments,
+    number,
+    parameter_name,
+    positive,
+    shown,
+    text,
+    told_in_python,
+)
 from plumbline.made_files import name_or_path
 from plumbline.missions import Mission
 from plumbline.state import State, state_of
@@ -54,6 +62,7 @@ _WORDS: dict[str, Condition] = {
 }
 
 
+@knows_its_arguments
 def connect(
     address: str = "udpin:127.0.0.1:14550", *, timeout_s: float = 10.0, signing_key: bytes | None = None
 ) -> RunningVehicle:

@@ -17,6 +17,7 @@ from plumbline.arguments import (
     by_parameter,
     file_path,
     items,
+    knows_its_arguments,
     numbers,
     setting_words,
     shown,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 _SAYS = "gcs: "  # begins the line of a known error
 
 
+@knows_its_arguments
 def sweep(
     mission: str | Path | Mission,
     *,

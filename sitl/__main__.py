@@ -54,7 +54,7 @@ def _run_on(cpu: int) -> None:
     type=click.Choice(list(AUTOPILOTS)),
     default=PLUMBLINE,
     show_default=True,
-    help="Whose autopilot flies; see docs/autopilots.md.",
+    help="The autopilot that flies; see docs/autopilots.md.",
 )
 @click.option(
     "--sensors",
@@ -77,19 +77,19 @@ def _run_on(cpu: int) -> None:
     "--speed",
     type=click.FloatRange(0.0, MOST_SPEED, min_open=True),
     metavar="NUMBER",
-    help="Simulated seconds per second, at most.  [default: 1; with --lockstep: no limit]",
+    help="Maximum speed, as a multiple of real time.  [default: 1; with --lockstep: no limit]",
 )
-@click.option("--lockstep", is_flag=True, help="As fast as the autopilot answers.")
+@click.option("--lockstep", is_flag=True, help="Run as fast as the autopilot answers.")
 @click.option(
     "--real-time",
     is_flag=True,
-    help="Keep to the wall clock: do not wait for an autopilot that is late, its command is missed.",
+    help="Keep to the wall clock: a late command of the autopilot is missed, and counted.",
 )
 @click.option(
     "--listen",
     type=address_option,
     metavar="[HOST:]PORT",
-    help="Where to listen for autopilots.  [default: 127.0.0.1:4560; for ardupilot and betaflight :9002]",
+    help="Address for autopilots.  [default: 127.0.0.1:4560; for ardupilot and betaflight :9002]",
 )
 @click.option(
     "--truth",
@@ -97,13 +97,13 @@ def _run_on(cpu: int) -> None:
     metavar="[HOST:]PORT",
     default="127.0.0.1:14560",
     show_default=True,
-    help="Where to send the true state, for logs and reports.",
+    help="Address to send the true state to, for logs and reports.",
 )
 @click.option(
     "--truth-every",
     type=WholeNumber(1, 1000),
     metavar="N",
-    help="Truth on every Nth tick.  [default: 2; for ardupilot 8, px4 5, betaflight 10]",
+    help="Send the true state every N ticks.  [default: 2; for ardupilot 8, px4 5, betaflight 10]",
 )
 @click.option(
     "--set",

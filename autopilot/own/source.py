@@ -113,7 +113,9 @@ def _of_entry_point(name: str, group: str, what: str, shipped: Sequence[str]) ->
     if name not in there:
         known = "".join(f"{one}, " for one in (*shipped, *sorted(there)))
         known += "or " if known else ""
-        hint = of_another_kind(name, what) or did_you_mean(name, (*shipped, *there))
+        beside = f"{name}.py"
+        hint = f"did you mean {beside}? " if Path(beside).is_file() else of_another_kind(name, what)
+        hint = hint or did_you_mean(name, (*shipped, *there))
         raise OwnError(f"{name!r}: no {what} of that name; {hint}must be {known}a file as my_law.py:MyLaw")
     try:
         found = there[name].load()

@@ -352,7 +352,7 @@ def _address_or_none(text: str) -> Address | None:
     metavar="[HOST:]PORT",
     default="127.0.0.1:4560",
     show_default=True,
-    help="Where the simulator listens.",
+    help="Address of the simulator.",
 )
 @click.option(
     "--gcs",
@@ -376,37 +376,37 @@ def _address_or_none(text: str) -> Address | None:
     "--tcp",
     type=address_option,
     metavar="[HOST:]PORT",
-    help="Listen here for ground stations that connect by TCP, as 127.0.0.1:5760.",
+    help="Listen for TCP connections of ground stations, e.g. at 127.0.0.1:5760.",
 )
 @click.option(
     "--ground-lockstep",
     type=address_option,
     metavar="[HOST:]PORT",
-    help="One ground station that shares our clock, in place of --gcs and --api.",
+    help="One ground station in lockstep, instead of --gcs and --api.",
 )
 @click.option(
     "--vehicle",
     default="bebop",
     show_default=True,
     metavar="NAME|FILE",
-    help=f"The vehicle as the autopilot knows it: {VEHICLES.choice()}.",
+    help=f"The vehicle that the autopilot assumes: {VEHICLES.choice()}.",
 )
 @click.option(
     "--law",
     metavar="NAME|FILE:CLASS",
-    help=f"Control law to fly with: {', '.join(LAWS)}, or your own (docs/laws.md).  [default: CTL_LAW]",
+    help=f"Control law: {', '.join(LAWS)}, or your own (docs/laws.md).  [default: CTL_LAW]",
 )
 @click.option(
     "--estimator",
     default="",
     metavar="FILE:CLASS",
-    help="Estimator of your own to fly with (docs/estimators.md).",
+    help="Your own estimator (docs/estimators.md).",
 )
 @click.option(
     "--planner",
     default="",
     metavar="FILE:CLASS",
-    help="Path planner of your own to fly with (docs/planners.md).",
+    help="Your own path planner (docs/planners.md).",
 )
 @click.option(
     "--set",
@@ -414,25 +414,25 @@ def _address_or_none(text: str) -> Address | None:
     type=setting_option,
     metavar="NAME=VALUE",
     multiple=True,
-    help="Set a parameter; repeatable. SIM_ parameters, which are the simulator's, are ignored.",
+    help="Set a parameter; repeatable. SIM_ parameters of the simulator are ignored.",
 )
 @click.option("--home", type=home_option, metavar="LAT,LON,ALT", help="Origin of the world: degrees, metres.")
 @click.option(
     "--storage",
     type=NamedPath(file_okay=False, path_type=Path),
     metavar="DIR",
-    help="Where mission and parameters outlive the program.  [default: the user's state directory]",
+    help="Folder that stores mission and parameters.  [default: the user's state directory]",
 )
 @click.option(
     "--signing-key",
     type=signing_key_option,
     metavar="FILE",
-    help="Accept only messages signed with this key: 64 hexadecimal digits, or a pass phrase. It is stored.",
+    help="Accept only messages signed with this key (64 hexadecimal digits or a pass phrase), and store it.",
 )
 @click.option(
     "--allow-setup-signing",
     is_flag=True,
-    help="Take a first signing key from whoever sends SETUP_SIGNING.",
+    help="Accept a first signing key from any sender of SETUP_SIGNING.",
 )
 @click.option("--quiet", is_flag=True, help="Print errors only.")
 @click.version_option(package_name="plumbline", message="autopilot (Plumbline) %(version)s")

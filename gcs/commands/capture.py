@@ -20,9 +20,9 @@ from gcs.shell.link import Address
     "--duration",
     "duration_s",
     type=PositiveType(),
-    help="Stop after so many seconds.",
+    help="Stop after NUMBER seconds.",
 )
-@click.option("--overwrite", is_flag=True, help="Even if --out is an earlier log: it is lost.")
+@click.option("--overwrite", is_flag=True, help="Replace an earlier log at --out.")
 @connect_option
 @truth_option
 def capture_command(

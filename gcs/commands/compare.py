@@ -14,15 +14,15 @@ from gcs.commands.options import OUTPUT_FILE, json_option, print_json
 @click.option(
     "--out",
     type=OUTPUT_FILE,
-    help="The page.  [default: comparisons/RUN-RUN.html]",
+    help="Path of the page.  [default: comparisons/RUN-RUN.html]",
 )
 @json_option
-@click.option("--quiet", is_flag=True, help="No table.")
+@click.option("--quiet", is_flag=True, help="Print no table.")
 def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool, quiet: bool) -> None:
     """Compare flights: figures, settings, tracks and errors.
 
     RUN is the output of gcs fly or gcs capture, or any telemetry log of a Plumbline vehicle. The figures
-    stand beside each other, the best of each marked, with what differed in mission, law, sensors, seed and
+    are listed side by side, the best of each marked, with what differed in mission, law, sensors, seed and
     parameters; the page lays tracks and errors over each other. Of more flights than the terminal has columns
     for, the main figures are shown, a row for each flight.
 

@@ -26,12 +26,12 @@ def _send(address: Address, make: Callable[[Session], Operation], begins: bool =
 
 
 @click.command("arm")
-@click.option("--force", is_flag=True, help="Without the vehicle's own checks.")
+@click.option("--force", is_flag=True, help="Skip the pre-arm checks of the vehicle.")
 @connect_option
 def arm_command(force: bool, address: Address) -> None:
     """Start the rotors.
 
-    A vehicle that is not ready yet is waited for, ten seconds at most; then it refuses, and says why.
+    If the vehicle is not ready, the command waits up to ten seconds; then the vehicle refuses and says why.
     """
     from gcs.workflows.readiness import wait_until_ready
 
@@ -44,12 +44,12 @@ def arm_command(force: bool, address: Address) -> None:
 
 
 @click.command("disarm")
-@click.option("--force", is_flag=True, help="Even in the air: the vehicle falls.")
+@click.option("--force", is_flag=True, help="Stop them even in the air: the vehicle falls.")
 @connect_option
 def disarm_command(force: bool, address: Address) -> None:
     """Stop the rotors.
 
-    In the air the vehicle refuses.
+    The vehicle refuses this in the air.
     """
     try:
         _send(address, lambda session: command.disarm(session.target, force))
@@ -62,7 +62,7 @@ def disarm_command(force: bool, address: Address) -> None:
 def start_command(address: Address) -> None:
     """Fly the mission on the vehicle from its first item.
 
-    A disarmed vehicle accepts it and begins when it is armed.
+    A disarmed vehicle accepts the command and starts when it is armed.
     """
     _send(address, lambda session: command.start_mission(session.target), begins=True)
 
@@ -72,7 +72,7 @@ def start_command(address: Address) -> None:
 def pause_command(address: Address) -> None:
     """Hold the load where it is.
 
-    gcs resume goes on with the mission.
+    gcs resume continues the mission.
     """
     _send(address, lambda session: command.pause(session.target))
 
@@ -80,7 +80,7 @@ def pause_command(address: Address) -> None:
 @click.command("resume")
 @connect_option
 def resume_command(address: Address) -> None:
-    """Go on with a paused mission."""
+    """Continue a paused mission."""
     _send(address, lambda session: command.resume(session.target))
 
 
@@ -91,8 +91,8 @@ def resume_command(address: Address) -> None:
 def takeoff_command(height: float | None, altitude: float | None, address: Address) -> None:
     """Lift the load and hold it.
 
-    HEIGHT is that of the load above home in m; without it the vehicle's MIS_TAKEOFF_ALT counts. The vehicle
-    must be armed, or is armed next.
+    HEIGHT is the height of the load above home in m; the default is the parameter MIS_TAKEOFF_ALT. The
+    vehicle must be armed, or armed next.
     """
     from gcs.workflows.running_flight import vehicle_home
 
@@ -117,16 +117,18 @@ def takeoff_command(height: float | None, altitude: float | None, address: Addre
     type=click.Choice(["home", "load"]),
     default="home",
     show_default=True,
-    help="From where EAST, NORTH and UP count: from home, or from where the load is now.",
+    help="Origin of EAST, NORTH and UP: home, or the present position of the load.",
 )
-@click.option("--speed", type=PositiveType(), help="m/s on the way, instead of the vehicle's own.")
+@click.option(
+    "--speed", type=PositiveType(), help="Speed on the way in m/s, instead of the default of the vehicle."
+)
 @connect_option
 def goto_command(
     east: float, north: float, up: float | None, frame: str, speed: float | None, address: Address
 ) -> None:
-    """Take the load to a place and hold it there.
+    """Move the load to a position and hold it there.
 
-    EAST, NORTH and UP are the place of the load in m; without UP it keeps its height. The vehicle must be
+    EAST, NORTH and UP are the position of the load in m; without UP it keeps its height. The vehicle must be
     flying. The distance to go is printed; the vehicle refuses what is more than 100 km off, or beyond its
     fence.
     """

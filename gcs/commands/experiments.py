@@ -22,13 +22,13 @@ def experiments_command() -> None:
     type=OUTPUT_FOLDER,
     default=Path("experiments/thesis"),
     show_default=True,
-    help="Where flights, tables and figures go.",
+    help="Folder for flights, tables and figures.",
 )
 @fresh_option
 @click.option(
     "--jobs",
     type=WholeNumber(min=1),
-    help="Flights at a time, each on a core of its own.  [default: all cores]",
+    help="Number of flights in parallel, one per core.  [default: all cores]",
 )
 @click.option(
     "--docs",
@@ -36,7 +36,7 @@ def experiments_command() -> None:
     help="Also put tables and key figures into this page, docs/thesis.md of the source tree.",
 )
 @json_option
-@click.option("--quiet", is_flag=True, help="No progress and no tables.")
+@click.option("--quiet", is_flag=True, help="Print no progress and no tables.")
 def thesis_command(
     out: Path, fresh: bool, jobs: int | None, docs: Path | None, as_json: bool, quiet: bool
 ) -> None:
@@ -44,7 +44,7 @@ def thesis_command(
 
     Sixteen flights through the real processes in lockstep, with ideal sensors; then tables, results.json, a
     figure for each of the thesis's, and index.html that shows them all. A flight that was flown already by
-    the same code is used again: after Ctrl-C the same command goes on where it was.
+    the same code is used again: after Ctrl-C the same command continues.
 
     \b
     gcs experiments thesis

@@ -61,50 +61,50 @@ _OWN = (
 @click.option(
     "--seed", type=WholeNumber(0, MOST_SEED), default=1, show_default=True, help="Seed of all noise."
 )
-@click.option("--lockstep", is_flag=True, help="As fast as possible, and reproducible to the byte (default).")
+@click.option("--lockstep", is_flag=True, help="Fly as fast as possible, reproducible to the byte (default).")
 @click.option(
     "--speed",
     type=PositiveType(most=MOST_SPEED),
-    help="On the wall clock, so many times as fast; other ground stations may watch on 14550 and 14540.",
+    help="Fly at NUMBER times real time; other ground stations can watch on ports 14550 and 14540.",
 )
 @click.option(
     "--real-time",
     is_flag=True,
-    help="As --speed 1, but the simulator waits for nobody: what comes too late is missed, and counted.",
+    help="Like --speed 1, but the simulator does not wait: a late rotor command is missed and counted.",
 )
 @click.option(
     "--set",
     "settings",
     type=SettingType(),
     multiple=True,
-    help="Set a parameter of the simulator (SIM_*) or of the autopilot; may be given again.",
+    help="Set a parameter of the simulator (SIM_*) or of the autopilot; repeatable.",
 )
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,
-    help="Where telemetry and report go.  [default: flights/MISSION-TIME]",
+    help="Folder for telemetry and report.  [default: flights/MISSION-TIME]",
 )
 @click.option(
     "--connect",
     type=AddressType(),
     is_flag=False,
     flag_value=str(DEFAULT_PORT),
-    help="Fly a vehicle that is running already, met at PORT or HOST:PORT (14550 if none is named).",
+    help="Fly a vehicle that is already running, at PORT or HOST:PORT (14550 without a value).",
 )
 @truth_option
 @click.option(
     "--timeout",
     "limit_s",
     type=PositiveType(),
-    help="Give up after so many seconds of the vehicle's clock.  [default: 1.5 x expected + 60]",
+    help="Give up after NUMBER seconds of the vehicle's clock.  [default: 1.5 x expected + 60]",
 )
-@click.option("--force", is_flag=True, help="Fly even what the vehicle cannot do.")
-@click.option("--overwrite", is_flag=True, help="Even if --out holds an earlier flight: it is lost.")
+@click.option("--force", is_flag=True, help="Fly the mission even if it exceeds the limits of the vehicle.")
+@click.option("--overwrite", is_flag=True, help="Replace an earlier flight in --out.")
 @click.option("--view", is_flag=True, help="Show the flight live in a browser; see gcs view.")
 @page_options
 @require_options
 @json_option
-@click.option("--quiet", is_flag=True, help="No progress and no table, only the outcome.")
+@click.option("--quiet", is_flag=True, help="Print only the outcome, no progress and no table.")
 @click.pass_context
 def fly_command(
     ctx: click.Context,
@@ -137,8 +137,8 @@ def fly_command(
     """Fly a mission from start to report.
 
     MISSION is the name of a shipped mission (see gcs missions) or the path of a mission file. A simulator and
-    an autopilot are started for the flight and stopped after it; with --connect those that run already are
-    used. The mission is checked, uploaded and flown, all telemetry is captured, and a report is made.
+    an autopilot are started for the flight and stopped after it; --connect uses running ones instead. The
+    mission is checked, uploaded and flown, all telemetry is captured, and a report is written.
 
     \b
     gcs fly case-b

@@ -46,7 +46,7 @@ def missions_command(as_json: bool) -> None:
 @mission_argument
 @vehicle_option("The vehicle that is to fly it")
 @planner_option
-@click.option("--as-asked", is_flag=True, help="Judge the paths as asked, not shaped.")
+@click.option("--as-asked", is_flag=True, help="Check the paths as asked, not shaped.")
 @click.option("--law", hidden=True, help="Refused: paths are checked, not a law.")
 @json_option
 @click.pass_context

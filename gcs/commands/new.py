@@ -11,10 +11,10 @@ from gcs.workflows.new_file import kinds, new_file
 @click.argument("kind", type=click.Choice(kinds()), metavar="KIND")
 @click.argument("name")
 def new_command(kind: str, name: str) -> None:
-    """Write a commented file of your own that flies as it is.
+    """Write a commented template that flies as it is, for you to edit.
 
-    KIND is one of those below, NAME is that of the file, without or with its ending; it may lead into another
-    folder, which is made. A file that exists is left as it is. The command that flies it is printed.
+    KIND is one of those below; NAME is the name or path of the file, with or without its ending. Missing
+    folders are created, and an existing file is never changed. The command that flies the file is printed.
 
     \b
     gcs new law steady

@@ -17,6 +17,7 @@ from gcs.errors import InputError
 from gcs.folders import check_writable
 from gcs.shell.display import keep_stdout_for_results, to_reader, to_results
 from gcs.shell.link import DEFAULT_PORT, LOOPBACK, PAGE_PORT, SITL_TRUTH, Address, AddressError, parse_address
+from missions.units import split_unit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -159,7 +160,7 @@ def connect_option(function: F) -> F:
         type=AddressType(),
         default=str(DEFAULT_PORT),
         show_default=True,
-        help="Where the vehicle is met: PORT or HOST:PORT to wait there, udpout:HOST:PORT to speak first.",
+        help="Connection to the vehicle: PORT or HOST:PORT to listen there, udpout:HOST:PORT to send first.",
     )(function)
 
 
@@ -169,7 +170,7 @@ def truth_option(function: F) -> F:
         "--truth",
         "truth_at",
         type=TruthType(),
-        help="Where the vehicle's simulator sends the true state, PORT or HOST:PORT (sitl --truth).  "
+        help="Where the simulator sends the true state: PORT or HOST:PORT (sitl --truth).  "
         f"[default: {SITL_TRUTH.port}]",
     )(function)
 
@@ -179,13 +180,13 @@ def page_options(function: F) -> F:
     port = click.option(
         "--port",
         type=WholeNumber(1, 65535),
-        help=f"TCP port of the live page.  [default: {PAGE_PORT}, or one that is free]",
+        help=f"TCP port of the live page.  [default: {PAGE_PORT}, or a free one]",
     )
     bind = click.option(
         "--bind",
         default=LOOPBACK,
         show_default=True,
-        help="Address of this machine at which the page is served; beyond the loopback others can reach it.",
+        help="Address at which the page is served; other machines reach it unless it is a loopback one.",
     )
     return port(bind(function))
 
@@ -233,7 +234,7 @@ def law_help() -> str:
     """What can be given to --law."""
     from autopilot.vehicle.parameters import LAWS
 
-    return f"Control law to fly with: {', '.join(LAWS)}, or one of your own (docs/laws.md)."
+    return f"Control law to fly with: {', '.join(LAWS)}, or your own (docs/laws.md)."
 
 
 def law_option(function: F) -> F:
@@ -285,7 +286,7 @@ def own_options(function: F) -> F:
     estimator = click.option(
         "--estimator",
         type=OwnType(_estimator),
-        help="Estimator of your own to fly with, FILE.py:CLASS (docs/estimators.md).  [default: built in]",
+        help="Your own estimator, FILE.py:CLASS (docs/estimators.md).  [default: built in]",
     )
     return estimator(planner_option(function))
 
@@ -295,7 +296,7 @@ def planner_option(function: F) -> F:
     return click.option(
         "--planner",
         type=OwnType(_planner),
-        help="Path planner of your own to fly with, FILE.py:CLASS (docs/planners.md).  [default: built in]",
+        help="Your own path planner, FILE.py:CLASS (docs/planners.md).  [default: built in]",
     )(function)
 
 
@@ -303,7 +304,7 @@ def sensors_option(function: F) -> F:
     """--sensors of every command that starts a simulator; its help lists the shipped profiles."""
     from sitl.sensors.shipped import PROFILES
 
-    help_text = f"What the vehicle senses with: {PROFILES.choice()}."
+    help_text = f"Sensors of the vehicle: {PROFILES.choice()}."
     return click.option(
         "--sensors",
         default="lab",
@@ -320,20 +321,20 @@ def require_options(function: F) -> F:
         "required",
         metavar='"KEY SIGN VALUE"',
         multiple=True,
-        help='A figure of --json that must hold, e.g. "load_error_max_m < 0.01"; if not, the exit code is 4. '
-        "May be given again.",
+        help='Condition on a figure of --json, e.g. "load_error_max_m < 0.01"; if it fails, the exit code is '
+        "4. Repeatable.",
     )
     junit = click.option(
         "--junit",
         type=OUTPUT_FILE,
-        help="Write the outcome, and what was required, as a JUnit test report.",
+        help="Write the outcome and the required conditions as a JUnit test report.",
     )
     return require(junit(function))
 
 
 def fresh_option(function: F) -> F:
     """--fresh of what goes on where it was stopped; --overwrite as of the others."""
-    text = "Fly everything anew, also what has been flown already: what --out holds is lost."
+    text = "Fly everything again and discard the results in --out."
     return click.option("--fresh", "--overwrite", "fresh", is_flag=True, help=text)(function)
 
 
@@ -345,7 +346,7 @@ def json_option(function: F) -> F:
         is_flag=True,
         is_eager=True,  # before a class is loaded that somebody has brought, which may print
         callback=_json_alone,
-        help="Print the result as JSON and nothing else.",
+        help="Print only the result, as JSON.",
     )(function)
 
 
@@ -372,28 +373,10 @@ def _plain(value: Any) -> Any:
     return value
 
 
-_UNITS = {
-    "_n_s2_m2": "N s^2/m^2",
-    "_n_s_m": "N s/m",
-    "_m_s2": "m/s^2",
-    "_m_s": "m/s",
-    "_1_s": "1/s",
-    "_n": "N",
-    "_m": "m",
-    "_s": "s",
-    "_us": "us",
-    "_v": "V",
-    "_hz": "Hz",
-    "_kg": "kg",
-    "_deg": "deg",
-    "_rad": "rad",
-}
-
-
 def spoken(key: str) -> str:
     """A key of a record as people read it: `cable_tension_n` is `cable tension (N)`."""
-    unit = max((one for one in _UNITS if key.endswith(one)), key=len, default="")
-    return key.removesuffix(unit).replace("_", " ") + (f" ({_UNITS[unit]})" if unit else "")
+    name, unit = split_unit(key)
+    return name.replace("_", " ") + (f" ({unit.sign})" if unit else "")
 
 
 def print_table(rows: Sequence[Sequence[str]], header: Sequence[str] = ()) -> None:

@@ -22,7 +22,7 @@ from gcs.workflows.parameters import (
 def param_command() -> None:
     """Read and write parameters.
 
-    Names are those of the vehicle: every gain, mass, rate and limit that its autopilot knows.
+    Every gain, mass, rate and limit of the autopilot is a parameter (docs/parameters.md).
     """
 
 
@@ -47,7 +47,7 @@ def list_command(pattern: str, as_json: bool, address: Address) -> None:
 @json_option
 @connect_option
 def get_command(names: tuple[str, ...], as_json: bool, address: Address) -> None:
-    """Read one parameter or more by NAME."""
+    """Read parameters by NAME."""
     found = get_parameters(names, address)
     if as_json:
         print_json(found)
@@ -60,7 +60,7 @@ def get_command(names: tuple[str, ...], as_json: bool, address: Address) -> None
 @click.argument("value", type=FiniteType())
 @connect_option
 def set_command(name: str, value: float, address: Address) -> None:
-    """Set parameter NAME to VALUE, and see that it was stored."""
+    """Set parameter NAME to VALUE and verify that it was stored."""
     click.echo(set_parameter(name, value, address))
 
 
@@ -80,10 +80,10 @@ def save_command(file: Path, address: Address) -> None:
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @connect_option
 def load_command(file: Path, address: Address) -> None:
-    """Set all parameters that FILE holds.
+    """Set all parameters in FILE.
 
     Reads `NAME value` lines (MAVProxy, Mission Planner) and QGroundControl's columns. A parameter that the
-    vehicle refuses is named, and the others are set all the same.
+    vehicle refuses is reported, and the others are set.
     """
     done, total = load_parameters(file, address)
     click.echo(f"{done} of {total} parameters set from {file}")

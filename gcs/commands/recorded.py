@@ -93,7 +93,7 @@ def identify_command(file: Path, columns: str | None, as_json: bool) -> None:
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,
-    help="Where table and picture go.  [default: replays/, by the flight's folder or the file's name]",
+    help="Folder for table and picture.  [default: replays/NAME, after the flight's folder or file]",
 )
 @json_option
 def replay_command(file: Path, columns: str | None, out: Path | None, as_json: bool) -> None:

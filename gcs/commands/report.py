@@ -15,24 +15,24 @@ from gcs.errors import InputError
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,
-    help="Where the report goes.  [default: beside the log]",
+    help="Folder of the report.  [default: that of the log]",
 )
-@click.option("--mcap", is_flag=True, help="Also flight.mcap, for Foxglove, PlotJuggler and Rerun.")
+@click.option("--mcap", is_flag=True, help="Write flight.mcap too, for Foxglove, PlotJuggler and Rerun.")
 @click.option(
     "--common-tlog",
     "common",
     is_flag=True,
-    help="Also flight.common.tlog, without the private dialect, for tools that end at unknown messages.",
+    help="Write flight.common.tlog too, without the private dialect, for tools that reject it.",
 )
 @json_option
-@click.option("--quiet", is_flag=True, help="No progress and no table.")
+@click.option("--quiet", is_flag=True, help="Print no progress and no table.")
 def report_command(
     source: Path, out: Path | None, mcap: bool, common: bool, as_json: bool, quiet: bool
 ) -> None:
-    """Make the report of a captured flight again.
+    """Write the report of a captured flight again.
 
-    DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. Made are
-    summary.json, flight.parquet, pictures and report.html, from the telemetry alone.
+    DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. The command
+    writes summary.json, flight.parquet, plots and report.html, all from the telemetry alone.
     """
     from gcs.shell.display import say
     from gcs.workflows.report import make_common, make_mcap, print_record, report_again

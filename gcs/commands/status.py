@@ -20,7 +20,7 @@ from gcs.workflows.status import vehicle_status, vehicle_texts
 def status_command(as_json: bool, address: Address, truth_at: Address | None) -> None:
     """Show the vehicle's status.
 
-    Its last warnings and errors follow, with their age.
+    The latest warnings and errors are listed with their age.
     """
     record = vehicle_status(address, truth_at, as_json)
     if as_json:
@@ -39,8 +39,8 @@ def status_command(as_json: bool, address: Address, truth_at: Address | None) ->
 def texts_command(as_json: bool, address: Address) -> None:
     """List the messages (STATUSTEXT) of the vehicle.
 
-    The vehicle keeps the last 50, each with the time at which it was last sent: what it does, warnings, and
-    why it has refused a command.
+    The vehicle keeps the last 50, each with the time at which it was last sent: progress, warnings, and
+    reasons for refused commands.
     """
     texts = vehicle_texts(address)
     if as_json:

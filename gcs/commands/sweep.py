@@ -36,7 +36,7 @@ from gcs.shell.display import say, to_results
     "laws",
     type=LawType(),
     multiple=True,
-    help=f"{law_help()} May be given again.  [default: {DEFAULT_LAW}]",
+    help=f"{law_help()} Repeatable.  [default: {DEFAULT_LAW}]",
 )
 @own_options
 @sensors_option
@@ -46,47 +46,48 @@ from gcs.shell.display import say, to_results
     "varied",
     metavar="NAME=VALUES",
     multiple=True,
-    help="Vary a parameter: NAME=LOW:HIGH:COUNT or NAME=A,B,C, with --sample also NAME=LOW:HIGH; "
-    "may be given again.",
+    help="Vary a parameter: NAME=LOW:HIGH:COUNT or NAME=A,B,C, with --sample also NAME=LOW:HIGH; repeatable.",
 )
 @click.option(
     "--set",
     "settings",
     type=SettingType(),
     multiple=True,
-    help="Set a parameter for all flights; may be given again.",
+    help="Set a parameter for all flights; repeatable.",
 )
 @click.option(
     "--seeds",
     type=WholeNumber(min=1),
     default=1,
     show_default=True,
-    help="Fly each setting with so many seeds: 1, 2, 3 ...",
+    help="Number of seeds for each setting: 1, 2, 3 ...",
 )
 @click.option(
     "--sample",
     type=WholeNumber(min=1),
-    help="Draw so many settings from what is varied (Latin hypercube) instead of flying its whole grid.",
+    help="Draw this many settings (Latin hypercube) instead of flying the whole grid.",
 )
 @click.option(
-    "--jobs", type=WholeNumber(min=1), help="Flights at a time, each on a core.  [default: all cores]"
+    "--jobs",
+    type=WholeNumber(min=1),
+    help="Number of flights in parallel, one per core.  [default: all cores]",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Fly on a running Dask cluster, e.g. tcp://host:8786.")
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,
-    help="Where table and report go.  [default: sweeps/MISSION]",
+    help="Folder for table and report.  [default: sweeps/MISSION]",
 )
 @click.option(
     "--reports",
     is_flag=True,
-    help="Fly the flights that stand out again, each with a report: of each law the worst, the median and "
-    "the first that was lost.",
+    help="Fly the notable flights again, each with a report: for each law the worst, the median and "
+    "the first lost flight.",
 )
 @fresh_option
 @require_options
 @json_option
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 @click.pass_context
 def sweep_command(
     ctx: click.Context,
@@ -112,13 +113,13 @@ def sweep_command(
 ) -> int:
     """Fly a mission thousands of times under varied conditions.
 
-    The flights are those of gcs fly --lockstep, but for the wire, which is left out: ten to twenty a second
-    on each core. Every parameter of the simulator and of the autopilot can be varied. The directory then
-    holds flights.parquet (a row for each flight), report.html with its pictures, and plan.json. A sweep that
-    was stopped goes on when the same command is given again.
+    The flights are those of gcs fly --lockstep without the UDP link, ten to twenty per second on each core.
+    Every parameter of the simulator and of the autopilot can be varied. The folder then holds flights.parquet
+    (a row for each flight), report.html with its plots, and plan.json. The same command continues a sweep
+    that was stopped.
 
-    The mission is not checked beforehand: gcs check MISSION tells what the vehicle cannot do. A path that the
-    autopilot refuses is flown as asked with --set MIS_INFEASIBLE=0, and slower with 1.
+    The mission is not checked beforehand; gcs check MISSION tells whether the vehicle can fly it. A path that
+    the autopilot refuses is flown as asked with --set MIS_INFEASIBLE=0, and slower with 1.
 
     \b
     gcs sweep case-b --vary SIM_ACT_DELAY_MS=0:60:7 --seeds 5

@@ -34,9 +34,11 @@ _RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 @click.command("upload")
 @mission_argument
 @vehicle_option("Vehicle against which it is checked")
-@click.option("--force", is_flag=True, help="Upload even what the vehicle cannot do.")
 @click.option(
-    "--skip", is_flag=True, help="Upload a .plan or .waypoints file without what is not flown of it."
+    "--force", is_flag=True, help="Upload the mission even if it exceeds the limits of the vehicle."
+)
+@click.option(
+    "--skip", is_flag=True, help="Leave out the items of a .plan or .waypoints file that are not flown."
 )
 @connect_option
 def upload_command(mission: str, vehicle: str, force: bool, skip: bool, address: Address) -> None:

@@ -15,7 +15,7 @@ from gcs.shell.link import API_PORT, SITL_TRUTH, Address
     type=AddressType(),
     multiple=True,
     default=(str(API_PORT),),
-    help="Where vehicles are met, as in the other commands; may be given again.  "
+    help="Connection to vehicles, as in the other commands; repeatable.  "
     f"[default: {API_PORT}, which leaves 14550 to other ground stations]",
 )
 @page_options
@@ -23,7 +23,7 @@ from gcs.shell.link import API_PORT, SITL_TRUTH, Address
 @click.option(
     "--no-truth",
     is_flag=True,
-    help="Do not listen to the simulator (errors of the estimator, true places): another program wants to.",
+    help="Do not listen to the simulator (estimator errors, true positions), because another program does.",
 )
 @truth_option
 @click.option("--feed", type=int, hidden=True, help="The descriptor at which gcs fly tells what it hears.")
@@ -38,9 +38,9 @@ def view_command(
 ) -> None:
     """Show running vehicles live in a browser.
 
-    A page on this machine shows vehicle, cable and load in 3-D with what is known of them, and commands
-    them. Its address is printed; whoever knows it may use the page. Several vehicles are told apart by their
-    system ids.
+    A page on this machine shows vehicle, cable and load in 3-D with their figures, and sends commands.
+    Its address is printed; everyone who knows it can use the page. Several vehicles are distinguished by
+    their system ids.
 
     \b
     gcs view

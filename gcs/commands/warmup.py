@@ -10,13 +10,13 @@ from gcs.commands.options import law_option
 
 @click.command("warmup")
 @law_option
-@click.option("--all", "all_laws", is_flag=True, help="All control laws.")
+@click.option("--all", "all_laws", is_flag=True, help="Compile all control laws.")
 @click.option(
     "--sweeps",
     is_flag=True,
-    help="Also what sweeps fly with, eight flights at once included: a minute or two more for each law.",
+    help="Compile the sweeps too, eight flights at once included: a minute or two more for each law.",
 )
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def warmup_command(law: str, all_laws: bool, sweeps: bool, quiet: bool) -> None:
     """Compile the flight software before the first flight.
 

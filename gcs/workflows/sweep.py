@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -121,9 +123,10 @@ def run_sweep(options: SweepOptions) -> Sweep:
         if directory != first and not options.quiet:
             goes = "is in" if directory.exists() else "goes to"
             say(f"{first} holds another sweep: this one {goes} {directory}")
-    scheduler = options.scheduler
-    workers = dask_cluster(scheduler) if scheduler else own_processes(len(cores(options.jobs)))
-    with StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop:
+    with (
+        StopRequest(f"stopping when the flights in the air have ended; {_CONTINUED}") as stop,
+        _workers(options) as workers,
+    ):
         done = sweep(
             plan,
             directory,
@@ -142,6 +145,16 @@ def run_sweep(options: SweepOptions) -> Sweep:
         page = write_report(directory, plan)
     flights = tuple(_told(plan, one, directory) for one in found)
     return Sweep(Path(plan.mission).stem, done, plan.flights, directory, page, flights)
+
+
+@contextmanager
+def _workers(options: SweepOptions) -> Iterator[AbstractContextManager[tuple[Executor, int]]]:
+    """Who flies. A cluster is met here, before anything is written or taken away: it may not answer."""
+    if options.scheduler:
+        with dask_cluster(options.scheduler) as cluster:
+            yield nullcontext(cluster)
+    else:
+        yield own_processes(len(cores(options.jobs)))
 
 
 def _tell_doubts(plan: SweepPlan) -> None:

@@ -2,7 +2,7 @@
 
 Every deviation is one sigma per axis. A `bias` is drawn once at switch-on; a `walk` is the growth of that
 bias over a second (its deviation rises with the square root of time). A table that is absent is a sensor that
-is not fitted; only the IMU must be there.
+is not fitted; only the IMU must be there, and motion capture or GNSS, which tells where the vehicle is.
 """
 
 from __future__ import annotations
@@ -328,6 +328,12 @@ class Profile(_Table):
     gnss: Gnss | None = None
     barometer: Barometer | None = None
     magnetometer: Magnetometer | None = None
+
+    @model_validator(mode="after")
+    def _tells_where_the_vehicle_is(self) -> Profile:
+        if self.mocap is None and self.gnss is None:
+            raise ValueError("has neither mocap nor gnss; one of them must tell where the vehicle is")
+        return self
 
 
 class Stated(NamedTuple):

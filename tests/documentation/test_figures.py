@@ -51,41 +51,39 @@ def figure(row: str, name: str, digits: int) -> str:
 
 def readme() -> str:
     """What README says of the flights."""
-    return f"""In each of {SWEEP["completed"]:,} flights the load kept within {math.ceil(1e3 * SWEEP["error_100"])} mm of its path at 2 m/s, with motion-capture noise, motor lag and
-rotors that saturate (`gcs fly case-b --sensors lab`).
-The law that does it, `plumbline`, takes the derivatives of its commands from model and mission, predicts over the delay
-it knows of, learns the load's mass and the wind, has gains computed from the vehicle for a delay it must survive, and
-flies paths that were shaped to the rotors beforehand. The law of the thesis that the project starts from errs by
-{mm("B lab, law thesis")} mm here.
+    return f"""In each of {SWEEP["completed"]:,} flights the load stayed within {math.ceil(1e3 * SWEEP["error_100"])} mm of its path at up to 2 m/s, with the noise of motion capture,
+motor lag and rotors that saturate (`gcs fly case-b --sensors lab`). The control law `plumbline` computes the derivatives of
+its commands from model and mission, predicts the state over the known delay, and estimates the mass of the load and the
+wind. Its gains are computed from the vehicle for a delay margin, and its paths are shaped to the limits of the rotors
+before flight. The control law of the thesis, from which the project started, has an error of {mm("B lab, law thesis")} mm in the same flight.
 
-| flight, worst of {RECORD["seeds"]} seeds (`make figures`) | clean world | world as it is |
+| flight, worst of {RECORD["seeds"]} seeds (`make figures`) | clean world | realistic world |
 |---|---|---|
 | Case B, perfect sensors | {mm("B ideal")} mm | |
 | Case B, motion capture, 12 ms delay and 30 ms motor lag | {mm("B lab 12/30 ms")} mm | {real("B lab 12/30 ms")} |
 | Case B, 72 ms delay | {mm("B lab 72 ms")} mm | {real("B lab 72 ms")} |
-| Case B, 72 ms delay believed to be 62 ms; 82 ms | {mm("B lab 72, told 62")} mm; {mm("B lab 72, told 82")} mm | |
+| Case B, 72 ms delay assumed to be 62 ms; 82 ms | {mm("B lab 72, told 62")} mm; {mm("B lab 72, told 82")} mm | |
 | Case C (a figure eight that travels 20 m), 12 ms and 30 ms | {mm("C lab 12/30 ms")} mm | {real("C lab 12/30 ms")} |
-| Case C, load half or one and a half times as heavy as believed | {mm("C lab load -50 %", "C lab load +50 %")} mm | {real("C lab load -50 %", "C lab load +50 %")} |
+| Case C, load half or one and a half times as heavy as assumed | {mm("C lab load -50 %", "C lab load +50 %")} mm | {real("C lab load -50 %", "C lab load +50 %")} |
 | Cases B and C outdoors: GNSS-RTK, magnetometer, barometer, camera | {mm("B rtk", "C rtk")} mm | {real("B rtk", "C rtk")} |
 | Cases B and C outdoors with `heavy-real`, in a wind of 5 m/s with gusts of 1 m/s | | {real("B field heavy", "C field heavy")} |
 | hovering in a gust of 5 m/s for 2 s | {mm("gust lab")} mm | {real("gust lab")} |
 | Case A, a step of 0.25 m under true rotor limits | {step_of("A lab")} | {step_of("A lab, real")} |
 
-The world as it is (`--vehicle bebop-real --sensors lab-real`, outdoors `field`, 12 ms delay) has rotors that drag and flap, ground
-effect, downwash, a cable attached off the centre, a battery that sags, vibration, late and hidden readings; the autopilot is
-told of none of it. Paths of Case A are planned there with 35 % of the rotors' range kept free for control at either limit
-(`MIS_ROTOR_MARG` 35); `heavy-real` is delivered with 40 %, and flies Case C 1.31 times as long as asked for it.
-[docs/realism.md](docs/realism.md) has each effect.
+The realistic world (`--vehicle bebop-real --sensors lab-real`, outdoors `field`, 12 ms delay) adds rotor drag and flapping,
+ground effect, downwash, a cable attached off the centre of mass, a sagging battery, vibration, and late and missing
+readings. The autopilot is not told about any of them. Case A is planned there with 35 % of the range of the rotors reserved
+for control at either limit (`MIS_ROTOR_MARG` 35); `heavy-real` comes with 40 % and takes 1.31 times as long for Case C as
+the mission asks for. [docs/realism.md](docs/realism.md) describes each effect.
 
-Scored is the true place of the load against the path that the mission asks for, from the end of the lift to the
-beginning of the landing. Of {SWEEP["flights"]:,} flights of Case B with motion capture, a seed each, {SWEEP["completed"]:,} were completed
-(`gcs sweep case-b --seeds {SWEEP["flights"]}`): the median error is {1e3 * SWEEP["error_50"]:.1f} mm, the worst
-{1e3 * SWEEP["error_100"]:.1f} mm. How much more it bears before a flight is lost is mapped in
-[docs/robustness.md](docs/robustness.md).
+The error is the distance between the true position of the load and the path that the mission asks for, from the end of the
+lift to the start of the landing. {SWEEP["completed"]:,} of {SWEEP["flights"]:,} flights of Case B with motion capture, each with its own seed, were
+completed (`gcs sweep case-b --seeds {SWEEP["flights"]}`): the median of their maximum errors is {1e3 * SWEEP["error_50"]:.1f} mm, the largest is {1e3 * SWEEP["error_100"]:.1f} mm.
+[docs/robustness.md](docs/robustness.md) maps how much noise and delay the loop tolerates before a flight is lost.
 
-The thesis prints 0.61 s, 15 % and 1.26 s for Case A, without rotor limits and by a controller
-that learns of the step when it comes; here the mission is known beforehand, and the vehicle begins to lean some 0.45 s
-before the step.
+For Case A the thesis prints a rise time of 0.61 s, 15 % overshoot and 1.26 s settling time, without rotor limits and with a
+controller that does not know of the step in advance. Here the mission is known in advance, and the vehicle starts to tilt
+about 0.45 s before the step.
 """
 
 
@@ -126,8 +124,8 @@ def robustness() -> str:
 gcs sweep case-b --seeds {SWEEP["flights"]}
 ```
 
-Case B, lab sensors, nothing varied but the noise: {SWEEP["completed"]:,} of {SWEEP["flights"]:,} completed. The greatest load error of a
-flight is {median} in the median, {most} in 99 and {nearly} in 99.9 of 100, {worst} in the worst.
+Case B, lab sensors, only the noise varied: {SWEEP["completed"]:,} of {SWEEP["flights"]:,} flights completed. The maximum load error of a
+flight has a median of {median}; its 99th percentile is {most}, its 99.9th percentile {nearly}, and the largest {worst}.
 """
 
 

@@ -175,7 +175,11 @@ def files_page() -> str:
     text += "\n### `[[items.terms]]` of signals\n\n" + rows(TermSpec)
     text += "\n### `[[items.terms.factors]]`\n\n" + rows(SineSpec)
     text += "\n## Sensor profile\n\nDeviations are one sigma per axis. A table that is left out is a sensor "
-    text += "that is not fitted.\n\n" + KEYS + "| `description` | text |  | one line for lists |\n"
+    text += (
+        "that is not fitted; one of `mocap` and `gnss` must be there.\n\n"
+        + KEYS
+        + "| `description` | text |  | one line for lists |\n"
+    )
     for name, field in Profile.model_fields.items():
         spec = table_of(field.annotation)
         if spec is not None:

@@ -151,7 +151,7 @@ BAD = {
 @pytest.mark.parametrize("middle", BAD, ids=lambda middle: BAD[middle][:50])
 def test_a_bad_item_gets_one_line_that_says_where_what_and_what_is_allowed(middle: str) -> None:
     found = complaint(middle)
-    assert found.startswith("m.toml: " + BAD[middle])
+    assert found.startswith("m.toml:5: " + BAD[middle])
     assert "\n" not in found
 
 
@@ -165,8 +165,8 @@ def test_several_problems_are_all_told() -> None:
     with pytest.raises(MissionFileError) as caught:
         parsed(WAYPOINT.replace("3.0", "-2.0") + WAYPOINT.replace("1.0", "nan"))
     assert [problem.split(" = ")[0] for problem in caught.value.problems] == [
-        "m.toml: items[1].altitude_m",
-        "m.toml: items[2].east_m",
+        "m.toml:5: items[1].altitude_m",
+        "m.toml:10: items[2].east_m",
     ]
     assert str(caught.value) == "; ".join(caught.value.problems)
 
@@ -192,6 +192,34 @@ def test_several_problems_are_all_told() -> None:
             "a number is written without its unit, which the key names: altitude_m = 2.0",
         ),
         (
+            'title = "T"\naltitude_m = -1,5 # up',
+            "x.toml:2:16: not TOML: Expected newline or end of document after a statement; "
+            "a decimal point is needed: altitude_m = -1.5",
+        ),
+        (
+            "title = My mission # here",
+            'x.toml:1:9: not TOML: Invalid value; text is written in quotes: title = "My mission"',
+        ),
+        ("law = steady", 'x.toml:1:7: not TOML: Invalid value; text is written in quotes: law = "steady"'),
+        (
+            "relative = True",
+            "x.toml:1:12: not TOML: Invalid value; true and false are written in lower case",
+        ),
+        ("x = nan\nx = nan", "x.toml:2:8: not TOML: x is given twice in this table"),
+        (
+            'title = "T"\n[[item]]\ntype = "takeoff"\n[[items]]\ntype = "land"',
+            "x.toml: item: not a table of the file; write [[items]], in two brackets, before each item",
+        ),
+        ("[waypoint]\neast_m = 1.0", "x.toml: waypoint: not a table of the file; write [[items]], in two"),
+        (
+            'title = "T"\nitems = [{type = "land"}]',
+            'x.toml: items[0].type = "land"; must be "takeoff": a mission begins on the ground',
+        ),
+        (
+            'title = "T"\ndescription = """\n[[items]]\n"""\n[[items]]\ntype = "land"',
+            'x.toml: items[0].type = "land"; must be "takeoff": a mission begins on the ground',
+        ),
+        (
             'title = "T"\nitems = [' + "{}, " * 1007 + "]",
             "x.toml: items has 1007 entries; must be a list of at most 1000 (the [[items]] in order)",
         ),
@@ -203,11 +231,11 @@ def test_several_problems_are_all_told() -> None:
         ('titel = "T"\n[[items]]\ntype = "land"', "x.toml: titel: unknown key; write title"),
         (
             'title = "T"\n[[items]]\ntype = "land"',
-            'x.toml: items[0].type = "land"; must be "takeoff": a mission begins on the ground',
+            'x.toml:2: items[0].type = "land"; must be "takeoff": a mission begins on the ground',
         ),
         (
             'title = "T"\n[[items]]\ntype = "takeoff"\naltitude_m = 1.0',
-            'x.toml: items[0].type = "takeoff"; must be "land": a mission ends on the ground',
+            'x.toml:2: items[0].type = "takeoff"; must be "land": a mission ends on the ground',
         ),
     ],
 )

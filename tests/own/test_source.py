@@ -73,6 +73,7 @@ def test_its_parameters_are_the_autopilots() -> None:
 WRONG = {
     "nofile.py:Fine": ("", r"^nofile\.py: no such file$"),
     "lab": ("", r"^'lab': no control law of that name; lab is one of the shipped sensors; must be thesis, "),
+    "mine": (FINE, r"^'mine': no control law of that name; did you mean mine\.py\? must be thesis, "),
     "nobody": ("", r"^'nobody': no control law of that name; must be thesis, lqr, .*my_law\.py:MyLaw$"),
     "mine.py:Other": (FINE, r"^mine\.py: has no class Other; there is Fine$"),
     "mine.py:force": (FINE, r"^mine\.py: has no class force; there is Fine$"),

@@ -139,6 +139,10 @@ WRONG: dict[str, tuple[Any, str]] = {
     ),
     "vehicle's value": (lambda: Vehicle.load("bebop").replace(load_mass_kg=-1), "load_mass_kg = -1; must be"),
     "sensors": (lambda: Sensors.load("lab").replace(imu=None), "Sensors: imu is missing"),
+    "nothing sees the vehicle": (
+        lambda: Sensors.load("lab").replace(mocap=None),
+        "Sensors: has neither mocap nor gnss; one of them must tell where the vehicle is",
+    ),
     "sensor's value": (lambda: Sensors.load("lab").replace(mocap={"rate_hz": 0}), "mocap.rate_hz = 0; must"),
 }
 

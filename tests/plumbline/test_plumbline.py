@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +97,21 @@ def test_a_library_that_is_missing_is_named_before_anything_is_flown(
         ):
             call()
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: plumbline.sweep("hover", law="lqr"), "sweep: no argument 'law'; did you mean laws? must be"),
+        (lambda: plumbline.fly("hover", setings={}), "fly: no argument 'setings'; did you mean settings?"),
+        (lambda: plumbline.connect(timeout=3.0), "did you mean timeout_s? must be one of address, timeout_s"),
+    ],
+)
+def test_an_argument_that_there_is_not_is_told_with_the_nearest(call: Callable[[], Any], says: str) -> None:
+    with pytest.raises(TypeError) as told:
+        call()
+    assert says in str(told.value)
+    assert inspect.signature(plumbline.fly).parameters["law"].default == "plumbline"
 
 
 WRONG: dict[str, tuple[Any, str]] = {

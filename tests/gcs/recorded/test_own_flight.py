@@ -110,5 +110,11 @@ def test_a_flight_goes_by_its_folder_and_any_other_recording_by_its_file(tmp_pat
 
 
 def test_a_key_is_spoken_with_its_unit() -> None:
-    spoken_keys = ("cable_tension_n", "late_p99_us", "drag_n_s_m", "mode")
-    assert list(map(spoken, spoken_keys)) == ["cable tension (N)", "late p99 (us)", "drag (N s/m)", "mode"]
+    told = {
+        "cable_tension_n": "cable tension (N)",
+        "late_p99_us": "late p99 (us)",
+        "latency_ms": "latency (ms)",
+        "drag_n_s_m": "drag (N s/m)",
+        "mode": "mode",
+    }
+    assert {key: spoken(key) for key in told} == told

@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from autopilot.shell.compiling import Part
 from gcs.batch import pool
 from gcs.cli import gcs
+from gcs.errors import GcsError
 from gcs.sweep import run
 from gcs.sweep.plan import PlanError, SweepPlan
 from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
@@ -274,6 +275,26 @@ def test_wrong_usage_is_one_line_and_exit_code_2(short: str, arguments: list[str
     result = CliRunner().invoke(gcs, ["sweep", short, *arguments], prog_name="gcs")
     assert result.exit_code == 2
     assert says in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_a_cluster_that_does_not_answer_changes_nothing(
+    short: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def silent(address: str) -> Iterator[Any]:
+        raise GcsError(f"--scheduler {address}: no Dask scheduler answers: timed out")
+        yield
+
+    monkeypatch.setattr("gcs.workflows.sweep.dask_cluster", silent)
+    flown = tmp_path / "flown"
+    flown.mkdir()
+    (flown / "plan.json").write_text("{}", encoding="utf-8")
+    for out, fresh in ((tmp_path / "new", []), (flown, ["--fresh"])):
+        words = ["sweep", short, "--scheduler", "tcp://nowhere:1", "--out", str(out), *fresh]
+        result = CliRunner().invoke(gcs, words, prog_name="gcs")
+        assert (result.exit_code, result.stdout) == (1, "")
+        assert "tcp://nowhere:1: no Dask scheduler answers" in result.stderr
+    assert [path.name for path in sorted(tmp_path.rglob("*"))] == ["flown", "plan.json"]
 
 
 def test_a_dask_cluster_flies_the_same(whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path) -> None:

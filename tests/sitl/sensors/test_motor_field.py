@@ -48,6 +48,10 @@ def test_the_magnetometer_feels_it_in_body_axes(core) -> None:
     [imu]
     accel_noise_m_s2 = 0.0
     gyro_noise_rad_s = 0.0
+    [mocap]
+    rate_hz = 100
+    position_noise_m = 0.0
+    attitude_noise_rad = 0.0
     [magnetometer]
     rate_hz = "tick"
     strength_gauss = 0.48

@@ -88,6 +88,11 @@ def test_imu_must_be_there() -> None:
         parse_profile('description = "blind"', "x.toml")
 
 
+def test_something_must_tell_where_the_vehicle_is() -> None:
+    with pytest.raises(ProfileError, match=r"^x\.toml: has neither mocap nor gnss; one of them must tell "):
+        parse_profile(GOOD[: GOOD.index("[mocap]")], "x.toml")
+
+
 def test_choice_names_what_is_allowed() -> None:
     text = GOOD + '[cable_sensor]\nkind = "sonar"\nrate_hz = 30\ndirection_noise_rad = 0\n'
     with pytest.raises(ProfileError, match=r'cable_sensor\.kind = "sonar"; must be "camera" or "encoder"'):
