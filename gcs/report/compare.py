@@ -18,7 +18,7 @@ from gcs.analysis.telemetry import load_telemetry
 from gcs.analysis.tracks import Telemetry
 from gcs.report.html import mood
 from gcs.report.replay import Json, replay_of
-from gcs.report.settings import changed_settings
+from gcs.report.settings import changed_settings, unchanged_settings
 from gcs.report.steps import step_texts
 from gcs.web import PLOT_SCRIPTS, PLOT_STYLES, SCENE_SCRIPTS
 from gcs.web.page import render
@@ -37,7 +37,7 @@ _WAYS = (
 )  # keys of the record that say how it was flown
 _CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
 STAR = "*: the best of the completed flights, and what is within 1 % of it."
-DEFAULT = "default"  # of a parameter that was not changed
+DEFAULT = "default"  # of a parameter that was not changed, where its number is not known
 _AS_GOOD = 0.01  # as a share of the best value: a difference that is none
 _PARTS = 3  # of a label; what differs beyond is in the table
 STEPS = "mission steps"
@@ -70,10 +70,11 @@ class Run:
 
 @dataclass(frozen=True)
 class Difference:
-    """Something that was not the same: a value for each run."""
+    """Something that was not the same: a value for each run, and whether it is what is usual there."""
 
     name: str
     values: tuple[str, ...]
+    usual: tuple[bool, ...]
 
 
 @dataclass(frozen=True)
@@ -97,13 +98,25 @@ def differences(runs: Sequence[Run]) -> list[Difference]:
     parameters that followed from it."""
     rows: dict[str, list[str]] = {name: [_shown(run.record[name]) for run in runs] for name in _WAYS}
     settings = [{s.name: s.value for s in changed_settings(run.telemetry, run.meta)} for run in runs]
-    unnamed = [DEFAULT if run.meta.command or run.telemetry.parameters else UNKNOWN for run in runs]
     asked = {name for run in runs for name in run.meta.settings}
-    for name in sorted(set().union(*settings), key=lambda name: (name not in asked, name)):
-        rows[name] = [found.get(name, other) for found, other in zip(settings, unnamed, strict=True)]
+    names = sorted(set().union(*settings), key=lambda name: (name not in asked, name))
+    others = [_unchanged(run, names) for run in runs]
+    for name in names:
+        rows[name] = [found.get(name, other[name]) for found, other in zip(settings, others, strict=True)]
     rows[STEPS] = _different_steps(runs)
     rows["version"] = [_shown(run.meta.version) for run in runs]
-    return [Difference(name, tuple(values)) for name, values in rows.items() if len(set(values)) > 1]
+    return [
+        Difference(name, tuple(values), tuple(name in names and name not in found for found in settings))
+        for name, values in rows.items()
+        if len(set(values)) > 1
+    ]
+
+
+def _unchanged(run: Run, names: Sequence[str]) -> dict[str, str]:
+    """What those of the parameters that were not changed are as people read it."""
+    if not (run.meta.command or run.telemetry.parameters):
+        return dict.fromkeys(names, UNKNOWN)
+    return {**dict.fromkeys(names, DEFAULT), **unchanged_settings(names, run.telemetry, run.meta)}
 
 
 def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:
@@ -148,7 +161,7 @@ def labels(runs: Sequence[Run]) -> list[str]:
     different = [one for one in known if one.name in asked] or known
     found = []
     for i in range(len(runs)):
-        parts = [part for one in different if (part := _part(one.name, one.values[i]))]
+        parts = [part for one in different if (part := _part(one.name, one.values[i], one.usual[i]))]
         more = f" and {len(parts) - _PARTS} more" if len(parts) > _PARTS else ""
         found.append(", ".join(parts[:_PARTS]) + more)
     told = [label or ("default settings" if different else "") for label in found]
@@ -158,9 +171,9 @@ def labels(runs: Sequence[Run]) -> list[str]:
     ]
 
 
-def _part(name: str, value: str) -> str:
+def _part(name: str, value: str, usual: bool) -> str:
     """A difference in a label; empty where it is what is usual."""
-    if value in (UNKNOWN, DEFAULT):
+    if usual or value == UNKNOWN:
         return ""
     if name in _WAYS and name != "seed":
         return value.rsplit("/", 1)[-1]  # a file goes by its name

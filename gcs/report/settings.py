@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from autopilot.vehicle.file import VehicleFileError
@@ -26,11 +27,22 @@ def changed_settings(telemetry: Telemetry, meta: FlightMeta) -> list[Setting]:
     tables = _tables(meta.vehicle or _USUAL) if told else ()
     found = []
     for name, value in sorted(told.items()):
-        default = next((table.describe(name).default for table in tables if name in table), None)
+        default = _default(name, tables)
         if name not in meta.settings and (default is None or _same(value, default)):
             continue
         found.append(Setting(name, _number(value), None if default is None else _number(default)))
     return found
+
+
+def unchanged_settings(names: Iterable[str], telemetry: Telemetry, meta: FlightMeta) -> dict[str, str]:
+    """What the vehicle said of these parameters, else their defaults, where one is known."""
+    tables = _tables(meta.vehicle or _USUAL)
+    known = {name: telemetry.parameters.get(name, _default(name, tables)) for name in names}
+    return {name: _number(value) for name, value in known.items() if value is not None}
+
+
+def _default(name: str, tables: tuple[ParameterTable, ...]) -> float | None:
+    return next((table.describe(name).default for table in tables if name in table), None)
 
 
 def _tables(vehicle: str) -> tuple[ParameterTable, ...]:

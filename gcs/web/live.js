@@ -196,20 +196,27 @@
     }
   }
 
-  for (const button of document.querySelectorAll("#cameras button")) {
-    button.addEventListener("click", () => {
-      const mode = button.dataset.camera;
-      if (!scene) return;
-      if (mode === "fit") {
-        if (scene.mode === "follow") scene.camera("orbit");
-        scene.fit();
-        pressCamera(scene.mode);
-        return;
-      }
+  function addCamera(name, act) {
+    const button = document.createElement("button");
+    button.textContent = name;
+    button.addEventListener("click", () => { if (scene) act(); });
+    byId("cameras").append(button);
+    return button;
+  }
+
+  for (const [mode, name] of Plumbline.CAMERAS) {
+    const button = addCamera(name, () => {
       scene.camera(mode);
       pressCamera(mode);
     });
+    button.dataset.camera = mode;
+    button.setAttribute("aria-pressed", String(mode === "follow"));
   }
+  addCamera(Plumbline.WHOLE, () => {
+    if (scene.mode === "follow") scene.camera("orbit");
+    scene.fit();
+    pressCamera(scene.mode);
+  });
 
   // ---- frames
 

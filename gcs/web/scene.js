@@ -435,4 +435,7 @@
   }
 
   Plumbline.Scene = Scene;
+  // what the buttons are called, on every page
+  Plumbline.CAMERAS = [["orbit", "Orbit"], ["follow", "Follow"], ["top", "From above"]];
+  Plumbline.WHOLE = "Whole path"; // brings all of it into the picture
 })();

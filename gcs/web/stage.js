@@ -9,7 +9,6 @@
 (function () {
   "use strict";
   const Plumbline = (window.Plumbline = window.Plumbline || {});
-  const CAMERAS = [["orbit", "Orbit"], ["follow", "Follow"], ["top", "From above"]];
 
   class Stage {
     constructor(element, layout) {
@@ -54,7 +53,7 @@
     _cameras(element) {
       const box = element.appendChild(document.createElement("div"));
       box.className = "over cameras";
-      this._modes = new Map(CAMERAS.map(([mode, name]) => {
+      this._modes = new Map(Plumbline.CAMERAS.map(([mode, name]) => {
         const button = box.appendChild(document.createElement("button"));
         button.type = "button";
         button.textContent = name;
@@ -64,7 +63,7 @@
       }));
       const fit = box.appendChild(document.createElement("button"));
       fit.type = "button";
-      fit.textContent = "Whole flight";
+      fit.textContent = Plumbline.WHOLE;
       fit.addEventListener("click", () => {
         if (this.scene.mode === "follow") this.camera("orbit"); // which would go along at once
         this.fit();

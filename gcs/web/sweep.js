@@ -3,6 +3,7 @@
   "use strict";
   const SVG = "http://www.w3.org/2000/svg";
   const MOST_NUMBERS = 144; // cells up to which each has its number written in
+  const NUMBER_PX = 38, CELL_PX = 14, DIGIT_PX = 7; // least widths of a cell with its number, of one without, of a digit
   const KINDS = [
     { key: "completed", name: "flights completed", unit: "%" },
     { key: "median", name: "load error, median", unit: "mm" },
@@ -54,8 +55,11 @@
       `load error median ${number(map.median[at])} mm, worst ${number(map.worst[at])} mm`;
   }
 
+  let picked = null; // the cell whose command is shown: {map, at}
+
   function choose(data, map, i, j) {
     const at = map.names.length > 1 ? i * map.axes[1].length + j : i, shown = map.shown[at];
+    picked = { map, at };
     const box = document.getElementById("chosen");
     box.hidden = !shown;
     if (!shown) return;
@@ -64,13 +68,17 @@
     box.querySelector("code").textContent = commandOf(data.base, map, shown);
   }
 
+  /** Draws the map as wide as its card, or wider where the cells need it. */
   function show(data, map, host, kind) {
     const [xs, ys] = [map.axes[0], map.axes[1] || [0]], flat = map.names.length === 1;
-    const width = 1000, left = flat ? 12 : 74, bottom = 44, top = 8;
-    const w = (width - left - 8) / xs.length, h = flat ? 64 : Math.min(Math.max(440 / ys.length, 12), 56);
+    const left = flat ? 12 : 74, right = 8, bottom = 44, top = 8, frame = host.querySelector(".frame");
+    const numbers = xs.length * ys.length <= MOST_NUMBERS;
+    const width = Math.max(frame.clientWidth, left + right + xs.length * (numbers ? NUMBER_PX : CELL_PX));
+    const w = (width - left - right) / xs.length, h = flat ? 64 : Math.min(Math.max(440 / ys.length, CELL_PX), 56);
+    const height = top + h * ys.length + bottom;
     const svg = document.createElementNS(SVG, "svg");
-    svg.setAttribute("viewBox", `0 0 ${width} ${top + h * ys.length + bottom}`);
-    svg.setAttribute("role", "group");
+    Object.entries({ width, height, viewBox: `0 0 ${width} ${height}`, role: "group" }).forEach(
+      ([name, value]) => svg.setAttribute(name, value));
     svg.setAttribute("aria-label", `${kind.name}, law ${map.law}`);
     const said = host.querySelector(".said");
     xs.forEach((_, i) => ys.forEach((__, j) => {
@@ -90,21 +98,22 @@
       };
       cell.addEventListener("click", pick);
       cell.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); pick(); } });
-      if (xs.length * ys.length > MOST_NUMBERS) return;
+      if (picked && picked.map === map && picked.at === at) cell.classList.add("chosen");
+      if (!numbers) return;
       const dark = rgb && 0.3 * rgb[0] + 0.59 * rgb[1] + 0.11 * rgb[2] >= 128;
       draw("text", { x: x + w / 2, y: y + h / 2 + 4, "text-anchor": "middle", class: rgb ? (dark ? "dark" : "pale") : "" }, svg, number(value));
     }));
-    const stride = Math.max(1, Math.ceil(xs.length / 14)), low = top + h * ys.length;
+    const longest = DIGIT_PX * (Math.max(...xs.map((value) => short(value).length)) + 1);
+    const stride = Math.ceil(longest / w), low = top + h * ys.length;
     xs.forEach((value, i) => i % stride || draw("text", { x: left + (i + 0.5) * w, y: low + 16, "text-anchor": "middle" }, svg, short(value)));
     const title = (axis) => map.names[axis] + (map.units[axis] ? ` (${map.units[axis]})` : "");
-    draw("text", { x: left + (width - left) / 2, y: low + 36, "text-anchor": "middle" }, svg, title(0));
+    draw("text", { x: (left + Math.min(width, frame.clientWidth)) / 2, y: low + 36, "text-anchor": "middle" }, svg, title(0));
     if (!flat) {
       const skip = Math.max(1, Math.ceil(ys.length / 20));
       ys.forEach((value, j) => j % skip || draw("text", { x: left - 6, y: top + (ys.length - 0.5 - j) * h + 4, "text-anchor": "end" }, svg, short(value)));
       draw("text", { x: 14, y: top + h * ys.length / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${top + h * ys.length / 2})` }, svg, title(1));
     }
-    const before = host.querySelector("svg");
-    if (before) before.replaceWith(svg); else host.insertBefore(svg, said);
+    frame.replaceChildren(svg);
   }
 
   function add(data, map) {
@@ -116,13 +125,17 @@
     choice.className = "choice";
     const said = document.createElement("p");
     said.className = "said";
-    host.append(head, choice, said);
+    const frame = document.createElement("div");
+    frame.className = "frame";
+    host.append(head, choice, frame, said);
+    let shown = KINDS[0];
     KINDS.forEach((kind) => {
       const button = document.createElement("button");
       button.type = "button";
       button.textContent = `${kind.name} (${kind.unit})`;
       button.addEventListener("click", () => {
         for (const other of choice.children) other.setAttribute("aria-pressed", String(other === button));
+        shown = kind;
         show(data, map, host, kind);
       });
       choice.append(button);
@@ -131,6 +144,20 @@
     // where every flight completes there is nothing to see but the errors
     const every = map.completed.every((share) => share === null || share === 100);
     (every ? choice.lastChild : choice.firstChild).click();
+    const fade = () => { // the cells would cover a shadow like that of other cards
+      const { scrollLeft: before, scrollWidth, clientWidth } = frame;
+      frame.classList.toggle("before", before > 1);
+      frame.classList.toggle("after", scrollWidth - clientWidth - before > 1);
+    };
+    frame.addEventListener("scroll", fade);
+    fade();
+    let width = frame.clientWidth;
+    new ResizeObserver(() => {
+      if (frame.clientWidth === width) return;
+      width = frame.clientWidth;
+      show(data, map, host, shown);
+      fade();
+    }).observe(frame);
   }
 
   /** Puts a text where it can be pasted from, or marks it so that it can be copied by hand. */

@@ -68,7 +68,20 @@ def called(*arguments: object) -> tuple[int, str, str]:
 
 def test_what_differed_is_told_and_nothing_else(runs: list[Path]) -> None:
     found = {one.name: one.values for one in differences([loaded(run) for run in runs[:2]])}
-    assert found == {"law": ("plumbline", "thesis"), "seed": ("1", "2"), "SIM_WIND_E": ("default", "2")}
+    assert found == {"law": ("plumbline", "thesis"), "seed": ("1", "2"), "SIM_WIND_E": ("0", "2")}
+
+
+def test_what_was_not_changed_is_the_number_that_was_told_or_that_of_the_default(runs: list[Path]) -> None:
+    base = loaded(runs[0])
+    settings = {"SIM_WIND_E": 2.0, "SIM_LOAD_MASS": 0.25, "OWN_GAIN": 3.0}
+    changed = replace(base, meta=replace(base.meta, settings=settings))
+    told = replace(base, telemetry=replace(base.telemetry, parameters={"SIM_WIND_E": 0.0, "OWN_GAIN": 1.5}))
+    found = {one.name: one.values for one in differences([base, changed, told])}
+    assert found["SIM_WIND_E"] == ("0", "2", "0")
+    assert found["SIM_LOAD_MASS"] == ("0.1", "0.25", "0.1")
+    assert found["OWN_GAIN"] == ("default", "3", "1.5")
+    captured = replace(base, meta=replace(base.meta, command=""))
+    assert differences([captured, changed])[0].values == ("–", "3")
 
 
 def test_flights_are_called_by_what_differs(runs: list[Path]) -> None:
@@ -266,6 +279,30 @@ def test_names_and_buttons_do_not_lie_over_each_other(
         "return names.map((one) => one.getBoundingClientRect().height)"
     )
     assert max(heights[1:]) < 1.5 * min(heights[1:]), "a name wraps"
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_tables_of_many_flights_scroll_under_their_first_column(
+    browser: Browser, runs: list[Path], tmp_path: Path, width: int
+) -> None:
+    page = tmp_path / "page.html"
+    assert called(*runs, "--quiet", "--out", page)[0] == 0
+    browser.open(page.as_uri(), width=width)
+    browser.wait("document.documentElement.dataset.ready === '1'")
+    assert browser.run("return document.documentElement.scrollWidth") <= width
+    cards = browser.run(
+        """return [...document.querySelectorAll(".wide")].map((card) => {
+            card.scrollLeft = 10000;
+            const first = card.querySelector("tr:not(.group) > td:first-child");
+            const { left, right } = first.getBoundingClientRect();
+            return [card.scrollLeft, left - card.getBoundingClientRect().left, right - left];
+        })"""
+    )
+    assert len(cards) == 2
+    for scrolled, left, column in cards:
+        assert left <= 1.5, "the first column stays"
+        assert column < 0.5 * width
+        assert width == 390 or not scrolled, "there is place for all"
 
 
 def test_the_command_prints_json_and_makes_the_page(runs: list[Path], tmp_path: Path) -> None:

@@ -211,6 +211,15 @@ def test_nothing_over_the_scene_lies_on_anything_else(page: Browser) -> None:
         assert not over, width
 
 
+def test_no_two_buttons_have_one_name(page: Browser) -> None:
+    names = page.run(
+        "const buttons = [...document.querySelectorAll('.cameras button, .plots-bar button')];"
+        "return buttons.map((one) => one.textContent)"
+    )
+    assert len(names) == 6
+    assert len(set(names)) == 6
+
+
 def test_what_stands_over_the_scene_can_be_read_in_a_narrow_window(page: Browser) -> None:
     page.resize(500, 800)
     sizes = page.run(

@@ -14,7 +14,8 @@ from tests.doubles.browser import Browser
 TEXT = "Reposition denied: load height -3.00 m, least 0.3 m"  # of the length that a STATUSTEXT may have
 
 PAGE = """<!doctype html><meta charset="utf-8"><title>messages</title><style>{style}</style>
-<main><section id="stage"><div id="toast">{text}</div><div id="banner">{text}</div></section></main>"""
+<main><section id="stage"><div id="over"><div id="banner">{text}</div></div><div id="toast">{text}</div>
+</section></main>"""
 
 
 @pytest.mark.parametrize("width", [500, 800, 1000, 1280])
@@ -42,10 +43,12 @@ put("phase", "mission, item 3, cable slack");
 put("about", "law plumbline · sensors lab · vehicle bebop · seed 1 · 4.2 x real time");
 put("wind", "wind 3.0 m/s");
 put("toast", arguments[0]);
+put("banner", `interrupted: ${arguments[0]}`);
 put("hint", "Click: go there · drag: turn · wheel: zoom");
 const legend = document.querySelector(".scene-legend");
 legend.style.display = "block";
-const seen = ["title", "about", "cameras", "wind", "toast", "hint"].map((id) => document.getElementById(id));
+const names = ["title", "about", "cameras", "wind", "banner", "toast", "hint"];
+const seen = names.map((id) => document.getElementById(id));
 return [...seen, legend].filter((one) => getComputedStyle(one).display !== "none").map((one) => {
   const { left, right, top, bottom } = one.getBoundingClientRect();
   return [one.id || one.className, left, right, top, bottom];
@@ -56,12 +59,31 @@ return [...seen, legend].filter((one) => getComputedStyle(one).display !== "none
 def test_nothing_over_the_picture_lies_on_anything_else(browser: Browser) -> None:
     browser.open((Path(gcs.web.__file__).with_name("live.html")).as_uri())
     browser.wait("document.querySelector('.scene-legend') !== null")
-    for width in (360, 500, 800, 1280):
+    for width in (360, 390, 500, 800, 910, 1000, 1160, 1280):
         browser.resize(width, 800)
         boxes = browser.run(SHOWN, TEXT)
+        assert all(box[1] >= 0 and box[2] <= width for box in boxes), (width, boxes)
         over = [
             (one[0], other[0])
             for one, other in combinations(boxes, 2)
             if min(one[2], other[2]) > max(one[1], other[1]) and min(one[4], other[4]) > max(one[3], other[3])
         ]
         assert not over, width
+
+
+@pytest.mark.parametrize("width", [390, 910, 1280])
+def test_a_refusal_of_two_lines_moves_nothing(browser: Browser, width: int) -> None:
+    browser.open((Path(gcs.web.__file__).with_name("live.html")).as_uri(), width, 800)
+    below = """
+        document.getElementById("answer").textContent = arguments[0];
+        return document.getElementById("world").getBoundingClientRect().top"""
+    assert browser.run(below, "") == browser.run(below, f"goto: denied; {TEXT}")
+
+
+def test_the_live_page_calls_its_cameras_as_the_report_does(browser: Browser) -> None:
+    browser.open((Path(gcs.web.__file__).with_name("live.html")).as_uri())
+    names = browser.run(
+        "return [...document.querySelectorAll('#cameras button')].map((one) => one.textContent)"
+    )
+    assert names == browser.run("return [...Plumbline.CAMERAS.map(([, name]) => name), Plumbline.WHOLE]")
+    assert len(set(names)) == 4
