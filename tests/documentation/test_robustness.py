@@ -83,21 +83,21 @@ def delay_noise() -> str:
     ours, thesis = of("delay-noise"), of("delay-noise", "thesis")
     usual = of("delay-noise", "thesis", **{NOISE: 1.0})
     carried = [error([cell]) for cell in thesis if whole(cell) and cell[NOISE] <= 4.0]
-    return f"""The law `thesis` ends {ends(usual, DELAY, "ms")} of delay with the noise of the lab, and most often {lost_most(thesis)}:
-the linear loop of its load position ends at 17.7 ms (20 ms of rotor lag). What limits it is its innermost loop,
-whose gains leave no more phase. Up to there its error is that of its reference filter, {min(carried):.0f} to {max(carried):.0f} mm, and noise adds little.
+    return f"""With the noise of the lab, the limit of the law `thesis` is {ends(usual, DELAY, "ms")} of delay. Most flights are lost {lost_most(thesis)}.
+The linear loop of its load position is stable up to 17.7 ms (20 ms of rotor lag). The limit is its innermost loop, whose
+gains leave no more phase margin. Up to the limit its error is that of its reference filter, {min(carried):.0f} to {max(carried):.0f} mm, and noise adds little.
 
 The law `plumbline` knows delay and lag, predicts over them and lowers its gains as they grow. It flies {home(ours)},
-also where sensors are {max(cell[NOISE] for cell in ours):g} times as bad as those of the lab; there is no linear limit within it. Its error, the median of a cell's
-flights, is noise times delay: {mm(min(error([cell]) for cell in ours))} at best, {mm(error(of("delay-noise", **{DELAY: 72.0, NOISE: 1.0})))} with the lab's sensors and 72 ms, {mm(max(error([cell]) for cell in ours))} in the far corner. What limits
-it is not stability but what noise the rotors are asked to follow.
+also with sensors {max(cell[NOISE] for cell in ours):g} times as noisy as those of the lab; the map contains no linear limit. Its error, the median of a
+cell's flights, grows with noise times delay: {mm(min(error([cell]) for cell in ours))} at best, {mm(error(of("delay-noise", **{DELAY: 72.0, NOISE: 1.0})))} with the lab's sensors and 72 ms, {mm(max(error([cell]) for cell in ours))} in the far corner.
+The limit is not stability but the noise that the rotors are commanded to follow.
 """
 
 
 def latency_noise() -> str:
     ours, thesis = of("latency-noise"), of("latency-noise", "thesis", **{NOISE: 1.0})
-    return f"""The latency is added to every sensor, the inertial unit's included, and told to the autopilot. `thesis`, which predicts
-nothing, ends {ends(thesis, LATENCY, "ms")}; `plumbline` flies {home(ours)} with noise times latency as its error,
+    return f"""The latency is added to every sensor, including the inertial unit, and the autopilot knows it. The limit of `thesis`, which
+predicts nothing, is {ends(thesis, LATENCY, "ms")}. `plumbline` flies {home(ours)}; its error grows with noise times latency,
 {mm(error(of("latency-noise", **{LATENCY: 80.0, NOISE: 1.0})))} at 80 ms with the lab's noise.
 """
 
@@ -106,13 +106,13 @@ def delay_lag() -> str:
     thesis = of("delay-lag", "thesis", **{LAG: 60.0})
     delays = [cell[DELAY] for cell in thesis if cell["completed"]]
     left = (
-        f"completes nothing beyond {max(delays):g} ms of delay"
+        f"completes no flight beyond {max(delays):g} ms of delay"
         if delays
-        else "has no delay left to bear, and completes nothing,"
+        else "tolerates no delay and completes no flight"
     )
     near, far = ([error([cell]) for cell in of("delay-lag", **{DELAY: delay})] for delay in (0.0, 96.0))
-    return f"""Both are told of. `plumbline` flies {home(of("delay-lag"))}. A lag of up to 60 ms costs it little: {min(near):.0f} to {max(near):.0f} mm without
-delay, {min(far):.0f} to {max(far):.0f} mm at 96 ms, by the lag. `thesis` {left} at a lag of 60 ms.
+    return f"""The autopilot knows both. `plumbline` flies {home(of("delay-lag"))}. A lag of up to 60 ms adds little error: depending on the lag,
+{min(near):.0f} to {max(near):.0f} mm without delay and {min(far):.0f} to {max(far):.0f} mm at 96 ms. `thesis` {left} at a lag of 60 ms.
 """
 
 
@@ -130,8 +130,8 @@ def dropouts() -> str:
     ours, last = told("plumbline")
     errors = [error(of("dropouts", **{DROP: share})) for share in (0.0, last)]
     return f"""Every sensor but the inertial unit loses single readings at random (`SIM_DROP_PCT`, 10 seeds each). `plumbline` {ours};
-the median error is {errors[0]:.1f} mm with all readings and {errors[1]:.1f} mm at {last:g} %. What ends it is an estimate that does not settle before
-the lift or after it, not the flight. `thesis` {told("thesis")[0]}.
+the median error is {errors[0]:.1f} mm with all readings and {errors[1]:.1f} mm at {last:g} %. The limit is not the flight itself but
+an estimate that does not settle before the lift or after it. `thesis` {told("thesis")[0]}.
 """
 
 
@@ -140,9 +140,9 @@ def wind_gusts() -> str:
     borne = max(levels(of("wind-gusts"), GUSTS, whole))
     beyond = [cell for cell in of("wind-gusts") if cell[GUSTS] > borne]
     flown, completed = (sum(cell[key] for cell in beyond) for key in ("flown", "completed"))
-    return f"""All complete up to {max(cell[WIND] for cell in of("wind-gusts")):g} m/s of steady wind with gusts of {borne:g} m/s; {calm[0.0]:.0f} mm of error in still air are {calm[5.0]:.0f} at 5 m/s and {calm[10.0]:.0f} at 10 m/s
-without gusts, and {mm(error(of("wind-gusts", **{WIND: 10.0, GUSTS: borne})))} at 10 m/s with gusts of {borne:g} m/s: their push is noticed only as it is felt, and the error grows
-with the wind because drag is quadratic. With more gusts {flown - completed} of {flown} flights are lost, most of them {lost_most(beyond)}.
+    return f"""All flights complete up to {max(cell[WIND] for cell in of("wind-gusts")):g} m/s of steady wind with gusts of {borne:g} m/s; the error of {calm[0.0]:.0f} mm in still air becomes {calm[5.0]:.0f} at 5 m/s and {calm[10.0]:.0f} at 10 m/s
+without gusts, and {mm(error(of("wind-gusts", **{WIND: 10.0, GUSTS: borne})))} at 10 m/s with gusts of {borne:g} m/s: the autopilot detects a gust only by its effect, and the
+error grows with the wind because drag is quadratic. With more gusts {flown - completed} of {flown} flights are lost, most of them {lost_most(beyond)}.
 """
 
 
@@ -154,9 +154,9 @@ def mass_length() -> str:
     heavier = [error([cell]) for cell in masses if cell[MASS] in borne and cell[MASS] > 0.2]
     longest = error(of("mass-length", **{MASS: 0.1, LENGTH: lengths[-1]}))
     beyond = f" and {min(heavier):.0f} to {max(heavier):.0f} mm beyond" if heavier else ""
-    return f"""Case C. The mass is learnt: from {min(borne) / 0.1:g} to {max(borne) / 0.1:g} times the believed 0.1 kg, with {min(to_twice):.0f} to {max(to_twice):.0f} mm up to twice{beyond}.
-The length is not: cables of {lengths[0]:g} to {lengths[-1]:g} m are flown for one that is believed to be 0.7 m (with the believed load),
-with the error growing to {longest:.0f} mm. A shorter one counts as never taut and the vehicle lands; on a longer one a light load
+    return f"""Case C. The autopilot learns the mass: it flies {min(borne) / 0.1:g} to {max(borne) / 0.1:g} times the assumed 0.1 kg, with {min(to_twice):.0f} to {max(to_twice):.0f} mm of error up to twice{beyond}.
+It does not learn the length: with the assumed load, it flies cables of {lengths[0]:g} to {lengths[-1]:g} m where it assumes 0.7 m,
+and the error grows to {longest:.0f} mm. A shorter cable counts as never taut, and the vehicle lands. On a longer one a light load
 cannot be set down ("load position not settled").
 """
 
@@ -169,9 +169,9 @@ def delay_unknown() -> str:
     flown, completed = (sum(cell[key] for cell in below) for key in ("flown", "completed"))
     near = [error([cell]) for cell in below if cell[DELAY] >= 28.0]
     early = max((cell for cell in below if cell[DELAY] < 28.0), key=lambda cell: error([cell]))
-    return f"""Believed to be 40 ms (`delay-unknown`, {found[0]["flown"]} seeds each): {completed} of {flown} flights complete with 0 to {good:g} ms, with {min(near):.0f} to {max(near):.0f} mm from 28 ms on, and
-none from {none:g} ms. With less delay than believed the prediction is too long, and the loop rings: {mm(error([early]))} at {early[DELAY]:g} ms. The law is
-designed for 12 ms that it does not know.
+    return f"""The autopilot assumes 40 ms (`delay-unknown`, {found[0]["flown"]} seeds each): {completed} of {flown} flights complete with a true delay of 0 to {good:g} ms, with {min(near):.0f} to {max(near):.0f} mm from 28 ms on, and
+none from {none:g} ms. With less delay than assumed the prediction is too long, and the loop rings: {mm(error([early]))} at {early[DELAY]:g} ms. The law is
+designed to tolerate 12 ms of unknown delay.
 """
 
 

@@ -19,33 +19,36 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "vehicles.md"
 HEAD = """# Vehicles
 
-A vehicle is one TOML file: multirotor, cable and load. The shipped ones are the files in
+A vehicle is one TOML file that describes multirotor, cable and load. The shipped vehicles are the files in
 `autopilot/vehicle/vehicles`:
 
 {shipped}
 
 `--vehicle NAME|FILE` of `sitl`, `autopilot`, `gcs fly`, `gcs check`, `gcs upload` and `gcs sweep` takes one
-of these names or the path of a file of your own; copy one of them. All of them read it in the same way:
+of these names or the path of a custom file; to write one, copy a shipped file. All programs read the same
+file:
 
 * The simulator flies it. Its `SIM_` parameters change single values of it
   ([parameters.md](parameters.md)).
-* The autopilot believes it: `VEH_`, `BAT_` and `PLB_DRAG` begin with its numbers. It uses neither the drag
-  of load and rotation, nor anything of the ground, nor what air and voltage do to the rotors
-  ([realism-plant.md](realism-plant.md)); the heights at which vehicle and load rest are its `EST_GEAR_H` and
-  `EST_LOAD_H`.
+* The autopilot uses it as its model: `VEH_`, `BAT_` and `PLB_DRAG` start with its numbers. The autopilot
+  ignores the drag of load and rotation, the keys of the ground, and the effects of air and voltage on the
+  rotors ([realism-plant.md](realism-plant.md)). `EST_GEAR_H` and `EST_LOAD_H` give it the heights at which
+  vehicle and load rest.
 * `gcs check` judges missions by it: masses, cable, rotors, and the drag of the vehicle.
-* A table `[parameters]` has parameters of the autopilot with which the vehicle is delivered, as an airframe
-  file of other autopilots. `heavy-real` brings `MIS_ROTOR_MARG` 40 and `MIS_INFEASIBLE` 1: its paths leave
-  room for what nobody knows of it, and are flown slower where they must be. What is set counts before them.
+* A table `[parameters]` contains parameters of the autopilot with which the vehicle is delivered, like an
+  airframe file of other autopilots. `heavy-real` sets `MIS_ROTOR_MARG` 40 and `MIS_INFEASIBLE` 1: its paths
+  leave room for unknown effects, and are flown slower where necessary. Parameters that you set take
+  precedence.
 
-Truth and belief are two values of the same record. Where they are to differ
+The truth and the autopilot's model are two sets of the same values. There are three ways to make them
+differ:
 
-* let one file say so: a file with `believed = "bebop"` is the truth, which the simulator flies, and the
-  autopilot and `gcs check` take it for `bebop`. It has the keys that differ; what it leaves out is as there.
-  `bebop-real` and `heavy-real` are such files.
-* or give settings: `gcs fly hover --set SIM_LOAD_MASS=0.15` makes the load heavier than is believed,
-  `--set VEH_LOAD_MASS=0.15` makes the belief heavier than the load;
-* or give the two programs two files (`sitl --vehicle a.toml`, `autopilot --vehicle b.toml`).
+* One file specifies both. A file with `believed = "bebop"` is the truth, which the simulator flies, while
+  the autopilot and `gcs check` use `bebop`. It contains the keys that differ; omitted keys have the values
+  of `bebop`. `bebop-real` and `heavy-real` are such files.
+* Settings change one of them: `gcs fly hover --set SIM_LOAD_MASS=0.15` makes the load heavier than the
+  autopilot assumes, `--set VEH_LOAD_MASS=0.15` makes the assumed load heavier than the true one.
+* The two programs read two files (`sitl --vehicle a.toml`, `autopilot --vehicle b.toml`).
 
 ```text
 believed = "bebop"                     # a shipped name, or a file beside this one
@@ -59,8 +62,8 @@ MIS_ROTOR_MARG = 30
 
 ## Keys
 
-A key ends in its unit. A number outside its range, an unknown key or a missing one is refused with a line
-that says which, what was found and what is allowed. A key without a default must be there.
+A key ends in its unit. A number outside its range, an unknown key or a missing key is refused with a line
+that names the key, the value found and the allowed values. A key without a default is required.
 
 | key | unit | range | default | meaning |
 |---|---|---|---|---|
@@ -68,9 +71,9 @@ that says which, what was found and what is allowed. A key without a default mus
 ROTORS = """
 ## Rotors
 
-Rotors are counted from the rear, or from the left of the gap at the rear, counterclockwise from above:
-`rotors = 4` is the plus quadrotor of (2-13) with rotor 1 behind, 2 right, 3 ahead and 4 left. Any other
-vehicle lists its rotors, each with its place:
+Rotors are counted counterclockwise from above, starting at the rear, or to the left of the gap at the rear:
+`rotors = 4` is the plus quadrotor of (2-13) with rotor 1 behind, 2 right, 3 ahead and 4 left. For any other
+layout, list the rotors, each with its position:
 
 ```text
 [[rotor]]
@@ -80,30 +83,31 @@ spin = "+"
 thrust_factor = 1.2
 ```
 
-Arms that fold, coaxial pairs and rotors of different size are all right as long as the vehicle can be held
-level with them. The axes are upright. `VEH_ARM_LEN`, `VEH_TORQUE`,
-`VEH_ROTOR_MIN` and `VEH_ROTOR_MAX` scale what the file says of places, torques and limits; where the rotors
-are, no parameter says: `sitl` and `autopilot` read it from their files.
+Folding arms, coaxial pairs and rotors of different size are allowed as long as they can hold the vehicle
+level. The rotor axes are upright. `VEH_ARM_LEN`, `VEH_TORQUE`, `VEH_ROTOR_MIN` and `VEH_ROTOR_MAX` scale
+the positions, torques and limits of the file. No parameter sets the positions of the rotors: `sitl` and
+`autopilot` read them from their files.
 
-**Which rotor may fail.** What n rotors can do together is a polytope of thrust and moments; a vehicle can be
-held as far as the point of its weight without a moment lies inside of it. The distance to the nearest face is
-the moment that is left in every direction (the degree of controllability of Du, Quan and others). For six
-rotors at equal angles, in newtons of one rotor of the shipped `hexarotor`, whose rotors give 24 N:
+**Which rotor may fail.** The thrust and moments that n rotors can produce together form a polytope. The
+vehicle can be held if the point of its weight without a moment lies inside. The distance to the nearest
+face is the moment that remains available in every direction (the degree of controllability of Du, Quan and
+others). For six rotors at equal angles, in newtons of one rotor of the shipped `hexarotor`, whose rotors
+give 24 N:
 
 | signs | all six, level and yaw | one lost, level moments | one lost, yaw as well |
 |---|---|---|---|
 | `+-+-+-`, as most hexarotors have them | 32 | 16 | 0, whichever |
 | `++--+-`, as shipped | 25 | 16 | 11 to 13 for rotors 1 to 4; none for 5 and 6 |
 
-With signs in turn a lost rotor leaves nothing for the yaw: its opposite turns the other way, so that one can
-be used only as much as the other is missed. With `++--+-` four of the six can be lost without that anything
-changes but the room. When rotor 5 or 6 is lost, the heading is given up: the nose points where it points, the
-vehicle turns at about 7 rad/s, and thrust, roll and pitch are flown as before.
+With alternating signs a lost rotor leaves no yaw moment: the opposite rotor turns the other way, so in
+balance both must give the same force, which is now zero. With `++--+-` the loss of any of four rotors only
+reduces the margin. When rotor 5 or 6 is lost, the autopilot gives up the heading: the vehicle turns at
+about 7 rad/s, and thrust, roll and pitch are controlled as before.
 
-The autopilot learns of a lost rotor by its speed, which the speed controllers tell every 20 ms (ESC_STATUS on
-the simulator link): three in turn that show less than 30 % of the force that the rotor has been asked for
-throughout the last 0.15 s. Where the others can fly the vehicle they are mixed anew, and it lands with its
-load. A quadrotor cannot be flown by three.
+The autopilot detects a lost rotor by its speed, which the speed controllers report every 20 ms (ESC_STATUS
+on the simulator link). A rotor counts as lost after three consecutive reports of less than 30 % of the
+force that was requested from it throughout the last 0.15 s. If the other rotors can fly the vehicle, the
+mixer is recomputed for them, and the vehicle lands with its load. Three rotors cannot fly a quadrotor.
 
 ```text
 gcs fly case-b --vehicle hexarotor --set SIM_ENGINE_FAIL=4 --set SIM_ENGINE_AT_S=40   # rotor 3 stops
@@ -113,27 +117,29 @@ gcs fly case-b --vehicle hexarotor --set SIM_ENGINE_FAIL=4 --set SIM_ENGINE_AT_S
 |---|---|---|---|---|
 """
 TAIL = """
-Beyond its range a value must fit the others: `rotor_max_n` is greater than `rotor_min_n`, which is finite
-unless `rotor_max_n` is `inf`; none of the three moments of inertia is greater than the sum of the other
-two. Where `rotor_max_n` is `inf`, the mixer of the autopilot keeps no limits (`VEH_ROTOR_LIM` 0).
+In addition to its range, a value must fit the others: `rotor_max_n` is greater than `rotor_min_n`, which is
+finite unless `rotor_max_n` is `inf`; none of the three moments of inertia is greater than the sum of the
+other two. If `rotor_max_n` is `inf`, the mixer of the autopilot applies no limits (`VEH_ROTOR_LIM` 0).
 
-Drag is -(linear + quadratic |v|) v on the velocity v relative to the air. What the values of the ground
-stand for is in [plant.md](plant.md).
+Drag is -(linear + quadratic |v|) v, where v is the velocity relative to the air. [plant.md](plant.md)
+explains the keys of the ground.
 
-What is wrong is told like this, by every program:
+Every program reports an error in the file in this form:
 
 ```text
 {wrong}
 ```
 """
 WHAT = {
-    "bebop-real": "a Bebop as it may really be, believed to be `bebop`: late rotors that drag, sag and blow "
-    "on the load, the cable a centimetre off ([realism-plant.md](realism-plant.md))",
-    "heavy-real": "the same of `heavy`, whose paths leave room for it",
-    "bebop": "the default: a Parrot Bebop with a load, Table 4-1 of the thesis, assumed where that is silent",
-    "heavy": "2 kg with a load of 0.5 kg on 2 m of cable: no real vehicle, sizes as such vehicles have them",
-    "hexarotor": "5 kg with a load of 1.5 kg on 1 m of cable: no real vehicle either; it lands with its load "
-    "when it has lost any one rotor",
+    "bebop-real": "a realistic Bebop, which the autopilot takes for `bebop`: slower rotors with drag, "
+    "battery sag and downwash on the load, and the cable a centimetre off the centre "
+    "([realism-plant.md](realism-plant.md))",
+    "heavy-real": "the same for `heavy`, with paths that leave room for these effects",
+    "bebop": "the default: a Parrot Bebop with a load, Table 4-1 of the thesis, with assumed values where it "
+    "has none",
+    "heavy": "2 kg with a load of 0.5 kg on 2 m of cable: not a real vehicle, but of typical dimensions",
+    "hexarotor": "5 kg with a load of 1.5 kg on 1 m of cable: not a real vehicle either; it lands with its "
+    "load after the loss of any one rotor",
     "iris": "1.5 kg with a load of 0.3 kg on 1 m of cable, of the size of the 3DR Iris, for "
     "third-party autopilots ([autopilots.md](autopilots.md))",
     "octorotor": "7 kg with a load of 2.5 kg on 1 m of cable, of the same kind",
