@@ -159,7 +159,7 @@ def main(
         )
     if kind.real_time and (lockstep or speed not in {None, 1.0}):
         raise click.UsageError(
-            f"{interface} keeps the wall clock and waits for nobody: leave --lockstep and --speed out"
+            f"{interface} runs on the wall clock and does not wait: leave --lockstep and --speed out"
         )
     real_time = real_time or kind.real_time
     listen = listen or kind.listen

@@ -289,7 +289,7 @@ def told_of(estimate: Estimate, found: int) -> str:
         vector = getattr(state, name)
         if not _is_number(vector):
             return f"gives {name} = {_shown(vector)}"
-    return "gives what is no number"
+    return "returns a value that is not a number"
 
 
 def _shown(value: Any) -> str:

@@ -158,4 +158,4 @@ def _told(asked: Asked) -> str:
         return f"asks for a thrust of {asked.thrust} N"
     if not all(map(isfinite, asked.vector)):
         return f"asks for {asked.vector}"
-    return "asks for an attitude that is no number"
+    return "commands an attitude that is not a number"

@@ -68,7 +68,7 @@ def _problem(m: Any, place: tuple[float, float, float]) -> str:
         return "Setpoint refused: neither position nor velocity nor acceleration is asked for"
     used = ((place, 0), ((m.vx, m.vy, m.vz), 3), ((m.afx, m.afy, m.afz), 6))
     if any(_asks_badly(values, mask, shift) for values, shift in used):
-        return "Setpoint refused: a value that is to be used is no number"
+        return "Setpoint refused: a used value is not a number"
     if math.isinf(_heading(m)) or math.isinf(_turning(m)):
         return "Setpoint refused: yaw is infinite"
     return ""

@@ -176,7 +176,7 @@ class Program:
                 now = time.monotonic()
                 if not silent and now - heard > _SILENCE_S:
                     silent = True
-                    self._say(f"no word from the simulator for {_SILENCE_S:g} s; looking for it")
+                    self._say(f"no message from the simulator for {_SILENCE_S:g} s; looking for it")
                     self.onboard.endpoint.say(
                         mavlink.MAV_SEVERITY_ERROR, "Simulator silent: time stands still"
                     )

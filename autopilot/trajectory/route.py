@@ -120,7 +120,7 @@ def check_path(path: Path, route: Route) -> None:
     if not 1 <= len(table) <= MOST_PIECES:
         raise PlanError(f"the path has {len(table)} pieces; must be 1 ... {MOST_PIECES}")
     if not (np.isfinite(table).all() and np.isfinite(passes).all()):
-        raise PlanError("the path has what is no number")
+        raise PlanError("the path contains a value that is not a number")
     for what, times in (("breaks_s", [*table[:, 0], table[-1, 1]]), ("passes_s", passes)):
         for before, after in pairwise(times):
             if after <= before:

@@ -75,14 +75,14 @@ class Truth:
         if not self._worlds and self._run is not None:
             return (
                 f"nothing comes at {where}: the vehicle's simulator sends its truth to the gcs fly that "
-                "started it, or to another port (name it by --truth PORT), or it stands still"
+                "started it, or to another port (name it by --truth PORT), or it is stopped"
             )
         if not self._worlds:
-            return f"no simulator tells its truth at {where}; {_OTHER}"
+            return f"no simulator sends its truth to {where}; {_OTHER}"
         if self._run is not None:
-            return f"the truth at {where} is refused: it is that of another simulator; {_OTHER}"
+            return f"the truth at {where} is refused: it comes from another simulator; {_OTHER}"
         if self._vouched:
-            return f"{len(self._worlds)} simulators tell their truth at {where}; {_OTHER}"
+            return f"{len(self._worlds)} simulators send their truth to {where}; {_OTHER}"
         if self._silent:
             return (
                 f"the vehicle did not answer which simulator it flies in, so the truth at {where} is not "
@@ -90,5 +90,5 @@ class Truth:
             )
         return (
             f"the vehicle does not say which simulator it flies in, so the truth at {where} is refused; "
-            "if it is the vehicle's, say so by --truth PORT"
+            "if it is the vehicle's, confirm it with --truth PORT"
         )

@@ -143,7 +143,7 @@ def with_interval(value: float, half_width: float) -> tuple[str, str]:
 
 
 def _told(name: str, record: dict[str, Any]) -> str:
-    return "not told by this recording" if name in record["not_told"] else ""
+    return "not determined by this recording" if name in record["not_told"] else ""
 
 
 def _shown(key: str, value: float) -> str:

@@ -48,7 +48,7 @@ def texts_command(as_json: bool, address: Address) -> None:
     elif texts:
         print_table(_lines(texts))
     else:
-        say("the vehicle has said nothing yet, or keeps no texts")
+        say("the vehicle has sent no texts yet, or keeps none")
 
 
 def _lines(texts: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:

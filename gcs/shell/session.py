@@ -23,9 +23,7 @@ FIND_S = 5.0
 TRUTH_S = 2.0  # it says five times a second of its clock whose it is
 REASON_S = 0.3  # a refusal is explained by a STATUSTEXT that may come a little later
 _TICK_S = 0.02
-_STANDS_STILL = (
-    "it or its simulator stands still (SIGSTOP, a debugger), or the link loses messages: try again"
-)
+_STANDS_STILL = "it or its simulator is stopped (SIGSTOP, a debugger), or the link loses messages: try again"
 
 Seen = Callable[[bytes, int], None]  # a datagram of the vehicle and the time
 
@@ -88,7 +86,7 @@ class Session:
         if self._connection.target is None or self.view.armed is None or not signatures.met:
             if signatures.trouble:
                 raise NoVehicleError(
-                    f"no vehicle that can be trusted on UDP {self.address}: {signatures.trouble}"
+                    f"no vehicle with a valid signature on UDP {self.address}: {signatures.trouble}"
                 )
             other = 14540 if self.address.port != 14540 else 14550
             raise NoVehicleError(

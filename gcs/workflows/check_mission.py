@@ -78,7 +78,7 @@ def remarks_on(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
             share, least = round(100.0 * left / whole), round(100.0 * ROOM_FOR_TRUTH)
             yield (
                 f"warning: items[{report.item}] ({report.kind}): {share} % of the rotors' range is left for "
-                f"control, and {vehicle} is not what the autopilot takes it for ({believed}): below "
+                f"control, and {vehicle} differs from what the autopilot assumes ({believed}): below "
                 f"{least} % such a flight may be lost; {MORE_ROOM} plans it slower"
             )
 
@@ -126,7 +126,7 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Plan
         )
     warnings += tuple(flown_alone(mission))
     if planner is not None and not any(isinstance(step, Waypoint) for step in mission.steps):
-        warnings += (f"the planner is never asked: mission {mission.name} has no waypoints",)
+        warnings += (f"the planner is not used: mission {mission.name} has no waypoints",)
     return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)
 
 

@@ -92,7 +92,9 @@ def run_lockstep(
             silent_s = time.monotonic() - heard_s
             if started and silent_s > WORKING_S and works():
                 if not waits:
-                    say("the autopilot is at work, as on paths that are hard to shape: waiting for it")
+                    say(
+                        "waiting for the autopilot, which is computing (for example shaping a difficult path)"
+                    )
                 waits, worked_s = True, time.monotonic()
             if not reason and time.monotonic() - max(heard_s, worked_s) > limit_s:
                 reason = f"the autopilot has sent nothing for {limit_s:.0f} s"

@@ -35,7 +35,7 @@ def reposition(
     load = _load(session)
     begin = load if from_load else _home(session, origin)
     if begin is None:
-        raise GcsError("the vehicle does not tell where its load is")
+        raise GcsError("the vehicle does not report the position of its load")
     east, north, up = add(begin, (offset[0], offset[1], offset[2] or 0.0))
     far = math.hypot(east, north)
     if far > FARTHEST_M:

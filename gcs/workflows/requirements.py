@@ -71,7 +71,7 @@ def _read(text: str, keys: Sequence[str], listed: str) -> Requirement:
         raise InputError(f"--require {text!r}: no figure {key}; {known}")
     value = _value(word)
     if isinstance(value, str) and sign not in ("==", "!="):
-        raise InputError(f"--require {text!r}: {word} is no number; a word is compared by == or !=")
+        raise InputError(f"--require {text!r}: {word} is not a number; a word is compared with == or !=")
     if isinstance(value, float) and math.isnan(value):
         raise InputError(f"--require {text!r}: nothing compares to {word}")
     return Requirement(text.strip(), key, sign, value)

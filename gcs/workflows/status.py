@@ -54,7 +54,7 @@ def vehicle_status(address: Address, truth_at: Address | None = None, quiet: boo
             "listening",
         )
         if session.deaf:
-            say(f"texts, and rate, lateness and missed ticks of the simulator, are not told: {session.deaf}")
+            say(f"texts, and rate, lateness and missed ticks of the simulator are missing: {session.deaf}")
         elif truth.missing:
             say(f"no rate, lateness and missed ticks of the simulator: {truth.missing}")
         texts = [text for text in asked.texts if text.severity <= mavlink.MAV_SEVERITY_WARNING]
@@ -68,7 +68,7 @@ def vehicle_texts(address: Address) -> list[dict[str, Any]]:
         session.find()
         asked = _ask_for_texts(session)
         if session.deaf:
-            raise NoVehicleError(f"its texts could not be asked for: {session.deaf}")
+            raise NoVehicleError(f"its texts could not be requested: {session.deaf}")
         session.watch(lambda: asked.answered, RECALL_S)
         return text_records(asked.texts)
 

@@ -104,7 +104,7 @@ class Exchange:
         news = ""
         if packet.number < self._newest:
             at_s = self._simulator.now_us / 1e6
-            news = f"the firmware began anew at t = {at_s:.3f} s, and so does the world"
+            news = f"the firmware restarted at t = {at_s:.3f} s, and the world restarts"
             self._simulator.begin_anew()
         elif self._newest < 0 < packet.number:
             news = f"the firmware has flown for {packet.number} frames; its world begins anew"

@@ -31,7 +31,7 @@ def run_betaflight(
         if motors is None or not link.serves(sender):
             return
         if before not in {None, sender}:
-            say(f"the firmware began anew at t = {simulator.now_us / 1e6:.3f} s, and so does the world")
+            say(f"the firmware restarted at t = {simulator.now_us / 1e6:.3f} s, and the world restarts")
             simulator.begin_anew()
         link.heard()
         exchange.receive(motors)

@@ -37,7 +37,7 @@ def run_px4(
             if came is None:
                 continue
             firmware, peer = came
-            say(f"serving PX4 at {shown(peer)}{', and the world begins anew' if served else ''}")
+            say(f"serving PX4 at {shown(peer)}{', and the world restarts' if served else ''}")
             link.met()
             if served:
                 simulator.begin_anew()

@@ -150,7 +150,10 @@ BAD = {
             "are of shape (1, 3); must be (2, 3)",
         ),
         (planner("return samples([0, 3], ends, [0, 1, 2, 3])"), "passes_s are 4 times; must be 2"),
-        (planner("return polynomials([0, 3], [[(nan, 0, 0)]], [0, 3])"), "the path has what is no number"),
+        (
+            planner("return polynomials([0, 3], [[(nan, 0, 0)]], [0, 3])"),
+            "the path contains a value that is not a number",
+        ),
         (
             planner("return samples([0, 3], [ends[0], ends[0]], [0, 3])"),
             "the path passes point 1 2.00 m beside it; must be 0.05 m at most (mine.py:7)",

@@ -27,7 +27,7 @@ CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as pl
 def test_a_path_that_leaves_little_to_a_vehicle_that_is_not_as_believed_is_warned_of() -> None:
     (warning,) = remarks_on([CASE_C], "heavy-real")
     assert warning.startswith("warning: items[2] (signals): 16 % of the rotors' range is left for control")
-    assert "heavy-real is not what the autopilot takes it for (heavy)" in warning
+    assert "heavy-real differs from what the autopilot assumes (heavy)" in warning
     assert "--set MIS_ROTOR_MARG=40 --set MIS_INFEASIBLE=1" in warning
     assert Check("case-c", "heavy-real", (), (CASE_C,), (warning,)).lines()[-1] == warning
 

@@ -558,7 +558,7 @@ def test_figures_that_only_the_simulator_knows_are_missed_with_the_option_that_g
     result = run("status", "--json", "--connect", port, "--truth", str(nobody))
     assert json.loads(result.stdout)["rate_hz"] is None
     assert (
-        "no rate, lateness and missed ticks of the simulator: no simulator tells its truth at "
+        "no rate, lateness and missed ticks of the simulator: no simulator sends its truth to "
         f"UDP 127.0.0.1:{nobody}; --truth PORT names the port to which the vehicle's simulator sends it "
         "(sitl --truth HOST:PORT)"
     ) in result.stderr

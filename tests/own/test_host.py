@@ -92,7 +92,7 @@ WRONG: dict[str, tuple[Callable[[Any, Now], Any], str]] = {
     "kind": (lambda memory, now: (memory, UPWARD._replace(kind=7)), "asks for a kind 7 that there is not"),
     "turned": (
         lambda memory, now: (memory, attitude(((nan, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3), 1.0)),
-        "asks for an attitude that is no number",
+        "commands an attitude that is not a number",
     ),
     "rate": (lambda memory, now: (memory, rates(1.0, 3.0)), r"the rate is 3\.0; must be 3 numbers"),  # type: ignore[arg-type]
 }

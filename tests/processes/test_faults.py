@@ -116,7 +116,7 @@ def test_a_simulator_killed_in_flight_begins_anew_with_the_vehicle_on_the_ground
     flight = fly(*QUICK)
     flight.into_the_mission()
     flight.sitl.kill()
-    flight.autopilot.says(b"no word from the simulator")
+    flight.autopilot.says(b"no message from the simulator")
     assert flight.status()["armed"], "time stands still"
     flight.sitl = flight.begin_sitl()
     flight.autopilot.says(b"the simulator has started again: so do I")
@@ -135,7 +135,7 @@ def test_a_program_that_stood_still_goes_on_where_it_was(fly: Callable[..., Flig
     if who == "sitl":
         stopped, other = other, stopped
     stopped.process.send_signal(signal.SIGSTOP)
-    other.says(b"no answer from the autopilot" if who == "autopilot" else b"no word from the simulator")
+    other.says(b"no answer from the autopilot" if who == "autopilot" else b"no message from the simulator")
     stopped.process.send_signal(signal.SIGCONT)
     status = flight.until(lambda status: status["phase"] != "mission")
     assert status["armed"], "it was flown to its landing"
@@ -165,7 +165,7 @@ def test_a_vehicle_whose_simulator_is_silent_refuses_what_is_to_be_flown(
 ) -> None:
     flight = fly(*QUICK)
     flight.sitl.process.send_signal(signal.SIGSTOP)
-    flight.autopilot.says(b"no word from the simulator")
+    flight.autopilot.says(b"no message from the simulator")
     for asked in ("arm", "land", "start"):
         refused = command(asked, "--connect", flight.ground)
         assert refused.exit_code == 1, asked

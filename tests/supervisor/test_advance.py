@@ -326,12 +326,12 @@ HERE = (1.0, 0.0, 2.0)
 NAN3 = (math.nan, 0.0, 0.0)
 TROUBLES: dict[str, tuple[dict[str, Any], str]] = {
     "tilt": ({"tilt_rad": math.radians(121.0)}, "tilt 121 deg exceeds FS_TILT_DEG 120"),
-    "tilt is no number": ({"tilt_rad": math.nan}, "the estimate is no number"),
+    "tilt is no number": ({"tilt_rad": math.nan}, "the estimate is not a number"),
     "nothing to land by": ({"lost": "no reading of the inertial unit"}, "no reading of the inertial unit"),
-    "x_quad is no number": ({"x_quad": NAN3}, "the estimate is no number"),
-    "v_quad is no number": ({"v_quad": NAN3}, "the estimate is no number"),
-    "x_load is no number": ({"x_load": NAN3}, "the estimate is no number"),
-    "v_load is infinite": ({"v_load": (math.inf, 0.0, 0.0)}, "the estimate is no number"),
+    "x_quad is no number": ({"x_quad": NAN3}, "the estimate is not a number"),
+    "v_quad is no number": ({"v_quad": NAN3}, "the estimate is not a number"),
+    "x_load is no number": ({"x_load": NAN3}, "the estimate is not a number"),
+    "v_load is infinite": ({"v_load": (math.inf, 0.0, 0.0)}, "the estimate is not a number"),
 }
 
 

@@ -105,7 +105,7 @@ def jumping(path: Path) -> Path:
 
 WRONG = {
     "times": (lambda p: p._replace(passes_s=(0.0, 2.0, 4.0)), r"passes_s are 3 times; must be 2"),
-    "number": (with_table((0, 5), np.nan), "what is no number"),
+    "number": (with_table((0, 5), np.nan), "is not a number"),
     "begin": (with_table((0, 0), 0.5), r"breaks_s of the path begin at 0\.5 s; must begin at 0"),
     "late": (lambda p: p._replace(passes_s=(0.5, 4.0)), r"passes_s of the path begin at 0\.5 s"),
     "end": (lambda p: p._replace(passes_s=(0.0, 3.0)), "ends at 4 s and passes its last point at 3 s"),

@@ -46,7 +46,7 @@ def offboard(flight: Flight, request: Any, view: View, settings: Settings) -> De
 def position_control(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
     """POSCTL: follow the stick."""
     if not flight.setpoints.manual.alive(view.now_us, settings.setpoints.manual_loss_us):
-        return flight, later("POSCTL denied: no MANUAL_CONTROL is heard")
+        return flight, later("POSCTL denied: no MANUAL_CONTROL received")
     if flight.phase in ON_GROUND:
         return flight, later("POSCTL denied: take off first")
     return begin_guided(flight, Guide.MANUAL, "POSCTL", view, settings)

@@ -50,7 +50,7 @@ def trouble(flight: Flight, view: View, settings: Settings) -> str:
     if view.lost and not (flight.legs and isinstance(flight.legs[0], Steady)):
         return view.lost
     if not all(map(isfinite, (view.tilt_rad, *view.x_quad, *view.v_quad, *view.x_load, *view.v_load))):
-        return "the estimate is no number"
+        return "the estimate is not a number"
     if view.tilt_rad > limits.tilt_limit_rad:
         limit = degrees(limits.tilt_limit_rad)
         return f"tilt {degrees(view.tilt_rad):.0f} deg exceeds FS_TILT_DEG {limit:.0f}"

@@ -15,7 +15,7 @@ def watch_idle(flight: Flight, view: View, settings: Settings) -> Watched:
     mission waits for its paths was asked for something, however long these take."""
     lasted_us = view.now_us - flight.phase_start_us
     if flight.phase == Phase.ARMED and not flight.mission.waiting and lasted_us > IDLE_DISARM_US:
-        return Watched(flight, Event.DISARM, ((INFO, "Disarmed: nothing was asked of the vehicle"),))
+        return Watched(flight, Event.DISARM, ((INFO, "Disarmed: no command received"),))
     if flight.phase == Phase.FAILSAFE and lasted_us > FAILSAFE_DISARM_US:
         return Watched(flight, Event.DISARM, ((WARNING, "Disarmed after failsafe"),))
     return Watched(flight)

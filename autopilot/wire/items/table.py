@@ -58,7 +58,7 @@ _BY_LENGTH = m.WINCH_RELATIVE_LENGTH_CONTROL
 _ATTITUDE_OF = {m.PLUMBLINE_CONTROL_QUAD_ATTITUDE: "vehicle", m.PLUMBLINE_CONTROL_LOAD_ATTITUDE: "load"}
 _UPRIGHT = math.pi / 2.0
 _MS, _US = 1e3, 1e6  # x and y: counts per second
-_CANNOT = "somebody would rely on it, and the vehicle cannot do it in a mission"
+_CANNOT = "the vehicle cannot do it in a mission, and ignoring it would be unsafe"
 
 COMMANDS: tuple[Command, ...] = (
     Command(
@@ -135,7 +135,7 @@ COMMANDS: tuple[Command, ...] = (
     ),
     Command(
         m.MAV_CMD_DO_SET_ROI_LOCATION,
-        "the nose follows the place from the next item on, until something else is asked of it",
+        "the nose follows the place from the next item on, until another command changes it",
         (Place(),),
         aims=nose.look,
     ),

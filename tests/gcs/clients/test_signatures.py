@@ -115,11 +115,11 @@ def test_a_vehicle_that_answers_nothing_for_want_of_its_key_is_asked_once_and_ca
 
     texts = run("texts")
     assert texts[0] == EXIT_ERROR
-    assert texts[1][0].startswith(f"gcs: its texts could not be asked for: {NO_KEY}name the file")
+    assert texts[1][0].startswith(f"gcs: its texts could not be requested: {NO_KEY}name the file")
     code, told = run("status")
     assert code == EXIT_DONE and len(asked) == 5
     (line,) = [line for line in told if "listening" not in line]
-    assert line.startswith("gcs: texts, and rate, lateness and missed ticks of the simulator, are not told: ")
+    assert line.startswith("gcs: texts, and rate, lateness and missed ticks of the simulator are missing: ")
     assert NO_KEY in line
     log = tmp_path / "flight.tlog"
     code, told = run("capture", "--duration", "0.2", "--out", str(log))

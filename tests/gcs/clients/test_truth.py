@@ -33,14 +33,14 @@ def test_a_port_that_was_named_does_not_make_another_world_the_vehicles() -> Non
     truth = Truth(AT, vouched=True)
     truth.of_vehicle(7)
     assert truth.take([(run(8) + status(1), OTHER), (b"\xfd garbage", OTHER)]) == []
-    assert f"the truth at UDP {AT} is refused: it is that of another simulator; --truth PORT" in truth.missing
+    assert f"the truth at UDP {AT} is refused: it comes from another simulator; --truth PORT" in truth.missing
 
 
 def test_a_vehicle_that_does_not_say_has_the_one_world_of_the_port_that_somebody_named() -> None:
     unnamed, named = Truth(AT, vouched=False), Truth(AT, vouched=True)
     for truth in (unnamed, named):
         truth.of_vehicle(None)
-        assert truth.missing.startswith(f"no simulator tells its truth at UDP {AT}; --truth PORT")
+        assert truth.missing.startswith(f"no simulator sends its truth to UDP {AT}; --truth PORT")
     assert unnamed.take([(run(8), OURS)]) == []
     assert unnamed.missing.startswith("the vehicle does not say which simulator it flies in, so the truth at")
     told = run(8)
@@ -54,7 +54,7 @@ def test_a_simulator_that_the_vehicle_has_named_and_that_is_silent_stands_still_
     truth.of_vehicle(7)
     assert truth.missing == (
         f"nothing comes at UDP {AT}: the vehicle's simulator sends its truth to the gcs fly that started it, "
-        "or to another port (name it by --truth PORT), or it stands still"
+        "or to another port (name it by --truth PORT), or it is stopped"
     )
 
 

@@ -238,7 +238,7 @@ def test_an_autopilot_that_works_is_waited_for(new_world, items, tmp_path, monke
         )
         ground.send(GOODBYE)
     assert client.outcome is not None and client.outcome.reason == "it has ended"
-    assert capsys.readouterr().err.count("the autopilot is at work") == 1
+    assert capsys.readouterr().err.count("waiting for the autopilot") == 1
 
 
 def test_lockstep_writes_the_same_bytes_whatever_is_repeated(new_world, items, tmp_path):

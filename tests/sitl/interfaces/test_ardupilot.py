@@ -123,7 +123,7 @@ def test_a_firmware_that_begins_anew_begins_the_world_anew(simulator: HilSimulat
     for n in range(3, 200):
         exchange.receive(read_servo_packet(packet(n, 1900)), 0.0)
     again = exchange.receive(read_servo_packet(packet(0)), 1.0)
-    assert "began anew at t = 0.250 s" in again.news
+    assert "restarted at t = 0.250 s" in again.news
     assert [
         again.answer,
         *(exchange.receive(read_servo_packet(packet(n)), 1.0).answer for n in (1, 2)),

@@ -163,7 +163,7 @@ def test_arducopter_killed_and_started_anew_has_the_world_anew(start: Start) -> 
     other = ArduPilot(port)
     assert [other.frame(n) for n in range(5)] == begun
     sitl.says("serving the autopilot at .*")
-    sitl.says("the firmware began anew at t = 0.006 s, and so does the world")
+    sitl.says("the firmware restarted at t = 0.006 s, and the world restarts")
     assert "answers again" not in sitl.said
 
 
@@ -207,7 +207,7 @@ def test_px4_killed_and_started_anew_has_the_world_anew(start: Start) -> None:
     sitl.says(r"PX4 is gone at t = .*: connection reset by peer; waiting for another")
     other = Px4(port)
     assert other.tick() <= times[1]
-    sitl.says("serving PX4 at .*, and the world begins anew")
+    sitl.says("serving PX4 at .*, and the world restarts")
     other.socket.close()
     sitl.says("PX4 is gone at t = ")
 

@@ -77,7 +77,7 @@ def test_a_firmware_is_served_others_are_not_and_what_begins_anew_is_told(
     said, wrong = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0 and not wrong
     assert "serving the autopilot at" in said and "is not served" in said
-    assert "the firmware began anew at t = 0.005 s, and so does the world" in said
+    assert "the firmware restarted at t = 0.005 s, and the world restarts" in said
     assert "stopped at t = 0.004 s" in said
 
 
