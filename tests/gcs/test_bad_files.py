@@ -286,7 +286,7 @@ def test_what_is_in_a_file_stays_until_another_is_written() -> None:
 REQUIREMENTS = [
     ("load_eror_max_m < 1", "did you mean load_error_max_m or "),
     ("load_error_max_m", "must be KEY SIGN VALUE"),
-    ("outcome < completed", "a word is compared by == or !="),
+    ("outcome < completed", "a word is compared with == or !="),
 ]
 
 

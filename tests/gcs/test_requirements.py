@@ -53,7 +53,7 @@ def test_a_requirement_is_met_or_not(text: str, met: bool) -> None:
         ("", "must be KEY SIGN VALUE"),
         ("load_eror_max_m < 1", "did you mean load_error_max_m? all are listed by gcs fly --json"),
         ("nothing_like_it < 1", "no figure nothing_like_it; there are load_error_max_m, outcome"),
-        ("outcome < completed", "a word is compared by == or !="),
+        ("outcome < completed", "a word is compared with == or !="),
         ("load_error_max_m < nan", "nothing compares to nan"),
     ],
 )
