@@ -21,13 +21,7 @@ from autopilot.control.believed import (
     believed_vehicle,
 )
 from autopilot.control.laws import build_law, chosen_law, is_own
-from autopilot.core.flight_core import (
-    LAID_OUT,
-    LAID_OUT_WAITING,
-    FlightCore,
-    Setup,
-    commanded_rate,
-)
+from autopilot.core.flight_core import LAID_OUT, LAID_OUT_WAITING, FlightCore, Setup, commanded_rate
 from autopilot.core.health import Condition, battery_constants
 from autopilot.core.sensor_inbox import SensorInbox, Tick
 from autopilot.core.warmup import rehearse

@@ -207,7 +207,10 @@ class Runner:
         code = self._code = self._code or self._addresses(known)
         questions = asked[2]
         unsent = b"".join(questions.unsent)
-        if code is None or len(unsent) + STREAMS_ROOM + FRAME_ROOM > _MOST_SAID:
+        too_much = (
+            len(unsent) + STREAMS_ROOM + FRAME_ROOM > _MOST_SAID or len(questions.unsent) > _MOST_WINDOWS
+        )
+        if code is None or too_much:
             return None
         ends = list(accumulate(map(len, questions.unsent[:-1])))
         self._said[: len(unsent)] = np.frombuffer(unsent, np.uint8)
@@ -224,7 +227,8 @@ class Runner:
             *(own.system, own.component, own.sequence, dialect.component, dialect.sequence, len(unsent)),
             *(known.tracks, first_us, known.control_mode, known.since_us, known.phase, seq),
             *(carrying, carries, rotors),
-            *(*asked[:2], questions.until_us, questions.alone_us, questions.most, len(ends), 0),
+            *(*asked[:2], questions.until_us, questions.alone_us, min(questions.most, _MOST_WINDOWS)),
+            *(len(ends), 0),
             *(written.aside.component, written.aside.sequence),
             *((NEVER_US, 1) if log is None else (log.due_us, log.period_us)),
             *(0, *self._records.sensed),

@@ -177,7 +177,6 @@ class GroundInStep:
     def __init__(self, address: Address) -> None:
         self._socket = open_socket(address, "ground station")
         self._address = address
-        self.way = self._socket, address  # by which machine code sends
         self._silent_until_us = 0  # it says nothing before
         self._waits_s = 0.0  # a receive that waits
         self._said: list[bytes] = []  # in this window
@@ -225,6 +224,11 @@ class GroundInStep:
                     if promised_us <= _LONGEST_SILENCE_US:  # else it is a clock of its own
                         self._silent_until_us = onboard.now_us + promised_us
                     return
+
+    @property
+    def way(self) -> tuple[socket.socket, Address]:
+        """By which machine code sends."""
+        return self._socket, self._address
 
     @property
     def questions(self) -> Questions:

@@ -154,14 +154,12 @@ class Program:
         self._greet()
         receive_from_simulator = self._socket.recv
         ground = self._ground
-        ticks = TickLoop(self._socket, *ground.way) if isinstance(ground, GroundInStep) else None
+        alone = (TickLoop(self._socket, *ground.way), ground) if isinstance(ground, GroundInStep) else None
         while True:
             stop.check()
             self._aside.attend(self.onboard)
             self._storing.attend()
-            met = NOTHING
-            if isinstance(ground, GroundInStep) and ticks is not None and not (silent or lost):
-                met = self._run_on(ticks, ground)
+            met = NOTHING if alone is None or silent or lost else self._run_on(*alone)
             if met.ran:
                 heard = time.monotonic()
             if met.more:

@@ -188,10 +188,10 @@ def test_windows_are_sent_some_at_a_time_and_one_by_one_where_the_ground_will_be
     assert len(rig.onboard.said) == 1
 
 
-def test_more_than_there_is_room_for_is_left_to_python(rig: Rig) -> None:
+@pytest.mark.parametrize("unsent", [(bytes(60_000), b""), (b"window",) * 16 + (b"",)])
+def test_more_than_there_is_room_for_is_left_to_python(rig: Rig, unsent: tuple[bytes, ...]) -> None:
     rig.simulator.send(rig.flight[0].sensors)
-    much = ALWAYS._replace(unsent=(bytes(60_000), b""))
-    assert rig.loop.run(rig.onboard, much) == (False, False, None, None)
+    assert rig.loop.run(rig.onboard, ALWAYS._replace(unsent=unsent)) == (False, False, None, None)
 
 
 @pytest.mark.parametrize(

@@ -180,12 +180,18 @@ def test_flights_that_stand_out_are_those_of_the_table(whole: tuple[SweepPlan, P
     assert {"--force", "--overwrite"} <= set(words), "it flies whatever it is, and as often as it is given"
 
 
+def open_page(browser: Browser, whole: tuple[SweepPlan, Path, run.Swept], width: int) -> None:
+    """The page of the sweep, its maps drawn."""
+    plan, directory, _ = whole
+    browser.open(write_report(directory, plan).as_uri(), width, 844)
+    browser.wait("document.documentElement.dataset.ready === '1'")
+
+
 def test_a_click_on_a_cell_gives_the_command_of_its_flight(
     browser: Browser, whole: tuple[SweepPlan, Path, run.Swept]
 ) -> None:
     plan, directory, _ = whole
-    browser.open(write_report(directory, plan).as_uri(), 1280, 900)
-    browser.wait("document.documentElement.dataset.ready === '1'")
+    open_page(browser, whole, 1280)
     assert browser.run("return document.querySelectorAll('rect.cell').length") == 3
     browser.find("rect.cell[data-cell='2']").click()
     assert "SIM_ACT_DELAY_MS 60 ms: 2 flights, 0 % completed" in browser.find(".said").text
@@ -201,9 +207,7 @@ def test_a_click_on_a_cell_gives_the_command_of_its_flight(
 def test_what_is_wider_than_the_window_scrolls_and_no_button_is_out_of_it(
     browser: Browser, whole: tuple[SweepPlan, Path, run.Swept], width: int
 ) -> None:
-    plan, directory, _ = whole
-    browser.open(write_report(directory, plan).as_uri(), width, 844)
-    browser.wait("document.documentElement.dataset.ready === '1'")
+    open_page(browser, whole, width)
     browser.find("rect.cell[data-cell='2']").click()
     assert browser.run("return document.documentElement.scrollWidth") <= width
     out = browser.run(
@@ -223,9 +227,7 @@ def test_what_is_wider_than_the_window_scrolls_and_no_button_is_out_of_it(
 def test_the_map_is_drawn_anew_in_a_window_of_another_width(
     browser: Browser, whole: tuple[SweepPlan, Path, run.Swept]
 ) -> None:
-    plan, directory, _ = whole
-    browser.open(write_report(directory, plan).as_uri(), 1280, 844)
-    browser.wait("document.documentElement.dataset.ready === '1'")
+    open_page(browser, whole, 1280)
     browser.find("rect.cell[data-cell='2']").click()
     browser.resize(390, 844)
     browser.wait("document.querySelector('.map svg').getBoundingClientRect().width < 390")
