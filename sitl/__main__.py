@@ -213,7 +213,7 @@ def main(
         be_punctual(real_time and simulator.tick_us * 1000 / factor > 4 * SPIN_NS)
         mode = "in lockstep" if unlimited else f"at {factor:g} x real time, slower on a busy machine"
         if real_time:
-            mode = f"at {factor:g} x real time, waiting for nobody"
+            mode = f"at {factor:g} x real time, without waiting for answers"
         say(
             f"vehicle {vehicle}, sensors {sensors}, seed {seed}, {1e6 / simulator.tick_us:g} Hz {mode}; "
             f"waiting for {kind.awaited} on {shown(listen)}"

@@ -2,7 +2,7 @@
 "use strict";
 (() => {
   const BUTTONS = [
-    ["start", "Fly the mission", "main"], ["takeoff", "Lift"], ["hold", "Hold"], ["resume", "Go on"],
+    ["start", "Fly the mission", "main"], ["takeoff", "Lift"], ["hold", "Hold"], ["resume", "Continue"],
     ["return", "Return"], ["land", "Land"], ["arm", "Arm"], ["disarm", "Disarm"], ["release", "Release the load", "grave"],
   ];
   // the wind blows towards that side: [row, column, label, north, east]

@@ -30,10 +30,16 @@ def check_options(options: FlightOptions) -> list[str]:
 
 
 def planner_doubts(planner: str, mission: Mission) -> list[str]:
-    """A line if a planner of somebody's own would never be asked in this mission."""
-    if not planner or any(isinstance(step, Waypoint) for step in mission.steps):
-        return []
-    return [f"--planner {planner}: is never asked: mission {mission.name} has no waypoints"]
+    """A line if the mission gives a planner of somebody's own nothing to plan."""
+    unused = without_planning(mission) if planner else ""
+    return [f"--planner {planner}: {unused}"] if unused else []
+
+
+def without_planning(mission: Mission) -> str:
+    """What is to be said of a planner for this mission if it has nothing to plan in it; else empty."""
+    if any(isinstance(step, Waypoint) for step in mission.steps):
+        return ""
+    return f"is not used: mission {mission.name} has no waypoints"
 
 
 def _as_shipped(options: FlightOptions) -> bool:

@@ -43,7 +43,7 @@ def capture_to(
         if session.deaf:
             say(f"only what the vehicle sends by itself is captured, without truth: {session.deaf}")
         elif world.missing:
-            say(f"the log will have no truth of the simulator: {world.missing}")
+            say(f"the log will not contain the simulator's truth: {world.missing}")
         path = out or fresh_folder("capture") / TLOG_FILE
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

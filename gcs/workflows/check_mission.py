@@ -15,10 +15,11 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
 from gcs.mission_items import items_of
+from gcs.workflows.before_flight import without_planning
 from gcs.workflows.checked import note_flyable
 from gcs.workflows.mission_file import load
 from gcs.workflows.vehicle_limits import load_limits
-from missions.model import AttitudeRun, Mission, Release, Signals, Waypoint, Winch
+from missions.model import AttitudeRun, Mission, Release, Signals, Winch
 
 # Share of the rotors' range that a path must leave a vehicle whose truth is not its belief: slower rotors, a
 # battery that sags and a cable off the centre take a part of it, wind another. `heavy-real` loses Case C with
@@ -125,8 +126,8 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Plan
             f"only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
         )
     warnings += tuple(flown_alone(mission))
-    if planner is not None and not any(isinstance(step, Waypoint) for step in mission.steps):
-        warnings += (f"the planner is not used: mission {mission.name} has no waypoints",)
+    if planner is not None and (unused := without_planning(mission)):
+        warnings += (f"the planner {unused}",)
     return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)
 
 

@@ -46,7 +46,7 @@ def fly_running(
             session.find_with_truth(truth)
             client = flight_client(mission, options, vehicle_home(session))
         if truth.missing:
-            say(f"the report will have no truth of the simulator: {truth.missing}")
+            say(f"the report will not contain the simulator's truth: {truth.missing}")
         _fly(client, mission, options, address, truth, log, stop, watch, page)
         return client, truth.missing
 

@@ -77,7 +77,7 @@ def _flown(path: Path, judged: Judged, skip: bool) -> tuple[WireItem, ...]:
     if judged.left_out and not skip:
         count = len(judged.left_out)
         raise GcsError(
-            f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip goes on"
+            f"{path}: {count} {'thing is' if count == 1 else 'things are'} not flown; --skip uploads the rest"
         )
     if not judged.items:
         raise GcsError(f"{path}: nothing that can be flown; gcs clear deletes the mission on the vehicle")

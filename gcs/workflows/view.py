@@ -263,7 +263,7 @@ def _announce(address: str, options: ViewOptions) -> None:
 def tell_if_open(host: str) -> None:
     """Say so if others than this machine can reach the page."""
     if host not in (LOOPBACK, "localhost", "::1"):
-        say("the page is served beyond this machine: whoever knows its whole address commands the vehicle")
+        say("other machines can reach the page: anyone who knows its full address can command the vehicle")
 
 
 def open_browser(address: str) -> bool:

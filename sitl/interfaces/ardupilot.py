@@ -107,7 +107,7 @@ class Exchange:
             news = f"the firmware restarted at t = {at_s:.3f} s, and the world restarts"
             self._simulator.begin_anew()
         elif self._newest < 0 < packet.number:
-            news = f"the firmware has flown for {packet.number} frames; its world begins anew"
+            news = f"the firmware has already flown for {packet.number} frames; the world restarts"
         self._newest, self._answered_s = packet.number, now_s
         self._answer = self._tick(packet.pwm)
         return Reply(self._answer, True, news)

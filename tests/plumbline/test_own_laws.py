@@ -141,7 +141,7 @@ def test_a_method_whose_name_is_near_to_one_that_is_called_is_told() -> None:
 
 
 def test_a_planner_that_is_never_asked_is_told() -> None:
-    with pytest.warns(UserWarning, match=f"^planner {PLANNER}: is never asked: mission short has no way"):
+    with pytest.warns(UserWarning, match=f"^planner {PLANNER}: is not used: mission short has no way"):
         plumbline.fly(SHORT, planner=PLANNER, quiet=True)
     told = "the planner is not used: mission hover has no waypoints\n"
     assert run("check", "hover", "--planner", PLANNER).stdout.endswith(told)

@@ -57,7 +57,7 @@ def test_the_truth_of_another_simulator_is_refused(start: Callable[..., Any], tm
                 flight.process.wait(0.05)
     assert flight.process.returncode == 0, flight.log.read_text()
     refused = f"the truth at UDP 127.0.0.1:{at} is refused: it comes from another simulator; --truth PORT"
-    assert f"the report will have no truth of the simulator: {refused}" in flight.log.read_text()
+    assert f"the report will not contain the simulator's truth: {refused}" in flight.log.read_text()
     record = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (record["outcome"], record["rate_hz"], record["load_error_max_m"]) == ("completed", None, None)
     assert refused in (tmp_path / "out" / "report.html").read_text()

@@ -118,7 +118,7 @@ def test_real_time_over_udp(port: int) -> None:
         *("--truth", f"127.0.0.1:{free_port()}"),
     )
     assert process.stdout is not None
-    assert "at 4 x real time, waiting for nobody" in process.stdout.readline()
+    assert "at 4 x real time, without waiting for answers" in process.stdout.readline()
     pilot = Pilot(port)
     pilot.greet()
     times = []

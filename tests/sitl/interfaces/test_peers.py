@@ -196,7 +196,7 @@ def test_sitl_started_anew_takes_up_a_firmware_that_runs(start: Start) -> None:
     sitl.end()
     sitl = start("ardupilot", port)
     assert one.frame(3) == first
-    sitl.says("the firmware has flown for 3 frames; its world begins anew")
+    sitl.says("the firmware has already flown for 3 frames; the world restarts")
 
 
 def test_px4_killed_and_started_anew_has_the_world_anew(start: Start) -> None:
