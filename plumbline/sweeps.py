@@ -70,10 +70,11 @@ def sweep(
     """
     check_kind(kind)
     with ExitStack() as stack:
+        words = ["--table-only"] if out is None else []
         if out is None:
             out = stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-"))
         folder = file_path("out", out)
-        words = [
+        words += [
             name_or_path("mission", mission),
             "--seeds",
             str(whole("seeds", seeds, 1)),

@@ -11,8 +11,9 @@ from __future__ import annotations
 import ast
 import gc
 import hashlib
+import re
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +21,10 @@ PACKAGES = ("autopilot", "gcs", "missions", "sitl")  # of this project; other li
 ROOT = Path(__file__).resolve().parents[2]
 
 _NO_DATA = (".py", ".pyc", ".html")  # code is found by its imports; pages are templates of reports
+# how an import statement begins; one that begins a line, to its end; one behind another statement
+_BEGIN = rb"(?:from[ \t]+[\w.]+[ \t]+import\b|import[ \t])"
+_IMPORT = re.compile(rb"^[ \t]*(" + _BEGIN + rb"(?:[^\n(\\]|\\\n|\([^)]*\))*)", re.MULTILINE)
+_WITHIN_A_LINE = re.compile(rb"[:;][ \t]*" + _BEGIN)
 
 
 def fingerprint(entries: Iterable[str], root: Path = ROOT) -> str:
@@ -44,10 +49,12 @@ def closure(entries: Iterable[str], root: Path = ROOT) -> set[Path]:
     files: set[Path] = set()
     while ahead:
         module = ahead.pop()
-        path = _source(module, root)
-        if module in seen or path is None:
+        if module in seen:
             continue
         seen.add(module)
+        path = _source(module, root)
+        if path is None:
+            continue
         files.add(path)
         if path.name == "__init__.py":
             files.update(_data(path.parent))
@@ -94,8 +101,10 @@ def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
     """Dotted names that a source in this package imports, and whether it calls `iter_modules`."""
     names: list[str] = []
     with _nothing_collected():  # a tree is of many objects, none of which is garbage
-        tree = ast.parse(source)
-        finds_modules = b"iter_modules" in source and any(map(_calls_iter_modules, ast.walk(tree)))
+        finds_modules = b"iter_modules" in source and any(
+            map(_calls_iter_modules, ast.walk(ast.parse(source)))
+        )
+        tree = _import_statements(source)
     for node in _statements(tree):
         match node:
             case ast.Import():
@@ -107,6 +116,15 @@ def _imported(source: bytes, package: str) -> tuple[tuple[str, ...], bool]:
                     base = ".".join([*above[: len(above) - node.level + 1], *([base] if base else [])])
                 names += [base, *(f"{base}.{alias.name}" for alias in node.names)]
     return tuple(names), finds_modules
+
+
+def _import_statements(source: bytes) -> ast.Module:
+    """A tree with all import statements of a source: parsed alone, which takes a tenth of the time, where
+    each begins a line and what looks like one is one."""
+    if not _WITHIN_A_LINE.search(source):
+        with suppress(SyntaxError):
+            return ast.parse(b"\n".join(_IMPORT.findall(source)))
+    return ast.parse(source)
 
 
 @contextmanager

@@ -50,12 +50,19 @@ class Recallable(Protocol):
 
 
 class OwnProcesses(ProcessPoolExecutor):
-    """Processes of our own. They have fetched groups that cannot be cancelled, and are told by an event."""
+    """Processes of our own. They have fetched groups that cannot be cancelled, and are told by an event.
+
+    They branch off with what is loaded here, while no thread may hold a lock; else each of them loads it
+    anew, which takes seconds.
+    """
 
     def __init__(self, jobs: int) -> None:
-        spawn = get_context("spawn")
-        self._recalled = spawn.Event()
-        super().__init__(jobs, mp_context=spawn, initializer=_begin_worker, initargs=(self._recalled,))
+        branches = sys.platform.startswith("linux") and threading.active_count() == 1
+        context = get_context("fork" if branches else "spawn")
+        self._recalled = context.Event()
+        super().__init__(jobs, mp_context=context, initializer=_begin_worker, initargs=(self._recalled,))
+        if branches:
+            self.submit(_nothing)  # begins all of them at once
 
     def recall(self) -> None:
         self._recalled.set()
@@ -140,6 +147,10 @@ def _killed_is_an_error() -> Iterator[None]:
             "a worker process was killed; completed flights are stored, run the same command again to"
             " continue"
         ) from None
+
+
+def _nothing() -> None:
+    """Work that is none."""
 
 
 def _begin_worker(recalled: Any) -> None:

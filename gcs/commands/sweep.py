@@ -84,6 +84,7 @@ from gcs.shell.display import say, to_results
     help="Fly the notable flights again, each with a report: for each law the worst, the median and "
     "the first lost flight.",
 )
+@click.option("--table-only", is_flag=True, help="Write the table without the page.")
 @fresh_option
 @require_options
 @json_option
@@ -105,6 +106,7 @@ def sweep_command(
     scheduler: str | None,
     out: Path | None,
     reports: bool,
+    table_only: bool,
     fresh: bool,
     required: tuple[str, ...],
     junit: Path | None,
@@ -149,6 +151,7 @@ def sweep_command(
         scheduler=scheduler,
         out=out,
         reports=reports,
+        table_only=table_only,
         fresh=fresh,
         quiet=quiet or as_json,
         command=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
@@ -170,7 +173,7 @@ def sweep_command(
                 click.echo(
                     f"{one['law']}, {one['kind']} (flight {one['index']}, {one['told']}): {one['command']}"
                 )
-            click.echo(f"report: {sweep.page}")
+            click.echo(f"{'table' if table_only else 'report'}: {sweep.result}")
     outcome = COMPLETED if sweep.done.whole else "interrupted"
     met = conclude(run, junit, outcome, sweep.done.wall_s, judge(requirements, sweep.record))
     return sweep.exit_code or (EXIT_DONE if met else EXIT_REQUIRED)

@@ -129,16 +129,16 @@ def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
     reference = Reference((ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO), E1)
     observed = aloft(vehicle)
     kernels, cable = kernels_of(law), Cable(vehicle.cable_length)
-    hover = np.zeros(LOAD_STATES)
+    motion = np.zeros(LOAD_STATES)
+    hover = state_at(motion, vehicle)
 
-    def tick(memory: Any, actuation: Actuation, motion: Floats) -> tuple[Any, Actuation, Floats]:
-        state = state_at(motion, vehicle)
+    def tick(memory: Any, actuation: Actuation, state: State) -> tuple[Any, Actuation, Floats]:
         memory, command = kernels.load_position(law, memory, state, reference, actuation, observed, cable)
         after = advance(actuation, command.thrust, command.moment, setup.actuation)
         return memory, after, np.array([command.thrust, *command.moment])
 
     actuation = steady(hover_thrust(vehicle), rows_of(setup.actuation))
-    memory = kernels.start(law, state_at(hover, vehicle), ZERO, ZERO)
+    memory = kernels.start(law, hover, ZERO, ZERO)
     for _ in range(SETTLE_TICKS):
         memory, actuation, _ = tick(memory, actuation, hover)
     form = (memory, actuation)
@@ -147,10 +147,10 @@ def linearised_law(setup: Setup) -> tuple[Floats, Floats, Floats, Floats]:
 
     def step(at: Floats) -> Floats:
         memory, actuation = _like(form, iter(at[:n].tolist()))
-        after, moved, command = tick(memory, actuation, at[n:])
+        after, moved, command = tick(memory, actuation, state_at(at[n:], vehicle))
         return np.array([*_numbers((after, moved)), *command])
 
-    at = np.concatenate([rest, hover])
+    at = np.concatenate([rest, motion])
     jacobian = np.empty((n + 4, n + LOAD_STATES))
     for j in range(n + LOAD_STATES):
         shift = np.zeros(n + LOAD_STATES)

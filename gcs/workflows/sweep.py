@@ -22,6 +22,7 @@ from gcs.sweep.plan_file import default_directory, default_folder, sweep_origin
 from gcs.sweep.report import write_report
 from gcs.sweep.run import Swept, sweep
 from gcs.sweep.standouts import FOLDER, Standout, command_of, flight_settings, stored_standouts
+from gcs.sweep.store import TABLE_FILE
 from gcs.workflows.before_flight import planner_doubts
 from gcs.workflows.flight_inputs import doubts
 from gcs.workflows.flight_options import FlightOptions, setting_of
@@ -64,6 +65,7 @@ class SweepOptions:
     command: str  # as it was typed
     own: Own = NOTHING_OWN  # estimator and planner that somebody has brought, of all flights
     reports: bool = False  # of the flights that stand out
+    table_only: bool = False  # no page
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class Sweep:
     done: Swept
     planned: int
     directory: Path
-    page: Path
+    result: Path  # the page, else the table
     flights: tuple[dict[str, object], ...]  # those that stand out
 
     @property
@@ -140,11 +142,14 @@ def run_sweep(options: SweepOptions) -> Sweep:
         found = stored_standouts(directory, plan)
         if options.reports and not stop:
             _fly_again(plan, found, directory, options.quiet)
-        if not options.quiet:
-            say("drawing the report")
-        page = write_report(directory, plan)
+        if options.table_only:
+            result = directory / TABLE_FILE
+        else:
+            if not options.quiet:
+                say("drawing the report")
+            result = write_report(directory, plan)
     flights = tuple(_told(plan, one, directory) for one in found)
-    return Sweep(Path(plan.mission).stem, done, plan.flights, directory, page, flights)
+    return Sweep(Path(plan.mission).stem, done, plan.flights, directory, result, flights)
 
 
 @contextmanager

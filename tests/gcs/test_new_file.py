@@ -15,10 +15,10 @@ from autopilot.vehicle.model import Vehicle
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
 from gcs.workflows.new_file import kinds
-from missions.model import Delay, Land, Mission, Takeoff
+from missions.model import Land, Mission, Takeoff, Waypoint
 from sitl.sensors.profile import Profile
 
-SHORT = Mission("short", "Short", "", (), (Takeoff(0.5), Delay(1.0), Land()))
+SHORT = Mission("short", "Short", "", (), (Takeoff(0.5), Waypoint(0.2, 0.0, 0.5), Land()))
 
 
 def run(*words: str) -> Result:

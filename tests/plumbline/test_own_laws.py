@@ -30,12 +30,10 @@ class Fails(LoadPid):
 """
 
 PLANNER = "plumbline.examples.minimum_snap:MinimumSnap"
-SAYS = """
-from multiprocessing import parent_process
-
-if parent_process() is not None:
-    print("said by a worker")
-"""
+TELLS_WHERE = "print('said', 'by a worker' if parent_process() else 'here')"
+SAYS = "from multiprocessing import parent_process" + FAILS.replace(
+    "            return memory, now.no", f"            {TELLS_WHERE}\n            return memory, now.no"
+)
 PRINTS = """
 from plumbline.examples.minimum_snap import MinimumSnap
 
@@ -151,7 +149,7 @@ def test_a_planner_that_is_never_asked_is_told() -> None:
 def test_a_sweep_tells_laws_apart(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """And flies each as `fly` does."""
     path = tmp_path / "mine.py"
-    path.write_text(f"{SAYS}{FAILS}")
+    path.write_text(SAYS)
     laws = (f"{__file__}:Heavier", f"{path}:Fails")
     out = tmp_path / "out"
     rows = plumbline.sweep("hover", laws=laws, jobs=1, out=out, quiet=True, kind="arrow").to_pylist()

@@ -106,6 +106,9 @@ def test_nothing_that_python_really_imports_is_missing(entries: tuple[str, ...])
     assert ours <= closure(entries)
 
 
+NAMED = ("failed", "succeeded", "chosen", "broken_off", "within", "behind")
+
+
 def test_imports_of_every_form_are_followed(tmp_path: Path) -> None:
     for name, text in {
         "gcs/__init__.py": "",
@@ -124,9 +127,12 @@ def test_imports_of_every_form_are_followed(tmp_path: Path) -> None:
             "f = lambda: 1\n"
             "try:\n    from gcs import tried\nexcept ImportError:\n    from gcs import failed\n"
             "else:\n    from gcs import succeeded\nfinally:\n    from gcs import ended\n"
-            "match f():\n    case 1:\n        with f():\n            from gcs import chosen"
+            "match f():\n    case 1:\n        with f():\n            from gcs import chosen\n"
+            '"""\nfrom here import is no statement, and\nimport what you like\n"""'
         ),
-        **{f"gcs/{name}.py": "" for name in ("tried", "failed", "succeeded", "ended", "chosen")},
+        "gcs/ended.py": "from gcs import \\\n    broken_off",
+        "gcs/tried.py": "if True: import gcs.within\npass; from gcs import behind",
+        **{f"gcs/{name}.py": "" for name in NAMED},
         "gcs/h.py": "from missions import *",
         "gcs/lonely.py": "",
         "gcs/many/__init__.py": "import pkgutil\nNAMES = [m.name for m in pkgutil.iter_modules(__path__)]",

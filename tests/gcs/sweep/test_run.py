@@ -259,6 +259,13 @@ def test_command_line_prints_one_object(short: str, tmp_path: Path) -> None:
     assert (tmp_path / "report.html").exists()
 
 
+def test_the_table_alone_is_written_where_that_is_asked_for(short: str, tmp_path: Path) -> None:
+    words = ["sweep", short, "--jobs", "1", "--out", str(tmp_path), "--table-only", "--quiet"]
+    result = CliRunner().invoke(gcs, words, prog_name="gcs")
+    assert (result.exit_code, result.stdout) == (0, f"table: {tmp_path / 'flights.parquet'}\n")
+    assert {path.name for path in tmp_path.iterdir() if path.suffix} == {"flights.parquet", "plan.json"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
