@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 
@@ -10,6 +11,7 @@ def main() -> None:
     """Run the program."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of matrices this small threads only cost time
     gc.disable()  # until everything is loaded (`be_punctual`): what is loaded stays
+    atexit.register(gc.freeze)  # nor is it looked through at the end
     from autopilot.shell.program import main as run
 
     run()
