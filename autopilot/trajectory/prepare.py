@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import cos, dist
 from typing import NamedTuple
 
@@ -214,8 +215,12 @@ class ShapedPath(NamedTuple):
     slowed_for: str = ""
 
 
+@lru_cache(maxsize=16)
 def shaped_path(step: Signals, limits: Limits) -> ShapedPath:
-    """Signals shaped to the vehicle, slowed down where that is wanted and needed."""
+    """Signals shaped to the vehicle, slowed down where that is wanted and needed.
+
+    Hard ones take seconds, and whoever flies a mission in this process has checked it before.
+    """
     found = shape(step, limits.body, limits.bounds)
     trouble = trouble_of(found, limits)
     if trouble and limits.when_infeasible == SLOW_DOWN:

@@ -171,7 +171,11 @@ def test_what_no_time_makes_flyable_is_found_so_by_few_tries(monkeypatch: pytest
         return hopeless
 
     monkeypatch.setattr(preparation, "shape", never)
-    assert shaped_path(hasty, LIMITS._replace(when_infeasible=SLOW_DOWN)) == (hopeless, "no way", "")
+    assert shaped_path.__wrapped__(hasty, LIMITS._replace(when_infeasible=SLOW_DOWN)) == (
+        hopeless,
+        "no way",
+        "",
+    )
     assert len(tried) == 5, "as asked, and four of eight times as long: the half, and the half of the rest"
 
 
