@@ -165,6 +165,21 @@ def real_time(seconds: float, folder: Path) -> tuple[str, str]:
 
 # ---- the tables
 
+
+def machine() -> str:
+    """Processor, its widest vectors, on which the sweeps depend most, and interpreter."""
+    about = dict.fromkeys(("model name", "flags"), "")
+    if Path("/proc/cpuinfo").is_file():
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            name, _, value = line.partition(":")
+            about[name.strip()] = value.strip()
+    widths = {"avx512f": 512, "avx2": 256}
+    width = next((bits for flag, bits in widths.items() if flag in about["flags"].split()), 0)
+    vectors = f", vectors of {width} bits" if width else ""
+    named = about["model name"] or platform.machine()
+    return f"{os.cpu_count()} cores of {named}{vectors}, Python {platform.python_version()}."
+
+
 Rows = list[tuple[str, ...]]
 
 
@@ -292,7 +307,7 @@ def main() -> None:
         if options.real_time:
             label = f"real time at {REAL_TIME_HZ} Hz, {options.real_time:g} s"
             rows.append((label, *real_time(options.real_time, folder)))
-    text = f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}.\n\n"
+    text = f"{machine()}\n\n"
     text += table(("Case B", "measured", "beside it"), rows) + "\n"
     if options.linear:
         text += "\n" + table(("without the wire, sensors of the lab", "us a tick"), linear_rows()) + "\n"

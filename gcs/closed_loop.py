@@ -20,7 +20,8 @@ from autopilot.vehicle.parameters import apply_settings
 from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
-from gcs.clients.lockstep import LockstepTurns, TruthQueue, ground_turn
+from gcs.clients.lockstep import LockstepTurns, ground_turn
+from gcs.closed_ticks import ClosedTicks
 from gcs.mission_items import items_of
 from missions.model import Mission
 from sitl.hil import HilSimulator
@@ -64,11 +65,13 @@ def fly(
     log: FrameLog,
     watch: Watch | None = None,
     client: FlightClient | None = None,
+    shown: Callable[[], None] = lambda: None,
 ) -> Outcome:
     """Fly a mission from take-off to landing; the log gets what `gcs fly --lockstep` writes.
 
-    `watch` is shown the cores at every tick, before the world moves on; False from it ends the flight.
-    `client` is the ground station's side of it, if it is not to be as usual.
+    `watch` is shown the cores at every tick, before the world moves on; False from it ends the flight. Where
+    nobody watches, ticks at which nothing is decided are flown in machine code. `client` is the ground
+    station's side of it, if it is not to be as usual; `shown` is called when it has had its turn.
     """
     home = Home()
     onboard = build_onboard(conditions, home)
@@ -76,23 +79,47 @@ def fly(
     simulator = build_simulator(conditions, home)
     client = client or FlightClient(items_of(mission, home), expected_duration_s(mission))
     capture = Capture(log)
-    turns, truth_queue = LockstepTurns(), TruthQueue()
+    turns = LockstepTurns()
+    ticks = ClosedTicks(onboard, simulator) if watch is None else None
+    told: list[bytes] = []  # truth, and what the vehicle said, of the window that is open
     said: list[bytes] = []
+    silent_until_us = 0  # as the ground station has promised
+
+    def turn(now_us: int) -> None:
+        """The ground station's, at the end of a window; the vehicle hears what it says."""
+        nonlocal silent_until_us
+        for datagram in ground_turn(client, capture, told, said, now_us):
+            onboard.receive_ground(datagram, _GROUND)
+        if now_us >= silent_until_us:  # before, nobody waits for an answer
+            onboard.receive_ground(turns.answer(now_us * 1000, client.silent_until_us), _GROUND)
+            silent_until_us = client.silent_until_us
+        told.clear()
+        said.clear()
+        capture.flush(now_us)
+        shown()
+
     while client.outcome is None:
         truth = simulator.truth_datagram()
         if truth is not None:
-            truth_queue.put([truth])
-        answer = onboard.receive_sensors(simulator.sensor_datagram())
+            told.append(truth)
+        flown = None if ticks is None else ticks.run(b"".join(said), silent_until_us)
+        if flown is not None:
+            for window in (*flown.over, flown.open):
+                told.append(window.truth)
+                said[:] = [window.said]
+                if window.ends_us and client.outcome is None:
+                    turn(window.ends_us)
+            if flown.moved or client.outcome is not None:
+                continue
+        if flown is not None and flown.decide is not None:
+            answer: bytes | None = onboard.complete(flown.decide)
+        else:
+            answer = onboard.receive_sensors(simulator.sensor_datagram())
         said += [datagram for _, datagram in onboard.ground_datagrams()]
         question = onboard.question(_GROUND)
         if question is not None:
-            now_us = onboard.now_us
             said.append(question)
-            sent = ground_turn(client, capture, truth_queue.until(now_us), said, now_us)
-            said.clear()
-            for datagram in (*sent, turns.answer(now_us * 1000)):
-                onboard.receive_ground(datagram, _GROUND)
-            capture.flush(now_us)
+            turn(onboard.now_us)
         if watch is not None and not watch(onboard, simulator):
             client.interrupt("stopped by who watched it")
         if answer is not None:

@@ -54,7 +54,7 @@ LOG_US, LOG_PERIOD_US, LOGGED, SENSED_BEGIN, SENSED_END = range(41, 46)
 NUMBERS = 46
 _MOST_SAID = 8 * STREAMS_ROOM  # bytes of streams without Python
 _MOST_LOGGED = 65_536
-_MOST_WINDOWS = 16
+MOST_WINDOWS = 16  # that can wait to be sent
 # what `Running.limits` are
 DURATION_S, ROTOR_MIN, ROTOR_MAX = range(3)
 
@@ -151,7 +151,7 @@ class Runner:
         self._numbers, self._limits = np.zeros(NUMBERS, np.int64), np.zeros(3)
         self._instant = np.zeros(width(Instant))
         self._said = np.zeros(_MOST_SAID, np.uint8)
-        self._windows = np.zeros(_MOST_WINDOWS, np.int64)
+        self._windows = np.zeros(MOST_WINDOWS, np.int64)
         self._logged = np.zeros(_MOST_LOGGED, np.uint8)
         self._frame, self._payload = np.zeros(FRAME_ROOM, np.uint8), np.zeros(PAYLOAD_ROOM, np.uint8)
         # of no log, as long as there is none
@@ -208,7 +208,7 @@ class Runner:
         questions = asked[2]
         unsent = b"".join(questions.unsent)
         too_much = (
-            len(unsent) + STREAMS_ROOM + FRAME_ROOM > _MOST_SAID or len(questions.unsent) > _MOST_WINDOWS
+            len(unsent) + STREAMS_ROOM + FRAME_ROOM > _MOST_SAID or len(questions.unsent) > MOST_WINDOWS
         )
         if code is None or too_much:
             return None
@@ -227,7 +227,7 @@ class Runner:
             *(own.system, own.component, own.sequence, dialect.component, dialect.sequence, len(unsent)),
             *(known.tracks, first_us, known.control_mode, known.since_us, known.phase, seq),
             *(carrying, carries, rotors),
-            *(*asked[:2], questions.until_us, questions.alone_us, min(questions.most, _MOST_WINDOWS)),
+            *(*asked[:2], questions.until_us, questions.alone_us, min(questions.most, MOST_WINDOWS)),
             *(len(ends), 0),
             *(written.aside.component, written.aside.sequence),
             *((NEVER_US, 1) if log is None else (log.due_us, log.period_us)),

@@ -26,7 +26,7 @@ def warmup_command(law: str, all_laws: bool, sweeps: bool, quiet: bool) -> None:
     A sweep of fewer than a thousand flights with a law flies them eight at once, which is faster, only if
     that has been compiled already: by --sweeps, or by a greater sweep.
     """
-    from gcs.workflows.warmup import all_sweep_parts, flight_parts, warm_up
+    from gcs.workflows.warmup import all_sweep_parts, parts_here, warm_up
 
     laws = LAWS if all_laws else (law,)
-    warm_up([*flight_parts(laws), *(all_sweep_parts(laws) if sweeps else ())], quiet)
+    warm_up([*parts_here(laws), *(all_sweep_parts(laws) if sweeps else ())], quiet)

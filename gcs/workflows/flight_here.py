@@ -14,7 +14,7 @@ from gcs.shell.display import FlightDisplay
 from gcs.workflows.before_flight import check_mission, check_options, planner_doubts
 from gcs.workflows.flight_options import FlightOptions, setting_of
 from gcs.workflows.own_flight import flight_client
-from gcs.workflows.warmup import flight_parts, warm_up
+from gcs.workflows.warmup import parts_here, warm_up
 from missions.model import Mission
 
 
@@ -27,21 +27,20 @@ def fly_here(
     """
     for line in (*check_options(options), *planner_doubts(options.planner, mission)):
         doubt(line)
-    warm_up(flight_parts((options.law,)), options.quiet)
+    warm_up(parts_here((options.law,)), options.quiet)
     check_mission(mission, options)
     settings = {"CTL_LAW": float(law_number(options.law)), **dict(map(setting_of, options.settings))}
     client = flight_client(mission, options, Home())
     with FlightDisplay(mission.name, options.quiet) as display, watched_calls():
 
-        def watch(*_: object) -> bool:
+        def show() -> None:
             if display.due:
                 display.update(client.progress)
-            return True
 
         return fly(
             mission,
             Conditions(options.vehicle, options.sensors, options.seed, settings, options.own),
             log,
-            watch,
-            client,
+            client=client,
+            shown=show,
         )

@@ -25,6 +25,14 @@ _CHECK = Part(
     "check",
     4.0,
 )
+_HERE = Part(
+    "flights in one process",
+    "gcs.workflows.warm_here",
+    (),
+    ROOT / "gcs" / "closed_ticks.py",
+    "here",
+    5.0,
+)
 _REPORT = Part("the report", "gcs.report.warm", (), ROOT / "gcs" / "report" / "style.py", "report", 3.0)
 
 
@@ -32,6 +40,11 @@ def flight_parts(laws: Sequence[str]) -> list[Part]:
     """What `gcs fly` needs for flights with these laws; with none, by a third-party autopilot."""
     own = autopilot_parts(*laws) if laws else ()
     return [*own, SIMULATOR, _CHECK, _REPORT]
+
+
+def parts_here(laws: Sequence[str]) -> list[Part]:
+    """What `plumbline.fly` needs for flights with these laws."""
+    return [*flight_parts(laws), _HERE]
 
 
 def all_sweep_parts(laws: Sequence[str]) -> list[Part]:

@@ -7,12 +7,10 @@ answer to this tick, none comes in time, or a tick is due at which more is to be
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from autopilot.geometry.addresses import ask_kernel_at, bytes_at, call_kernel_at
 from autopilot.geometry.entry import entry_of
 from autopilot.geometry.kernel import kernel, threaded
 from autopilot.shell.machine_sockets import (
@@ -25,37 +23,15 @@ from autopilot.shell.machine_sockets import (
     usable,
 )
 from autopilot.shell.options import LARGEST_DATAGRAM, Address
-from autopilot.vehicle.layout import MOST
-from autopilot.wire.compiled import FRAME_ROOM, Bytes
-from sitl.hil import LEAST_SNAP, HilSimulator
-from sitl.messages import DIALECT_FRAMES, VEHICLE_SYSTEM
-from sitl.plant.rotors import ASKED
-from sitl.running import (
-    ARMED,
-    DIALECT_SEQUENCE,
-    GRIPPER_OPEN,
-    LENGTH,
-    NOW_US,
-    RAN,
-    SEQUENCE,
-    TICK_US,
-    TICKS,
-    TRUTH_EVERY,
-    TRUTH_SEQUENCE,
-    UNTIL_US,
-    Ints,
-    Running,
-    ask_answer,
-    ask_sensors,
-)
+from autopilot.wire.compiled import Bytes
+from sitl.hil import HilSimulator
+from sitl.running import NOW_US, RAN, Ints, Running
 from sitl.shell.link import TRUTH_WINDOW_US, Link
-from sitl.sim_core import SNAP_SPEED
-from sitl.world import rotors_of
+from sitl.ticks import TRUTH_OF_A_TICK, goes_on, move_on, put_sensors_next, put_truth_due
 
 # why `exchange` returns
 SILENCE, HEARD, MOVED = 0, 1, 2
 _TRUTH_ROOM = 65_507  # bytes of the longest datagram; a window has less
-_TRUTH_OF_A_TICK = (1 + DIALECT_FRAMES) * FRAME_ROOM
 # what `Wire.sizes` are
 _ADDRESS, _HEARD, _GATHERED = range(3)
 
@@ -75,16 +51,10 @@ class Wire(NamedTuple):
 
 
 @kernel
-def _tell(wire: Wire, run: Running, now_us: int) -> None:
+def _tell(wire: Wire, run: Running) -> None:
     """Send the sensors of this tick; gather its truth, and at the end of a window send that."""
-    numbers, rows, code = run.numbers, run.rows, run.code
-    if numbers[TICKS] % numbers[TRUTH_EVERY] == 0:
-        begin = wire.sizes[_GATHERED]
-        truth = (rows.world, rows.model, rotors_of(rows), run.statement, wire.gathered[begin:], run.payload)
-        length = ask_kernel_at(code.put_truth, (*truth, numbers[TRUTH_SEQUENCE], numbers[DIALECT_SEQUENCE]))
-        wire.sizes[_GATHERED] = begin + length
-        numbers[TRUTH_SEQUENCE] = (numbers[TRUTH_SEQUENCE] + 1) & 0xFF
-        numbers[DIALECT_SEQUENCE] = (numbers[DIALECT_SEQUENCE] + DIALECT_FRAMES) & 0xFF
+    now_us = run.numbers[NOW_US]
+    wire.sizes[_GATHERED] += put_truth_due(run, wire.gathered[wire.sizes[_GATHERED] :])
     ends_us = wire.window_ends_us[0]
     if not ends_us - TRUTH_WINDOW_US < now_us < ends_us:
         wire.window_ends_us[0] = now_us - now_us % TRUTH_WINDOW_US + TRUTH_WINDOW_US
@@ -97,11 +67,7 @@ def _tell(wire: Wire, run: Running, now_us: int) -> None:
                 SYSTEM_ADDRESS_BYTES,
             )
             wire.sizes[_GATHERED] = 0
-    length, sequence = ask_sensors(
-        code.put_sensors,
-        (rows, now_us, run.newest, run.statement, run.buffer, run.payload, numbers[SEQUENCE]),
-    )
-    numbers[LENGTH], numbers[SEQUENCE] = length, sequence
+    length = put_sensors_next(run)
     send_to_at(wire.fd, run.buffer.ctypes.data, length, wire.peer.ctypes.data, SYSTEM_ADDRESS_BYTES)
 
 
@@ -109,9 +75,6 @@ def _tell(wire: Wire, run: Running, now_us: int) -> None:
 def exchange(wire: Wire, run: Running) -> int:
     """Ticks of the world, each as soon as the one before is answered: SILENCE or HEARD where the present one
     is not, MOVED where the world stands at a tick of which nothing is framed yet."""
-    numbers, rows, code = run.numbers, run.rows, run.code
-    asked, rotors = rows.rotors[ASKED], rows.rotor_table.shape[0]
-    now_us = numbers[NOW_US]
     while True:
         wire.sizes[_ADDRESS] = SYSTEM_ADDRESS_BYTES
         size = receive_from_at(
@@ -123,31 +86,11 @@ def exchange(wire: Wire, run: Running) -> int:
         for i in range(SYSTEM_ADDRESS_BYTES):
             if wire.sender[i] != wire.peer[i]:
                 return HEARD
-        said = ask_answer(
-            code.answer_in, (bytes_at(wire.heard.ctypes.data, size), VEHICLE_SYSTEM, run.payload)
-        )
-        plain, time_us, forces, armed, gripper_open, reel_rate = said
-        total = 0.0
-        for i in range(MOST):
-            total += forces[i]
-        if not plain or time_us != now_us or not isfinite(total):
+        if not move_on(run, wire.heard.ctypes.data, size):
             return HEARD
-        asked[:] = 0.0
-        for i in range(MOST):
-            run.command[i] = forces[i]
-            if armed and i < rotors:
-                asked[i] = forces[i]
-        run.command[MOST] = reel_rate
-        numbers[ARMED], numbers[GRIPPER_OPEN] = armed, gripper_open
-        call_kernel_at(code.world_tick, (rows, asked, gripper_open, reel_rate, run.chain))
-        now_us += numbers[TICK_US]
-        numbers[NOW_US] = now_us
-        numbers[TICKS] += 1
-        numbers[RAN] += 1
-        full = wire.sizes[_GATHERED] > _TRUTH_ROOM - _TRUTH_OF_A_TICK
-        if now_us >= numbers[UNTIL_US] or rows.world[SNAP_SPEED] > LEAST_SNAP or full:
+        if not goes_on(run) or wire.sizes[_GATHERED] > _TRUTH_ROOM - TRUTH_OF_A_TICK:
             return MOVED
-        _tell(wire, run, now_us)
+        _tell(wire, run)
 
 
 class TickLoop:
@@ -170,7 +113,7 @@ class TickLoop:
         if run is None or wire is None:
             return False, link.receive()
         gathered = link.take_gathered()
-        if len(gathered) > _TRUTH_ROOM - _TRUTH_OF_A_TICK:
+        if len(gathered) > _TRUTH_ROOM - TRUTH_OF_A_TICK:
             link.gather(gathered, link.window_ends_us)
             return False, link.receive()
         wire.gathered[: len(gathered)] = np.frombuffer(gathered, np.uint8)

@@ -143,6 +143,7 @@ MAY_IMPORT: dict[str, tuple[str, ...]] = {
     "gcs.workflows.flight_here": (*GCS, "gcs", "autopilot.shell.watched_calls"),
     "gcs.report.settings": (*GCS, "gcs", "sitl.vehicles"),
     "gcs.closed_loop": ("autopilot", "sitl", "missions", "gcs"),
+    "gcs.closed_ticks": ("autopilot", "sitl", "gcs"),
     "gcs.sweep": ("autopilot", "sitl", "missions", "gcs"),
     "gcs.templates": ("plumbline",),  # files of users, which import what scripts import
     "plumbline.estimators": ("autopilot.estimation.desk", RECORDS, "autopilot.own"),
@@ -168,10 +169,17 @@ TOP: dict[str, tuple[str, ...]] = {
         "autopilot.shell",
         "autopilot.__main__",
         "gcs.closed_loop",
+        "gcs.closed_ticks",
         "gcs.sweep",
         "plumbline.learning",
     ),
-    "autopilot.onboard": ("autopilot.shell", "autopilot.__main__", "gcs.closed_loop", "gcs.sweep"),
+    "autopilot.onboard": (
+        "autopilot.shell",
+        "autopilot.__main__",
+        "gcs.closed_loop",
+        "gcs.closed_ticks",
+        "gcs.sweep",
+    ),
     "gcs.closed_loop": ("gcs", "plumbline.learning"),
     **{f"autopilot.control.laws.{law}": ("autopilot.control.laws",) for law in LAWS},
 }

@@ -54,7 +54,7 @@ def commands():
 def nothing_left_to_compile(monkeypatch):
     """What is said of compiling is looked at in test_warmup."""
     monkeypatch.setattr("gcs.workflows.fly.flight_parts", lambda laws: [])
-    monkeypatch.setattr("gcs.workflows.flight_here.flight_parts", lambda laws: [])
+    monkeypatch.setattr("gcs.workflows.flight_here.parts_here", lambda laws: [])
 
 
 def one_line(result, code):

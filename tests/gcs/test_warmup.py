@@ -50,7 +50,7 @@ def test_who_sweeps_can_have_eight_flights_at_once_compiled_beforehand(monkeypat
     assert CliRunner().invoke(gcs, ["warmup", "--law", "lqr", "--sweeps"]).exit_code == 0
     marks = [part.mark for part in asked]
     fly = {part.mark for part in flight_parts(["lqr"])}
-    assert sorted(marks) == sorted({*fly, "alone", "lanes-lqr"})
+    assert sorted(marks) == sorted({*fly, "here", "alone", "lanes-lqr"})
     asked.clear()
     assert CliRunner().invoke(gcs, ["warmup", "--all"]).exit_code == 0
     assert not [part.mark for part in asked if part.mark.startswith(("alone", "lanes"))]

@@ -1,0 +1,21 @@
+"""Compiles what flights in one process fly with beside the rest: python -m gcs.workflows.warm_here."""
+
+from __future__ import annotations
+
+from autopilot.shell.compiling import name_what_is_compiled
+
+
+def main() -> None:
+    """Compile it, or find it compiled; prints the names of the kernels that this compiles."""
+    name_what_is_compiled()
+    # only now: the import itself compiles the first ones
+    from autopilot.wire.convert.geodesy import Home
+    from gcs.closed_loop import Conditions, build_onboard, build_simulator
+    from gcs.closed_ticks import rehearse
+
+    conditions, home = Conditions(), Home()
+    rehearse(build_onboard(conditions, home), build_simulator(conditions, home))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+"""Flights in one process: machine code flies the ticks at which nothing is decided, to the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from gcs import closed_loop
+from gcs.clients.flight import Outcome
+from gcs.closed_loop import Conditions
+from gcs.closed_ticks import ClosedTicks, Flown
+from gcs.workflows.mission_file import load
+from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
+
+ERRAND = Mission(
+    "errand",
+    "Errand",
+    "",
+    (),
+    (Takeoff(1.2), Winch(0.8, None), Waypoint(1.0, 0.5, 1.2, hold_s=0.5), Release(), Land()),
+)
+GUSTS = {"SIM_WIND_E": 3.0, "SIM_GUST_STD": 1.0, "SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 9.0}
+
+
+class Frames:
+    """A log of what is written, with the times."""
+
+    def __init__(self) -> None:
+        self.written: list[tuple[int, bytes]] = []
+
+    def write(self, unix_us: int, *frames: bytes) -> None:
+        self.written += [(unix_us, frame) for frame in frames]
+
+
+def flown(mission: Mission, conditions: Conditions, **how: Any) -> tuple[Outcome, list[tuple[int, bytes]]]:
+    log = Frames()
+    return closed_loop.fly(mission, conditions, log, **how), log.written
+
+
+@pytest.mark.parametrize(
+    ("mission", "conditions"),
+    [
+        (load("hover"), Conditions()),
+        (ERRAND, Conditions(sensors="rtk", seed=2)),
+        (load("hover"), Conditions("heavy-real", "field", 3, GUSTS)),
+        (load("hover"), Conditions(settings={"SIM_CBL_LINKS": 3.0, "SIM_RATE_HZ": 500.0})),
+    ],
+    ids=["hover", "errand", "field", "links"],
+)
+def test_a_flight_is_the_same_without_python_at_each_tick(
+    mission: Mission, conditions: Conditions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    windows = 0
+    run: Callable[..., Flown | None] = ClosedTicks.run
+
+    def counted(ticks: ClosedTicks, said: bytes, silent_until_us: int) -> Flown | None:
+        nonlocal windows
+        found = run(ticks, said, silent_until_us)
+        windows += 0 if found is None else len(found.over)
+        return found
+
+    monkeypatch.setattr(ClosedTicks, "run", counted)
+    outcome, fast = flown(mission, conditions)
+    asked = windows
+    assert flown(mission, conditions, watch=lambda *_: True) == (outcome, fast)
+    assert windows == asked, "with a watch each tick is shown"
+    seconds = (fast[-1][0] - fast[0][0]) * 1e-6
+    assert asked > 0.8 * seconds / 0.02, "of the windows of 20 ms most are flown without Python"
+
+
+def test_the_ground_station_has_its_turn_at_each_window() -> None:
+    turns = 0
+
+    def shown() -> None:
+        nonlocal turns
+        turns += 1
+
+    _, log = flown(load("hover"), Conditions(sensors="ideal"), shown=shown)
+    seconds = (log[-1][0] - log[0][0]) * 1e-6
+    assert turns == pytest.approx(seconds / 0.02, rel=0.01)
