@@ -36,6 +36,7 @@ MISSION = "case-b"
 TICKS_PER_S = 250  # as the simulator has them by default
 SENSORS_BYTES, ANSWER_BYTES = 330, 52  # of a tick with the sensors of the lab, and of its answer
 REAL_TIME_HZ = 500
+_CLOCK = re.compile(r"gcs: +[\d.]+ s  ")  # how a line of `gcs fly` begins that says how far the flight is
 BEGIN, END = "<!-- measured -->", "<!-- end -->"
 
 
@@ -56,8 +57,8 @@ def over_udp(folder: Path) -> tuple[dict[str, float], float, float]:
     began = time.perf_counter()
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     assert child.stderr is not None
-    told = (time.perf_counter() - began for line in child.stderr if "looking for" not in line)
-    heard = next(told, float("nan"))
+    of_vehicle = (line for line in child.stderr if _CLOCK.match(line) and "looking for" not in line)
+    heard = next((time.perf_counter() - began for _ in of_vehicle), float("nan"))
     child.communicate()
     whole = time.perf_counter() - began
     if child.returncode != 0:
