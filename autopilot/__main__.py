@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import gc
 import os
 
@@ -11,7 +10,6 @@ def main() -> None:
     """Run the program."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of matrices this small threads only cost time
     gc.disable()  # until everything is loaded (`be_punctual`): what is loaded stays
-    atexit.register(gc.freeze)  # nor is it looked through at the end
     from autopilot.shell.program import main as run
 
     run()

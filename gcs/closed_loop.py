@@ -21,7 +21,7 @@ from autopilot.wire.convert.geodesy import Home
 from gcs.clients.capture import LOCKSTEP_BOOT_UNIX_US, Capture, FrameLog
 from gcs.clients.flight import FlightClient, Outcome
 from gcs.clients.lockstep import LockstepTurns, ground_turn
-from gcs.closed_ticks import ClosedTicks
+from gcs.closed_ticks import NOTHING, ClosedTicks
 from gcs.mission_items import items_of
 from missions.model import Mission
 from sitl.hil import HilSimulator
@@ -81,8 +81,8 @@ def fly(
     capture = Capture(log)
     turns = LockstepTurns()
     ticks = ClosedTicks(onboard, simulator) if watch is None else None
-    told: list[bytes] = []  # truth, and what the vehicle said, of the window that is open
-    said: list[bytes] = []
+    told: list[bytes] = []  # truth of the window that is open
+    said: list[bytes] = []  # by the vehicle, in it
     silent_until_us = 0  # as the ground station has promised
 
     def turn(now_us: int) -> None:
@@ -102,16 +102,15 @@ def fly(
         truth = simulator.truth_datagram()
         if truth is not None:
             told.append(truth)
-        flown = None if ticks is None else ticks.run(b"".join(said), silent_until_us)
-        if flown is not None:
-            for window in (*flown.over, flown.open):
-                told.append(window.truth)
-                said[:] = [window.said]
-                if window.ends_us and client.outcome is None:
-                    turn(window.ends_us)
-            if flown.moved or client.outcome is not None:
-                continue
-        if flown is not None and flown.decide is not None:
+        flown = NOTHING if ticks is None else ticks.run(b"".join(said), silent_until_us)
+        for window in flown.windows:
+            told.append(window.truth)
+            said[:] = [window.said]
+            if window.ends_us and client.outcome is None:
+                turn(window.ends_us)
+        if flown.moved or client.outcome is not None:
+            continue
+        if flown.decide is not None:
             answer: bytes | None = onboard.complete(flown.decide)
         else:
             answer = onboard.receive_sensors(simulator.sensor_datagram())

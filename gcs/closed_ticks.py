@@ -49,12 +49,14 @@ class Window(NamedTuple):
 
 
 class Flown(NamedTuple):
-    """What has been flown in machine code."""
+    """What has been flown in machine code; the last window is the open one."""
 
-    over: tuple[Window, ...]
-    open: Window
+    windows: tuple[Window, ...] = ()
     moved: bool = False  # the world stands at a tick of which nothing is told yet
     decide: Tick | None = None  # the tick is begun, and to be decided upon
+
+
+NOTHING = Flown()
 
 
 @kernel
@@ -93,39 +95,38 @@ class ClosedTicks:
         )
         self._fly_on: Any = None  # machine code, once it was asked for
 
-    def run(self, said: bytes, silent_until_us: int) -> Flown | None:
-        """Fly from where the truth of the world's tick is told and its sensors are not; None: nothing of it
-        can be flown so. `said`: what the vehicle has said in the window that is open; before
-        `silent_until_us` the ground station says nothing."""
+    def run(self, said: bytes, silent_until_us: int) -> Flown:
+        """Fly what can be flown so from where the truth of the world's tick is told and its sensors are not.
+        `said`: what the vehicle has said in the window that is open; before `silent_until_us` the ground
+        station says nothing."""
         onboard, simulator, between = self._onboard, self._simulator, self._between
         moving = simulator.running()
         if moving is None:
-            return None
+            return NOTHING
         flying = onboard.running(Questions(silent_until_us, silent_until_us, MOST_WINDOWS, (said,)))
         if flying is None:
-            return None
+            return NOTHING
         sensors = simulator.sensor_datagram()
         between.sensors[: len(sensors)] = np.frombuffer(sensors, np.uint8)
         between.sizes[:] = len(sensors), 0
-        if self._fly_on is None:
-            self._fly_on = entry_of(fly_on, between, flying, moving)
-        why = self._fly_on(between, flying, moving)
+        why = self._ready(flying, moving)(between, flying, moving)
         decide = begun(flying) if why == DECIDE else None
         if not onboard.ran():
-            return None if decide is None else Flown((), Window(b"", said), decide=decide)
+            return Flown(decide=decide)
         simulator.ran(framed=why != MOVED)
         *heard, last = onboard.said
-        truth, over, begin = between.truth[: between.sizes[1]].tobytes(), [], 0
+        truth, windows, begin = between.truth[: between.sizes[1]].tobytes(), [], 0
         for said_then, (end, ends_us) in zip(heard, between.ends[: len(heard)].tolist(), strict=True):
-            over.append(Window(truth[begin:end], said_then, ends_us))
+            windows.append(Window(truth[begin:end], said_then, ends_us))
             begin = end
-        return Flown(tuple(over), Window(truth[begin:], last), why == MOVED, decide)
+        return Flown((*windows, Window(truth[begin:], last)), why == MOVED, decide)
 
+    def rehearse(self) -> None:
+        """Have the machine code ready, if it can be used."""
+        moving = self._simulator.running()
+        if moving is not None:
+            self._ready(self._onboard.rehearsed_running(), moving)
 
-def rehearse(onboard: Onboard, simulator: HilSimulator) -> None:
-    """Have the machine code of `fly_on` ready, if it can be used."""
-    moving = simulator.running()
-    if moving is not None:
-        none = np.zeros(1, np.uint8)
-        between = Between(none, none, np.zeros((1, 2), np.int64), np.zeros(2, np.int64))
-        entry_of(fly_on, between, onboard.rehearsed_running(), moving)
+    def _ready(self, flying: Flying, moving: Moving) -> Any:
+        self._fly_on = self._fly_on or entry_of(fly_on, self._between, flying, moving)
+        return self._fly_on

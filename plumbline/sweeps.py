@@ -70,9 +70,10 @@ def sweep(
     """
     check_kind(kind)
     with ExitStack() as stack:
-        words = ["--table-only"] if out is None else []
+        words = []
         if out is None:
             out = stack.enter_context(tempfile.TemporaryDirectory(prefix="plumbline-"))
+            words += ["--table-only"]  # nobody would see the page
         folder = file_path("out", out)
         words += [
             name_or_path("mission", mission),

@@ -67,8 +67,8 @@ from autopilot.onboard.running import (
 from autopilot.services.stream_frames import STREAMS_ROOM
 from autopilot.wire.compiled import FRAME_ROOM, Origin, put_frame
 
-# what becomes of a tick: it is FLOWN, and a window may have ENDED with it; what was HEARD is not the plain
-# next tick; DECIDE: its estimate is made, and the supervisor is to decide upon it
+# what becomes of a tick: it is FLOWN, and a window may have ENDED with it; or Python is to fly it: since what
+# was HEARD is not the plain next tick, or since its estimate is made and the supervisor is to DECIDE upon it
 FLOWN, ENDED, HEARD, DECIDE = range(4)
 
 

@@ -10,6 +10,7 @@ import signal
 import socket
 import struct
 import sys
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -200,6 +201,12 @@ def reason(error: OSError) -> str:
 def shown(address: Address | None) -> str:
     """An address for a person."""
     return f"{address[0]}:{address[1]}" if address else "nowhere"
+
+
+def can_branch_off() -> bool:
+    """Whether another process can begin with what is loaded here: no thread holds a lock that it would take
+    along."""
+    return sys.platform.startswith("linux") and threading.active_count() == 1
 
 
 def be_punctual(real_time: bool) -> None:

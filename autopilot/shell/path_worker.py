@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gc
 import signal
-import sys
-import threading
 import time
 from contextlib import suppress
 from multiprocessing import get_context
@@ -14,6 +12,7 @@ from multiprocessing.context import ForkContext, SpawnContext
 from multiprocessing.process import BaseProcess
 
 from autopilot.onboard.onboard import Gains, Onboard, Rehearsal, Work
+from autopilot.shell.options import can_branch_off
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.supervisor.state import ON_GROUND
 
@@ -38,7 +37,7 @@ class Aside:
 
         Where that cannot be, `start` begins one that loads all of it itself: a second of processor time.
         """
-        if sys.platform.startswith("linux") and threading.active_count() == 1:
+        if can_branch_off():
             self._begin(get_context("fork"))
 
     def start(self, rehearsal: Rehearsal) -> None:

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
+from autopilot.shell.options import can_branch_off
 from gcs.batch.runner import Running
 from gcs.errors import GcsError, from_clone
 
@@ -57,7 +58,7 @@ class OwnProcesses(ProcessPoolExecutor):
     """
 
     def __init__(self, jobs: int) -> None:
-        branches = sys.platform.startswith("linux") and threading.active_count() == 1
+        branches = can_branch_off()
         context = get_context("fork" if branches else "spawn")
         self._recalled = context.Event()
         super().__init__(jobs, mp_context=context, initializer=_begin_worker, initargs=(self._recalled,))

@@ -11,10 +11,10 @@ def main() -> None:
     # only now: the import itself compiles the first ones
     from autopilot.wire.convert.geodesy import Home
     from gcs.closed_loop import Conditions, build_onboard, build_simulator
-    from gcs.closed_ticks import rehearse
+    from gcs.closed_ticks import ClosedTicks
 
     conditions, home = Conditions(), Home()
-    rehearse(build_onboard(conditions, home), build_simulator(conditions, home))
+    ClosedTicks(build_onboard(conditions, home), build_simulator(conditions, home)).rehearse()
 
 
 if __name__ == "__main__":
