@@ -58,7 +58,8 @@ from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
 from sitl.world import rotors_of
 
-STATUS_PERIOD_US = 200_000
+STATUS_PERIOD_US = 200_000  # in real time; in lockstep nobody waits for a status
+BATTERY_PERIOD_US = 200_000
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
 COMMAND_TIMEOUT_US = 500_000
 LEAST_SNAP = 1e-3  # m/s, closing speed from which a cable that comes taut is told of
@@ -73,6 +74,11 @@ def _asks_reboot(message: Any) -> bool:
     if message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
         return False
     return bool(message.command == mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN and message.param1 == 1.0)
+
+
+def _next_multiple(period_us: int, now_us: int) -> int:
+    """The first after now."""
+    return now_us - now_us % period_us + period_us
 
 
 class PacingFigures(NamedTuple):
@@ -112,6 +118,7 @@ class HilSimulator:
         self.parameters = ParameterServer(table)
         self._home = home
         self._lockstep = lockstep
+        self._status_us = SECOND_US if lockstep else STATUS_PERIOD_US
         self._truth_every = truth_every
         self._boot_id = boot_id
         # machine code, once it was asked for
@@ -154,7 +161,7 @@ class HilSimulator:
         self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
         self._truth_made = False
-        self._gust_told = ZERO
+        self._wind_told = settings.wind, ZERO  # mean and gust pulse
         self._reboot = False  # asked for
         self._snap_mass()  # compiled before the first tick, not at the first snap
 
@@ -213,7 +220,7 @@ class HilSimulator:
 
     def run_datagram(self) -> bytes | None:
         """Whose truth it is: SIM_BOOT, as the autopilot hears it; None on the ticks that do not tell."""
-        due = self.core.now_us % STATUS_PERIOD_US == 0
+        due = self.core.now_us % self._status_us == 0
         return self._run_writer.frame(self._boot()) if due else None
 
     def greets(self, datagram: bytes) -> bool:
@@ -358,7 +365,9 @@ class HilSimulator:
         now_us, tick_us = core.now_us, core.settings.tick_us
         if not self._lockstep or self._reboot or self._introduced or self.answered or self.parameters.speaks:
             return None
-        until_us = min(now_us - now_us % STATUS_PERIOD_US + STATUS_PERIOD_US, core.pulse_changes_us)
+        until_us = min(_next_multiple(self._status_us, now_us), core.pulse_changes_us)
+        if core.truth.drive.battery > 0.0:
+            until_us = min(until_us, _next_multiple(BATTERY_PERIOD_US, now_us))
         if until_us <= now_us + tick_us:
             return None
         times = (now_us, core.tick_count, tick_us, until_us, self._truth_every)
@@ -390,7 +399,7 @@ class HilSimulator:
         if self._introduced or core.now_us % SECOND_US == 0:
             self._introduced = False
             aside.append(self._boot())
-        if core.truth.drive.battery > 0.0 and core.now_us % STATUS_PERIOD_US == 0:
+        if core.truth.drive.battery > 0.0 and core.now_us % BATTERY_PERIOD_US == 0:
             aside.append(self._battery())
         if not self._lockstep and core.now_us % SECOND_US == 0:  # how punctual the answers are
             aside.append(self._status())
@@ -406,8 +415,8 @@ class HilSimulator:
     def _truth_frames(self) -> bytes | None:
         core = self.core
         due = core.tick_count % self._truth_every == 0
-        status_due = core.now_us % STATUS_PERIOD_US == 0
-        wind_due = status_due or core.pulse != self._gust_told
+        status_due = core.now_us % self._status_us == 0
+        wind_due = status_due or (core.settings.wind, core.pulse) != self._wind_told
         snapped = core.snap_speed > LEAST_SNAP
         if not (due or wind_due or snapped):
             return None
@@ -432,8 +441,8 @@ class HilSimulator:
         core, now_us = self.core, self.core.now_us
         messages: list[Any] = []
         if wind_due:
-            self._gust_told = core.pulse
-            messages.append(wind_state_message(now_us, core.settings.wind, core.pulse))
+            self._wind_told = core.settings.wind, core.pulse
+            messages.append(wind_state_message(now_us, *self._wind_told))
         if snapped:
             speed = core.snap_speed
             messages.append(mavlink.MAVLink_cable_snap_message(now_us, speed, self._snap_mass() * speed))

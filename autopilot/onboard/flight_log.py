@@ -22,7 +22,7 @@ from autopilot.wire.parameter_table import ParameterTable
 from autopilot.wire.ulog import UlogWriter
 
 TAIL_US = 1_000_000  # so long the log goes on behind the disarming
-SLOW_US = 500_000  # between two records of the slow topics
+SLOW_US = 1_000_000  # between two records of the slow topics
 MOST_WAITING = 4 * 2**20  # bytes that the shell has not taken; beyond them records are dropped
 TEXTS_BEFORE = 20  # said before arming, the log begins with them
 _FLOAT32_MAX = 3.4028234663852886e38

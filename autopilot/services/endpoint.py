@@ -520,7 +520,8 @@ class VehicleEndpoint:
                         self._announce(link, key)
                 case _:
                     events.append(output)
-        self._work = self._work or bool(outputs)
+                    continue
+            self._work = True
 
     # ---- links
 
