@@ -286,8 +286,9 @@ class FlightCore:
 
     @property
     def runs(self) -> bool:
-        """Whether the next tick needs nothing of Python unless the supervisor is to decide."""
-        return self._host is None and self._seat is None and not self._dirty and not self.reels
+        """Whether machine code can fly the next tick, but for what the supervisor is to decide; a law that
+        somebody has brought is called by it."""
+        return self._seat is None and not self._dirty and not self.reels
 
     def address_of_tick(self) -> int:
         """The address of `fly_tick`, compiled or loaded where need be; 0 where nothing is compiled."""

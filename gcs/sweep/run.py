@@ -20,7 +20,6 @@ from gcs.sweep.results import COMPLETED
 from gcs.sweep.store import Row, Store
 from gcs.sweep.work import batches, fly_cases, prepare
 
-BATCH = 16  # flights handed over at a time: about two seconds
 _KEEP_S = 5.0  # a flight is on disk so long after its end, at the latest
 
 
@@ -86,7 +85,7 @@ def _fly_missing(
                 display.add(len(rows), sum(row["outcome"] == COMPLETED for row in rows), running)
 
             crew = PoolCrew(executor, count, partial(fly_cases, work))
-            whole = fly_all(batches(missing, BATCH), crew, store.add, told, stopped, _KEEP_S)
+            whole = fly_all(batches(plan, missing, count), crew, store.add, told, stopped, _KEEP_S)
             flown, wall_s = display.flown, display.elapsed_s
     table = store.merge()
     outcomes = table.column("outcome").to_pylist()

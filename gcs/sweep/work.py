@@ -23,6 +23,7 @@ from missions.model import Mission
 
 Clock = Callable[[], float]  # seconds
 LANES_PAY = 1000  # flights with a law, for which its lanes are compiled
+_MOST_AT_A_TIME = 2 * LANES
 
 _NOT_FLOWN = (ValueError, ArithmeticError)
 
@@ -122,13 +123,22 @@ def _fly_at_once(work: Work, cases: Sequence[Case], clock: Clock) -> list[Row] |
     ]
 
 
-def batches(cases: Sequence[Case], size: int) -> list[tuple[Case, ...]]:
-    """The cases in groups of up to `size`, each of one law, so that a worker need not change its kernels."""
+def batches(plan: SweepPlan, cases: Sequence[Case], workers: int) -> list[tuple[Case, ...]]:
+    """The cases in groups to be handed to so many workers, each of one law, so that a worker need not change
+    its kernels."""
+    size = batch_size(len(cases), workers)
     groups: list[tuple[Case, ...]] = []
-    group: list[Case] = []
-    for case in cases:
-        if group and (len(group) == size or group[0].law != case.law):
-            groups.append(tuple(group))
-            group = []
-        group.append(case)
-    return [*groups, tuple(group)] if group else groups
+    for law, members in groupby(cases, key=lambda case: case.law):
+        most = 1 if any(plan.own(law)) else size  # in Python a flight takes seconds
+        of_law = list(members)
+        groups += [tuple(of_law[first : first + most]) for first in range(0, len(of_law), most)]
+    return groups
+
+
+def batch_size(flights: int, workers: int) -> int:
+    """How many flights a worker is given at a time: what is left is divided among all of them, and where
+    there is plenty, a group takes a second or two."""
+    share = max(1, -(-flights // workers))
+    if share <= LANES:
+        return share
+    return _MOST_AT_A_TIME if share >= 4 * _MOST_AT_A_TIME else LANES

@@ -7,12 +7,15 @@ from typing import Any
 
 import pytest
 
+from autopilot.control.law_desk import Now
+from autopilot.own.chosen import Own
 from gcs import closed_loop
 from gcs.clients.flight import Outcome
 from gcs.closed_loop import Conditions
 from gcs.closed_ticks import ClosedTicks, Flown
 from gcs.workflows.mission_file import load
 from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
+from plumbline.examples.load_pid import LoadPid
 
 ERRAND = Mission(
     "errand",
@@ -22,6 +25,15 @@ ERRAND = Mission(
     (Takeoff(1.2), Winch(0.8, None), Waypoint(1.0, 0.5, 1.2, hold_s=0.5), Release(), Land()),
 )
 GUSTS = {"SIM_WIND_E": 3.0, "SIM_GUST_STD": 1.0, "SIM_GUST_E": 2.0, "SIM_GUST_AT_S": 9.0}
+
+
+class Fails(LoadPid):
+    """A law that gives up in flight."""
+
+    def load_position(self, memory: Any, now: Now) -> Any:
+        if now.time_s > 3.0:
+            raise ValueError("enough")
+        return super().load_position(memory, now)
 
 
 class Frames:
@@ -46,8 +58,10 @@ def flown(mission: Mission, conditions: Conditions, **how: Any) -> tuple[Outcome
         (ERRAND, Conditions(sensors="rtk", seed=2)),
         (load("hover"), Conditions("heavy-real", "field", 3, GUSTS)),
         (load("hover"), Conditions(settings={"SIM_CBL_LINKS": 3.0, "SIM_RATE_HZ": 500.0})),
+        (load("hover"), Conditions(own=Own("plumbline.examples.load_pid:LoadPid"))),
+        (load("hover"), Conditions(own=Own(f"{__name__}:Fails"))),
     ],
-    ids=["hover", "errand", "field", "links"],
+    ids=["hover", "errand", "field", "links", "own law", "own law that fails"],
 )
 def test_a_flight_is_the_same_without_python_at_each_tick(
     mission: Mission, conditions: Conditions, monkeypatch: pytest.MonkeyPatch

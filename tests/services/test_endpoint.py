@@ -307,6 +307,15 @@ def test_timesync_questions_are_answered_and_answers_are_events(rig):
     assert rig.events == [TimesyncAnswered("gcs", 99, 12345)]
 
 
+def test_only_what_is_to_be_answered_is_work(rig):
+    rig.poll()
+    rig.send(m.MAVLink_timesync_message(99, 12345))
+    before_all_streams_us = -1
+    assert not rig.endpoint.due(before_all_streams_us)
+    rig.send(m.MAVLink_timesync_message(0, 12345))
+    assert rig.endpoint.due(before_all_streams_us)
+
+
 def test_a_timesync_answer_at_boot_is_no_question(rig):
     rig.send(m.MAVLink_timesync_message(0, 5))
     (answer,) = [r.message for r in rig.poll()["gcs"] if r.message.get_type() == "TIMESYNC"]

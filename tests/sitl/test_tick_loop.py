@@ -13,7 +13,7 @@ from autopilot.shell.machine_sockets import SUPPORTED
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.convert.simulator import hil_actuator_controls_message, padded
 from gcs.shell.link import LOOPBACK, free_port
-from sitl.hil import STATUS_PERIOD_US, HilSimulator
+from sitl.hil import HilSimulator
 from sitl.shell.link import TRUTH_WINDOW_US, Link
 from sitl.shell.tick_loop import TickLoop
 
@@ -25,6 +25,10 @@ LIFTING = (2.0, 2.0, 2.0, 2.0)
 WAIT_S = 0.05  # for a datagram that does not come
 
 
+GUST_US = 200_000  # when a gust begins, which is told
+GUST = {"SIM_GUST_E": 1.0, "SIM_GUST_AT_S": 1e-6 * GUST_US}
+
+
 class Rig:
     """A simulator on a socket at tick 1, an autopilot, who hears the truth; and the same world in Python."""
 
@@ -34,7 +38,9 @@ class Rig:
         self.link = Link(address, self.truth.getsockname(), lambda text: None)
         self.link.peer = self.autopilot.getsockname()
         self.link.timeout(WAIT_S)
-        self.simulator, self.twin = (HilSimulator.build(sensors="lab", seed=3) for _ in range(2))
+        self.simulator, self.twin = (
+            HilSimulator.build(sensors="lab", seed=3, settings=GUST) for _ in range(2)
+        )
         self.loop = TickLoop(self.link, self.simulator)
         self.writer = FrameWriter(1, 1)
         self.told: list[bytes] = []  # by the twin
@@ -115,11 +121,11 @@ def test_python_goes_on_where_the_loop_has_ended(rig: Rig) -> None:
 
 
 def test_a_tick_with_more_to_say_is_left_to_python(rig: Rig) -> None:
-    ticks = STATUS_PERIOD_US // TICK_US
+    ticks = GUST_US // TICK_US
     rig.say(*(rig.answer(TICK_US * i) for i in range(1, ticks + 5)))
     moved, arrived = rig.loop.run()
     assert (moved, arrived) == (True, None)
-    assert rig.simulator.now_us == STATUS_PERIOD_US
+    assert rig.simulator.now_us == GUST_US
     for _ in range(1, ticks):
         rig.step_twin()
     assert rig.simulator.sensor_datagram() == rig.twin.sensor_datagram()

@@ -7000,8 +7000,9 @@ setattr(MAVLink_sim_status_message, "name", mavlink_msg_deprecated_name_property
 
 class MAVLink_wind_state_message(MAVLink_message):
     """
-    Wind of the simulated world: five times a second, and when a gust
-    pulse begins or ends.
+    Wind of the simulated world: every second (in real time five
+    times), and when the mean wind changes or a gust pulse begins or
+    ends.
     """
 
     id = MAVLINK_MSG_ID_WIND_STATE
@@ -18581,8 +18582,8 @@ class MAVLink(object):
 
     def wind_state_encode(self, time_usec: int, wind: Sequence[float], gust: Sequence[float]) -> MAVLink_wind_state_message:
         """
-        Wind of the simulated world: five times a second, and when a gust
-        pulse begins or ends.
+        Wind of the simulated world: every second (in real time five times),
+        and when the mean wind changes or a gust pulse begins or ends.
 
         time_usec                 : Time from which this holds, clock of the vehicle. [us] (type:uint64_t)
         wind                      : Mean wind, NED, without random gusts. [m/s] (type:float)
@@ -18593,8 +18594,8 @@ class MAVLink(object):
 
     def wind_state_send(self, time_usec: int, wind: Sequence[float], gust: Sequence[float], force_mavlink1: bool = False) -> None:
         """
-        Wind of the simulated world: five times a second, and when a gust
-        pulse begins or ends.
+        Wind of the simulated world: every second (in real time five times),
+        and when the mean wind changes or a gust pulse begins or ends.
 
         time_usec                 : Time from which this holds, clock of the vehicle. [us] (type:uint64_t)
         wind                      : Mean wind, NED, without random gusts. [m/s] (type:float)

@@ -19,7 +19,7 @@ from autopilot.shell.compiling import Part
 from gcs.batch import pool
 from gcs.cli import gcs
 from gcs.errors import GcsError
-from gcs.sweep import run
+from gcs.sweep import run, work
 from gcs.sweep.plan import PlanError, SweepPlan
 from gcs.sweep.plan_file import load_plan, store_plan, sweep_origin
 from gcs.sweep.report import write_report
@@ -81,7 +81,7 @@ def test_a_sweep_that_was_stopped_goes_on(
     whole: tuple[SweepPlan, Path, run.Swept], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, complete, _ = whole
-    monkeypatch.setattr(run, "BATCH", 1)
+    monkeypatch.setattr(work, "batch_size", lambda flights, workers: 1)
     first = swept(plan, tmp_path, AfterOne())
     assert not first.whole and 0 < first.flights < 6
     rest = swept(plan, tmp_path)
