@@ -27,7 +27,7 @@ class Faults:
         self._told_us[what] = now_us
         kind = sys.exc_info()[0]
         name = kind.__name__ if kind is not None else "?"
-        text = f"Internal error in {what}: {name}; the flight goes on"
+        text = f"Internal error in {what}: {name}; the flight continues"
         return [Say(mavlink.MAV_SEVERITY_ERROR, text), ServiceFailed(what, traceback.format_exc())]
 
     def answered(self, message: Any, peer: Peer, now_us: int) -> list[Output]:

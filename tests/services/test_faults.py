@@ -26,7 +26,7 @@ def test_the_asker_is_answered_and_the_operators_are_told(rig: Any, message: Any
     replies = rig.replies(message)
     answers = [reply for reply in replies if reply.get_type() != "STATUSTEXT"]
     texts = "".join(reply.text for reply in replies if reply.get_type() == "STATUSTEXT")
-    assert texts == f"Internal error in {message.get_type()}: RecursionError; the flight goes on"
+    assert texts == f"Internal error in {message.get_type()}: RecursionError; the flight continues"
     (answer,) = answers
     match answer.get_type():
         case "COMMAND_ACK":
