@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from autopilot.geometry.entry import entry_of
-from autopilot.geometry.linear import ZERO
+from autopilot.geometry.linear import ZERO, Vec3
 from autopilot.geometry.packed import Row, packed, unpack
 from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.vehicle.battery import open_voltage
@@ -58,8 +58,9 @@ from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import truth_of
 from sitl.world import rotors_of
 
-STATUS_PERIOD_US = 200_000  # in real time; in lockstep nobody waits for a status
-BATTERY_PERIOD_US = 200_000
+_STATUS_PERIOD_US = 200_000  # in real time; in lockstep nobody waits for a status
+_BATTERY_PERIOD_US = 200_000
+_BOOT_PERIOD_US = SECOND_US  # of SIM_BOOT, beside the sensors
 # in real time the rotors stop when no command came for this long, as a speed controller without signal does
 COMMAND_TIMEOUT_US = 500_000
 LEAST_SNAP = 1e-3  # m/s, closing speed from which a cable that comes taut is told of
@@ -74,11 +75,6 @@ def _asks_reboot(message: Any) -> bool:
     if message.get_msgId() != mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
         return False
     return bool(message.command == mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN and message.param1 == 1.0)
-
-
-def _next_multiple(period_us: int, now_us: int) -> int:
-    """The first after now."""
-    return now_us - now_us % period_us + period_us
 
 
 class PacingFigures(NamedTuple):
@@ -118,7 +114,7 @@ class HilSimulator:
         self.parameters = ParameterServer(table)
         self._home = home
         self._lockstep = lockstep
-        self._status_us = SECOND_US if lockstep else STATUS_PERIOD_US
+        self._status_us = SECOND_US if lockstep else _STATUS_PERIOD_US
         self._truth_every = truth_every
         self._boot_id = boot_id
         # machine code, once it was asked for
@@ -161,7 +157,7 @@ class HilSimulator:
         self._sensors = self._sensor_frames()
         self._truth: bytes | None = None
         self._truth_made = False
-        self._wind_told = settings.wind, ZERO  # mean and gust pulse
+        self._wind_told = settings.wind, ZERO
         self._reboot = False  # asked for
         self._snap_mass()  # compiled before the first tick, not at the first snap
 
@@ -365,14 +361,21 @@ class HilSimulator:
         now_us, tick_us = core.now_us, core.settings.tick_us
         if not self._lockstep or self._reboot or self._introduced or self.answered or self.parameters.speaks:
             return None
-        until_us = min(_next_multiple(self._status_us, now_us), core.pulse_changes_us)
-        if core.truth.drive.battery > 0.0:
-            until_us = min(until_us, _next_multiple(BATTERY_PERIOD_US, now_us))
+        until_us = self._speaks_us
         if until_us <= now_us + tick_us:
             return None
         times = (now_us, core.tick_count, tick_us, until_us, self._truth_every)
         room = Room(self._newest, self._statement, self._buffer, self._payload)
         return self._runner.running(times, core.rows, core.chain, room)
+
+    @property
+    def _speaks_us(self) -> int:
+        """When more is to be said next than sensors and truth, whatever happens."""
+        core, now_us = self.core, self.core.now_us
+        periods_us = [self._status_us, _BOOT_PERIOD_US]
+        if core.truth.drive.battery > 0.0:
+            periods_us.append(_BATTERY_PERIOD_US)
+        return min(core.pulse_changes_us, *(now_us - now_us % each_us + each_us for each_us in periods_us))
 
     def ran(self, framed: bool) -> None:
         """Take over what machine code has made of `running`; `framed`: the sensors of the tick at which the
@@ -396,10 +399,10 @@ class HilSimulator:
     def _sensor_frames(self) -> bytes:
         writer, core = self._sensor_writer, self.core
         aside = self.parameters.take()
-        if self._introduced or core.now_us % SECOND_US == 0:
+        if self._introduced or core.now_us % _BOOT_PERIOD_US == 0:
             self._introduced = False
             aside.append(self._boot())
-        if core.truth.drive.battery > 0.0 and core.now_us % BATTERY_PERIOD_US == 0:
+        if core.truth.drive.battery > 0.0 and core.now_us % _BATTERY_PERIOD_US == 0:
             aside.append(self._battery())
         if not self._lockstep and core.now_us % SECOND_US == 0:  # how punctual the answers are
             aside.append(self._status())
@@ -416,7 +419,7 @@ class HilSimulator:
         core = self.core
         due = core.tick_count % self._truth_every == 0
         status_due = core.now_us % self._status_us == 0
-        wind_due = status_due or (core.settings.wind, core.pulse) != self._wind_told
+        wind_due = status_due or self._wind != self._wind_told
         snapped = core.snap_speed > LEAST_SNAP
         if not (due or wind_due or snapped):
             return None
@@ -436,12 +439,17 @@ class HilSimulator:
                 datagram += writer.frame(_DIVERGED)
         return datagram
 
+    @property
+    def _wind(self) -> tuple[Vec3, Vec3]:
+        """Mean and gust pulse."""
+        return self.core.settings.wind, self.core.pulse
+
     def _events(self, wind_due: bool, snapped: bool, status_due: bool) -> list[Any]:
         """What is told now and then beside the state."""
         core, now_us = self.core, self.core.now_us
         messages: list[Any] = []
         if wind_due:
-            self._wind_told = core.settings.wind, core.pulse
+            self._wind_told = self._wind
             messages.append(wind_state_message(now_us, *self._wind_told))
         if snapped:
             speed = core.snap_speed

@@ -23,7 +23,7 @@ from missions.model import Mission
 
 Clock = Callable[[], float]  # seconds
 LANES_PAY = 1000  # flights with a law, for which its lanes are compiled
-_MOST_AT_A_TIME = 2 * LANES
+_MOST_AT_A_TIME = 2 * LANES  # flights that one worker is given
 
 _NOT_FLOWN = (ValueError, ArithmeticError)
 
