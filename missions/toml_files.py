@@ -14,16 +14,17 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, get_args
-
-from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, get_args
 
 from missions.nearest import did_you_mean, nearest
 from missions.text_files import TextFileError, text_of
 from missions.units import split_unit
 
-Spec = TypeVar("Spec", bound=BaseModel)
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+    from pydantic.fields import FieldInfo
+
+Spec = TypeVar("Spec", bound="BaseModel")
 
 _SUFFIX = ".toml"
 _LONGEST_SHOWN = 40  # characters of a value
@@ -121,6 +122,8 @@ class TomlFiles:
 
     def record(self, spec: type[Spec], table: Mapping[str, Any], where: str) -> Spec:
         """The table as `spec` describes it."""
+        from pydantic import ValidationError  # whoever lists names needs no schema
+
         found = [kind for kind, known in _KINDS.items() if known.mark in table]
         if found and self.kind in _KINDS and self.kind not in found:
             raise self.error([f"{where}: is a {found[0]} file; a {self.kind} file is wanted here"])
@@ -257,6 +260,8 @@ def _place(location: Sequence[str | int], spec: type[BaseModel], at: str) -> tup
 
 def _table_of(annotation: Any) -> type[BaseModel] | None:
     """The spec of the table that a key holds, alone, in a list, or optionally; None if it holds none."""
+    from pydantic import BaseModel
+
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     found = (_table_of(argument) for argument in get_args(annotation))

@@ -6,7 +6,8 @@ from os import PathLike
 from typing import ClassVar, Self
 
 from autopilot.vehicle import model
-from autopilot.vehicle.file import VEHICLES, vehicle_keys
+from autopilot.vehicle.file import vehicle_keys
+from autopilot.vehicle.shipped import VEHICLES
 from gcs.errors import input_error
 from missions.toml_files import FileError, TomlFiles
 from plumbline.arguments import name_or_file

@@ -27,7 +27,7 @@ from autopilot.shell.options import (
     setting_option,
     shown,
 )
-from autopilot.vehicle.file import VEHICLES, VehicleFileError
+from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.parameter_table import ParameterError
 from sitl.hil import HilSimulator

@@ -29,9 +29,10 @@ _DAY_S = 86400.0
 KEPT_S = 90.0 * _DAY_S  # that machine code is kept without being used
 _MARKS = "ready"
 CHOSEN_BY_USER = os.environ.get("NUMBA_CACHE_DIR", "")
+_PACKAGES = ("autopilot", "sitl", "missions", "gcs", "plumbline")
 # it begins with letters, which are found fast: what is found in a text too does no harm
 _IMPORT = re.compile(
-    rb"from[ \t]+((?:autopilot|sitl|missions|gcs|plumbline)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)"
+    rb"from[ \t]+((?:%b)[\w.]*)\s+import\s+(\([^)]*\)|[^\n]*)" % "|".join(_PACKAGES).encode()
 )
 _NAME = re.compile(rb"\w+")
 _CPU_INFO = Path("/proc/cpuinfo")
@@ -39,50 +40,62 @@ _CPU_FIELDS = ("model name", "flags", "Features", "CPU implementer", "CPU part")
 
 
 @cache
-def _source(path: Path) -> bytes:
-    return path.read_bytes()
+def _source(file: str, root: str) -> bytes:
+    return Path(root, file).read_bytes()
 
 
 @cache
-def _digest(path: Path) -> bytes:
-    return hashlib.sha256(_source(path)).digest()
+def _digest(file: str, root: str) -> bytes:
+    return hashlib.sha256(_source(file, root)).digest()
 
 
 @cache
-def _packages(path: Path, root: Path) -> tuple[Path, ...]:
-    """The files that make `path`, or what it lies in, packages of the project at `root`."""
-    inside = [parent for parent in (path, *path.parents) if parent.is_relative_to(root)]
-    return tuple(file for file in (parent / "__init__.py" for parent in inside) if file.is_file())
+def _files(root: str) -> frozenset[str]:
+    """The source files of the project at `root`, relative to it; in texts, of which a `Path` costs ten."""
+    walked = (step for package in _PACKAGES for step in os.walk(f"{root}{os.sep}{package}"))
+    inside = ((os.path.relpath(folder, root), names) for folder, _, names in walked)
+    return frozenset(
+        f"{folder}{os.sep}{name}" for folder, names in inside for name in names if name.endswith(".py")
+    )
 
 
 @cache
-def _imported(path: Path, root: Path) -> frozenset[Path]:
-    """Files below `root` that the file imports itself."""
-    found: set[Path] = set()
-    for module, names in _IMPORT.findall(_source(path)):
-        base = root.joinpath(*module.decode().split("."))
-        found.update(_packages(base, root))
-        if base.is_dir():
-            parts = (base / name.decode() for name in _NAME.findall(names))
-            found.update(p for q in parts for p in (q.with_suffix(".py"), q / "__init__.py") if p.is_file())
-        elif base.with_suffix(".py").is_file():
-            found.add(base.with_suffix(".py"))
-    if b"iter_modules(__path__)" in _source(path):  # a package that finds its modules by itself
-        found.update(path.parent.glob("*.py"))
+def _named(module: str, root: str) -> frozenset[str]:
+    """The file of a module, and those that make what it lies in packages."""
+    base = module.replace(".", os.sep)
+    packages = (
+        f"{base[:end]}{os.sep}__init__.py" for end, sign in enumerate(base + os.sep) if sign == os.sep
+    )
+    return _files(root) & {f"{base}.py", *packages}
+
+
+@cache
+def _imported(file: str, root: str) -> frozenset[str]:
+    """The files below `root` that a file imports itself."""
+    found: set[str] = set()
+    for module, names in _IMPORT.findall(_source(file, root)):
+        base = module.decode()
+        found |= _named(base, root)
+        if f"{base.replace('.', os.sep)}.py" not in found:  # a package, of which modules may be named
+            found.update(*(_named(f"{base}.{name.decode()}", root) for name in _NAME.findall(names)))
+    if b"iter_modules(__path__)" in _source(file, root):  # a package that finds its modules by itself
+        folder = file.rpartition(os.sep)[0]
+        found.update(other for other in _files(root) if other.rpartition(os.sep)[0] == folder)
     return frozenset(found)
 
 
 @cache
 def sources_hash(path: Path, root: Path = ROOT) -> str:
     """Hash of a source file and of all files of the project at `root` that it imports, directly or not."""
-    seen, ahead = {path}, [path]
+    first, top = os.path.relpath(path, root), str(root)
+    seen, ahead = {first}, [first]
     while ahead:
-        fresh = _imported(ahead.pop(), root) - seen
+        fresh = _imported(ahead.pop(), top) - seen
         seen |= fresh
         ahead += fresh
     digest = hashlib.sha256()
-    for name, file in sorted((os.path.relpath(file, root), file) for file in seen):
-        digest.update(name.encode() + b"\0" + _digest(file))
+    for file in sorted(seen):
+        digest.update(file.encode() + b"\0" + _digest(file, top))
     return digest.hexdigest()[:16]
 
 

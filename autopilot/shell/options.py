@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import errno
 import gc
+import json
 import os
 import signal
 import socket
@@ -19,7 +20,6 @@ from typing import Any, TextIO, cast
 import click
 
 from autopilot.wire.convert.geodesy import Home, home_from_text
-from autopilot.wire.signing import NoKeyError, key_of_text
 
 Address = tuple[str, int]
 
@@ -27,22 +27,43 @@ LARGEST_DATAGRAM = 65535
 MOST_SEED = 2**63 - 1
 EXIT_ERROR, EXIT_USAGE = 1, 2  # of the latter the fault is the command line's, or a file's that it names
 MOST_SPEED = 1000.0  # times the wall clock
+ARGUMENTS_FOLLOW = "--arguments-follow"  # on stdin
 _THIS_MACHINE = "127.0.0.1"
 _PR_SET_TIMERSLACK = 29
 
 
 class ProgramCommand(click.Command):
-    """A program that tells wrong usage in one line, and ends with 2."""
+    """A program that tells wrong usage in one line, and ends with 2.
+
+    Whoever starts it for a flight may have it load before it is known which: with `ARGUMENTS_FOLLOW` alone it
+    waits for a line on stdin.
+    """
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
         extra["standalone_mode"] = False
         outlive_terminal()
+        if args is None and sys.argv[1:] == [ARGUMENTS_FOLLOW]:
+            args = _following_arguments()
         try:
             code = super().main(args, **extra)
         except click.UsageError as error:
             print(f"{self.name}: {usage_text(error)}", file=sys.stderr)
             sys.exit(error.exit_code)
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def _following_arguments() -> list[str]:
+    """The arguments in a line of JSON on stdin, behind the file to which to write; ends where none comes."""
+    line = sys.stdin.buffer.readline()
+    if not line:
+        sys.exit(0)
+    log, *arguments = cast("list[str]", json.loads(line))
+    for path, flags, numbers in ((os.devnull, os.O_RDONLY, (0,)), (log, os.O_WRONLY | os.O_APPEND, (1, 2))):
+        opened = os.open(path, flags)
+        for number in numbers:
+            os.dup2(opened, number)
+        os.close(opened)
+    return arguments
 
 
 def complain(program: str, exit_code: int, *lines: str) -> int:
@@ -244,6 +265,8 @@ def home_option(text: str) -> Home:
 
 def signing_key_option(text: str) -> bytes:
     """FILE with a signing key that nobody else may read."""
+    from autopilot.wire.signing import NoKeyError, key_of_text  # in case of need alone
+
     path = Path(text)
     try:
         if path.stat().st_mode & 0o077:

@@ -62,8 +62,9 @@ from autopilot.shell.storing import Storing
 from autopilot.shell.tick_cost import TickCost
 from autopilot.shell.tick_loop import NOTHING, Met, TickLoop, rehearse
 from autopilot.shell.watched_calls import watched_calls
-from autopilot.vehicle.file import VEHICLES, VehicleFileError, load_belief
+from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import DEFAULT_LAW, LAWS, apply_settings
+from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink

@@ -12,8 +12,8 @@ from math import acos, degrees, factorial
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import make_interp_spline
 
 from autopilot.geometry.linear import Vec3
 from autopilot.trajectory.convex import excess
@@ -85,7 +85,7 @@ def samples(times_s: ArrayLike, positions: ArrayLike, passes_s: ArrayLike) -> Pa
     if not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
         raise ValueError("times_s must increase")
     rest = [(order, np.zeros(3)) for order in range(1, (DEGREE + 1) // 2)]
-    spline = make_interp_spline(times, places, DEGREE, bc_type=(rest, rest))
+    spline = scipy.interpolate.make_interp_spline(times, places, DEGREE, bc_type=(rest, rest))
     breaks = np.unique(spline.t)
     orders = [spline(breaks[:-1], nu=n) / factorial(n) for n in range(DEGREE + 1)]
     return polynomials(breaks, np.stack(orders, axis=1), passes_s)

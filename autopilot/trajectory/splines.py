@@ -14,8 +14,8 @@ from __future__ import annotations
 from math import factorial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from autopilot.geometry.kernel import kernel
 from autopilot.geometry.linear import ZERO
@@ -44,7 +44,7 @@ class Basis:
         self.spacing = (end - begin) / intervals
         inner = np.arange(intervals + 1, dtype=np.float64)
         knots = np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, float(intervals))])
-        self._one = BSpline(knots, np.eye(self.count), DEGREE)
+        self._one = scipy.interpolate.BSpline(knots, np.eye(self.count), DEGREE)
 
     def band(self, times: Array, orders: int) -> tuple[Array, NDArray[np.int64]]:
         """(orders, n, 10): the derivatives 0 ... orders - 1 of the B-splines that are not zero at each of n
@@ -70,7 +70,7 @@ class Basis:
 
     def pieces(self, coefficients: Array, origin: Array) -> PieceTable:
         """The table of the spline with these coefficients (count, 3), moved by `origin` (3,)."""
-        spline = BSpline(self._one.t, coefficients, DEGREE)
+        spline = scipy.interpolate.BSpline(self._one.t, coefficients, DEGREE)
         left = np.arange(self.intervals, dtype=np.float64)
         table = np.empty((self.intervals, COLUMNS))
         table[:, 0], table[:, 1] = self.breaks[:-1], self.breaks[1:]

@@ -22,9 +22,9 @@ from itertools import pairwise
 from math import ceil, dist
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import minimize
 from scipy.sparse.linalg import splu
 
 from autopilot.geometry.kernel import kernel
@@ -184,7 +184,7 @@ def share_times(points: Array, whole: float) -> Array:
         return float(np.log(MinimumSnap(points, _clock(shares(x), whole)).cost))
 
     bounds = [(value - 0.7, value + 0.7) for value in begin]
-    found = minimize(
+    found = scipy.optimize.minimize(
         cost, begin, method="L-BFGS-B", bounds=bounds, options={"maxiter": _SPLIT_ROUNDS, "eps": 1e-3}
     )
     return shares(found.x)

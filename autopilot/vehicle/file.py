@@ -1,4 +1,4 @@
-"""Vehicle files: TOML in, `Vehicle` out. The shipped ones are the files in `vehicles`, named nowhere else.
+"""Vehicle files: TOML in, `Vehicle` out.
 
 A file whose `believed` names another vehicle is the truth beside a belief: what it leaves out is as there,
 the simulator flies it, and the autopilot, and whoever checks missions, goes by the other.
@@ -13,16 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from autopilot.vehicle.model import Vehicle
+from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from autopilot.wire.parameter_names import unknown_parameter
 from autopilot.wire.parameter_table import ParameterError
-from missions.toml_files import FileError, TomlFiles, shown
-
-
-class VehicleFileError(FileError):
-    """A vehicle file is missing or wrong: the fault of whoever wrote or named it."""
-
-
-VEHICLES = TomlFiles("vehicle", VehicleFileError)
+from missions.toml_files import shown
 
 
 def load_vehicle(name_or_path: str | PathLike[str]) -> Vehicle:

@@ -269,6 +269,37 @@ class Field:
         return self._number.unpack_from(frame, begin)[0]
 
 
+def message_at(data: bytes, start: int) -> tuple[Received | None, int]:
+    """The message whose frame begins at `start`, and where the frame ends.
+
+    None and 0 where no frame begins, or it is cut off, damaged or laid out in a way that is not known; None
+    and its end where it is whole, but of an unknown id, so that it cannot be checked.
+    """
+    end = len(data)
+    magic = data[start]
+    if magic == _MAGIC_V2 and start + _HEADER_V2 + _CRC <= end:
+        _, payload, flags, _, sequence, system, component, low, high = _HEADER2.unpack_from(data, start)
+        message_id = low | high << 16
+        tail = start + _HEADER_V2 + payload
+        stop = tail + _CRC + (_SIGNATURE if flags else 0)
+        if flags and flags != _SIGNED:
+            return None, 0
+    elif magic == _MAGIC_V1 and start + _HEADER_V1 + _CRC <= end:
+        _, payload, sequence, system, component, message_id = data[start : start + _HEADER_V1]
+        tail = start + _HEADER_V1 + payload
+        stop = tail + _CRC
+    else:
+        return None, 0
+    if stop > end:
+        return None, 0
+    layout = _BY_ID.get(message_id)
+    if layout is None:
+        return None, stop
+    if mcrf4xx(layout.extra, mcrf4xx(data[start + 1 : tail])) != data[tail] | data[tail + 1] << 8:
+        return None, 0
+    return Received(message_id, system, component, sequence, data[start:stop]), stop
+
+
 def decode(datagram: bytes, patience: int | None = None) -> tuple[list[Received], int]:
     """The messages of a datagram in their order, and how many of its bytes were not part of one.
 
@@ -284,38 +315,14 @@ def decode(datagram: bytes, patience: int | None = None) -> tuple[list[Received]
     while start < end:
         if patience is not None and start - good - unknown > patience:
             break
-        magic = datagram[start]
-        if magic == _MAGIC_V2 and start + _HEADER_V2 + _CRC <= end:
-            _, payload, flags, _, sequence, system, component, low, high = _HEADER2.unpack_from(
-                datagram, start
-            )
-            message_id = low | high << 16
-            tail = start + _HEADER_V2 + payload
-            stop = tail + _CRC + (_SIGNATURE if flags else 0)
-            legible = not flags or flags == _SIGNED  # else laid out in a way that is not known
-        elif magic == _MAGIC_V1 and start + _HEADER_V1 + _CRC <= end:
-            _, payload, sequence, system, component, message_id = datagram[start : start + _HEADER_V1]
-            tail = start + _HEADER_V1 + payload
-            stop = tail + _CRC
-            legible = True
+        message, stop = message_at(datagram, start)
+        if message is not None:
+            received.append(message)
+            good += stop - start
+        elif stop and (stop == end or datagram[stop] in MAGICS):
+            unknown += stop - start
         else:
-            start += 1
-            continue
-        if stop > end or not legible:
-            start += 1
-            continue
-        layout = _BY_ID.get(message_id)
-        if layout is None:
-            whole = stop == end or datagram[stop] in MAGICS
-            unknown += stop - start if whole else 0
-            start = stop if whole else start + 1
-            continue
-        checksum = mcrf4xx(layout.extra, mcrf4xx(datagram[start + 1 : tail]))
-        if checksum != datagram[tail] | datagram[tail + 1] << 8:
-            start += 1
-            continue
-        received.append(Received(message_id, system, component, sequence, datagram[start:stop]))
-        good += stop - start
+            stop = start + 1
         start = stop
     return received, end - good
 

@@ -10,7 +10,7 @@ from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from autopilot.wire.codec import LONGEST_FRAME, MAGICS, Received, announced_length, decode
+from autopilot.wire.codec import LONGEST_FRAME, MAGICS, Received, announced_length, message_at
 from autopilot.wire.dialect import plumbline as mavlink
 
 _STAMP = struct.Struct(">Q")
@@ -65,17 +65,13 @@ def _records(buffer: bytes, before: int) -> Generator[tuple[int, Received], None
     start = 0
     while start < before:
         begin = start + _STAMP.size
-        length = announced_length(buffer, begin)
-        end = begin + length
-        if not length or end > len(buffer):
-            start += 1
-            continue
-        received, junk = decode(buffer[begin:end])
-        if received and not junk:
-            yield _STAMP.unpack_from(buffer, start)[0], received[0]
+        received, end = message_at(buffer, begin) if begin < len(buffer) else (None, 0)
+        if received is not None:
+            yield _STAMP.unpack_from(buffer, start)[0], received
             start = end
-        elif end + _STAMP.size < len(buffer) and buffer[end + _STAMP.size] in MAGICS:
-            start = end  # a frame that is damaged or unknown, but whole
-        else:
-            start += 1
+            continue
+        end = begin + announced_length(buffer, begin)
+        # a frame that is damaged or unknown, but whole
+        whole = begin < end < len(buffer) - _STAMP.size and buffer[end + _STAMP.size] in MAGICS
+        start = end if whole else start + 1
     return start

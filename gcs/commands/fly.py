@@ -182,6 +182,11 @@ def fly_command(
         page = PageOptions(bind, port)
     elif port is not None:
         raise click.UsageError("--port is that of the page: add --view", ctx)
+    from gcs.shell.processes import Processes
+
+    processes = ctx.with_resource(Processes())
+    if connect is None and firmware is None:
+        processes.load("sitl", "autopilot")  # while we load ourselves, and look at what is to be flown
     from gcs.workflows.flight_options import FlightOptions
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record
@@ -223,7 +228,7 @@ def fly_command(
     )
     run = f"gcs fly {mission}"
     with reporting(run, junit):
-        flight = fly(options, told, page)
+        flight = fly(options, told, page, processes)
     if not (as_json or quiet):
         to_reader(lambda: click.echo(f"report: {flight.out / 'report.html'}"))
     wall_s = flight.record["wall_s"] or 0.0

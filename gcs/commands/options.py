@@ -193,7 +193,7 @@ def page_options(function: F) -> F:
 
 def vehicle_option(what: str = "What flies, in truth and by belief") -> Callable[[F], F]:
     """--vehicle of every command that reads a vehicle file; its help lists the shipped ones."""
-    from autopilot.vehicle.file import VEHICLES
+    from autopilot.vehicle.shipped import VEHICLES
 
     return click.option(
         "--vehicle",

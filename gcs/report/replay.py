@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.vehicle.file import VehicleFileError, load_vehicle
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
+from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire.dialect import plumbline as mavlink
 from gcs.analysis.align import MAX_GAP_S, as_of, linear
 from gcs.analysis.axes import Floats, quat_enu_flu_from_ned_frd

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from autopilot.vehicle.file import VehicleFileError
+from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire.parameter_table import ParameterTable
 from gcs.analysis.record import FlightMeta
 from gcs.analysis.tracks import Telemetry

@@ -1,22 +1,25 @@
 """The simulator and the autopilot as child processes that cannot outlive us.
 
 Each gets a process group of its own (Ctrl-C reaches us alone, we stop them in order), is killed by the kernel
-if we die (Linux), and writes its stderr to a file from which the reason of an early end is taken.
+if we die (Linux), and writes its stderr to a file from which the reason of an early end is taken. A program
+of ours can be loaded before it is known with what it is to start.
 """
 
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
+from autopilot.shell.options import ARGUMENTS_FOLLOW
 from gcs.errors import GcsError
 from gcs.shell.display import say
 
@@ -41,7 +44,9 @@ class Child:
         inherits: Sequence[int] = (),
         folder: Path | None = None,
         environment: Mapping[str, str] | None = None,
+        waits: bool = False,
     ) -> None:
+        """With `waits` it is one of our programs, which waits for its arguments (`take`)."""
         self.name = name
         self.log = log
         self.exit_code: int | None = None
@@ -50,13 +55,27 @@ class Child:
                 command,
                 cwd=folder,
                 env={**os.environ, **environment} if environment else None,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE if waits else subprocess.DEVNULL,
                 stdout=stderr,
                 stderr=subprocess.STDOUT,
                 process_group=0,
                 pass_fds=inherits,
                 preexec_fn=_die_with_parent(),  # noqa: PLW1509, there are no threads
             )
+
+    def take(self, arguments: Sequence[str], log: Path) -> bool:
+        """Start with these arguments and write to this file; False if it has ended while it waited."""
+        pipe = self._process.stdin
+        if pipe is None or not self.running:
+            return False
+        log.write_bytes(b"")
+        self.log = log
+        try:
+            with pipe:
+                pipe.write(json.dumps([str(log.resolve()), *arguments]).encode() + b"\n")
+        except BrokenPipeError:
+            return False
+        return True
 
     @property
     def pid(self) -> int:
@@ -126,36 +145,37 @@ class Processes:
 
     def __init__(self) -> None:
         self._children: list[Child] = []
+        self._loaded: dict[str, Child] = {}  # by name, those that wait to be started
         self._cpus_before: set[int] | None = None
         self._looked_s = 0.0
         self._used = 0.0, 0.0  # time of the last look, and processor time that they had used
         self._works = False
         self._stopped_s: dict[int, float] = {}  # since when a child is seen to be stopped, by its id
 
+    def load(self, *names: str) -> None:
+        """Have these programs of ours load what they need, which takes a second, before they are started."""
+        for name in names:
+            with suppress(OSError):  # of which `start` will tell
+                command = [sys.executable, "-m", name, ARGUMENTS_FOLLOW]
+                self._loaded[name] = Child(name, command, Path(os.devnull), waits=True)
+
     def start(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> Child:
-        """Start `python -m NAME ARGUMENTS` with its output in `log`; it inherits these open descriptors."""
-        return self._begin(name, [sys.executable, "-m", name, *arguments], log, inherits)
+        """Start `python -m NAME ARGUMENTS` with its output in `log`: the one that is loaded, or else a new
+        one, which inherits these open descriptors."""
+        with _told(name):
+            child = self._loaded.pop(name, None)
+            if child is None or not child.take(arguments, log):
+                child = Child(name, [sys.executable, "-m", name, *arguments], log, inherits)
+        self._children.append(child)
+        return child
 
     def start_program(
         self, name: str, command: Sequence[str], log: Path, folder: Path, environment: Mapping[str, str]
     ) -> Child:
         """Start a program of others, called `name`, in a folder, with its output in `log` and these variables
         beside ours."""
-        return self._begin(name, command, log, (), folder, environment)
-
-    def _begin(
-        self,
-        name: str,
-        command: Sequence[str],
-        log: Path,
-        inherits: Sequence[int] = (),
-        folder: Path | None = None,
-        environment: Mapping[str, str] | None = None,
-    ) -> Child:
-        try:
-            child = Child(name, command, log, inherits, folder, environment)
-        except OSError as error:
-            raise GcsError(f"{name} cannot be started: {error}") from None
+        with _told(name):
+            child = Child(name, command, log, (), folder, environment)
         self._children.append(child)
         return child
 
@@ -223,11 +243,13 @@ class Processes:
         if self._cpus_before is not None:
             os.sched_setaffinity(0, self._cpus_before)
             self._cpus_before = None
-        for child in reversed(self._children):
+        children = (*self._loaded.values(), *self._children)
+        for child in reversed(children):
             child.terminate()
-        for child in reversed(self._children):
+        for child in reversed(children):
             child.finish()
         self._children.clear()
+        self._loaded.clear()
 
     def __enter__(self) -> Processes:
         return self
@@ -236,6 +258,15 @@ class Processes:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+
+@contextmanager
+def _told(name: str) -> Iterator[None]:
+    """GcsError where a program cannot be started."""
+    try:
+        yield
+    except OSError as error:
+        raise GcsError(f"{name} cannot be started: {error}") from None
 
 
 def _current_core(allowed: set[int]) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autopilot.vehicle.file import VEHICLES
+from autopilot.vehicle.shipped import VEHICLES
 from gcs.shell.display import told_if_slow
 from gcs.workflows.checked import known_flyable
 from gcs.workflows.flight_options import FlightOptions, setting_of

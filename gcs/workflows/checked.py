@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 
 from autopilot.geometry.machine_code import ROOT, is_marked, mark_ready
-from autopilot.vehicle.file import VEHICLES, belief_of
+from autopilot.vehicle.file import belief_of
+from autopilot.vehicle.shipped import VEHICLES
 from missions.model import Mission
 from missions.toml_files import FileError
 

@@ -37,6 +37,7 @@ from missions.model import Mission
 if TYPE_CHECKING:
     from gcs.analysis.record import Record
     from gcs.clients.flight import FlightClient, Outcome
+    from gcs.shell.processes import Processes
     from gcs.workflows.flight_page import FlightPage, PageOptions
 
 _EXIT = {
@@ -67,9 +68,12 @@ class Flight:
         return EXIT_INTERRUPTED if self.stopped else _EXIT[self.outcome.name]
 
 
-def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> Flight:
+def fly(
+    options: FlightOptions, told: Told, view: PageOptions | None = None, processes: Processes | None = None
+) -> Flight:
     """The whole flight; GcsError if there was none. `told` is called when it is over, before the pictures of
-    the report are drawn. With `view` a page shows it, and stays."""
+    the report are drawn. With `view` a page shows it, and stays. Simulator and autopilot may be loaded in
+    `processes`."""
     doubts = []
     if options.connect is None and options.firmware is None:
         doubts = check_options(options)
@@ -95,7 +99,7 @@ def fly(options: FlightOptions, told: Told, view: PageOptions | None = None) -> 
                 if options.firmware is not None:
                     client = _fly_firmware(mission, options, options.firmware, log, out, stop, watch, page)
                 elif options.connect is None:
-                    client = _fly_own(mission, options, log, out, stop, watch, page)
+                    client = _fly_own(mission, options, log, out, stop, watch, page, processes)
                 else:
                     client, truth_missing = _fly_running(
                         mission, options, options.connect, log, stop, watch, page
@@ -139,8 +143,9 @@ def _fly_own(
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None,
+    processes: Processes | None,
 ) -> FlightClient:
-    with own_vehicle(options, out) as own:
+    with own_vehicle(options, out, processes) as own:
         from gcs.workflows.own_flight import fly_own  # while they load
 
         check_mission(mission, options)

@@ -11,7 +11,8 @@ from autopilot.own.planning import planner_of
 from autopilot.own.source import OwnError
 from autopilot.shell.watched_calls import watched_calls
 from autopilot.trajectory.route import Planner
-from autopilot.vehicle.file import VehicleFileError, load_belief
+from autopilot.vehicle.file import load_belief
+from autopilot.vehicle.shipped import VehicleFileError
 from gcs.errors import InputError, input_error
 
 

@@ -1,7 +1,8 @@
 """A simulator and an autopilot started for one flight, and stopped after it.
 
 They load for a second before they speak: they are started first, and what the ground station itself has to
-load, and to check, comes meanwhile. Therefore nothing heavy is imported here.
+load, and to check, comes meanwhile. Therefore nothing heavy is imported here. A command has them loaded
+before it has looked at what it was given.
 """
 
 from __future__ import annotations
@@ -32,20 +33,22 @@ class OwnVehicle:
 
 
 @contextmanager
-def own_vehicle(options: FlightOptions, out: Path) -> Iterator[OwnVehicle]:
-    """Start both programs; afterwards they are gone.
+def own_vehicle(
+    options: FlightOptions, out: Path, processes: Processes | None = None
+) -> Iterator[OwnVehicle]:
+    """Start both programs, among `processes`, in which they may be loaded; afterwards they are gone.
 
     Their logs, and the autopilot's own log of the flight, are left in `out`.
     """
     with (
         tempfile.TemporaryDirectory(prefix="plumbline-") as storage,
         _log_kept(Path(storage), out),
-        Processes() as processes,
+        processes or Processes() as ours,
         closing(UdpSocket()) as vehicle,
         closing(UdpSocket()) as truth,
     ):
-        _start(processes, options, out, Path(storage), vehicle.address, truth.address)
-        yield OwnVehicle(processes, vehicle, truth)
+        _start(ours, options, out, Path(storage), vehicle.address, truth.address)
+        yield OwnVehicle(ours, vehicle, truth)
 
 
 @contextmanager

@@ -5,8 +5,9 @@ from __future__ import annotations
 from math import radians
 
 from autopilot.trajectory.feasibility import VehicleLimits
-from autopilot.vehicle.file import VehicleFileError, load_belief
+from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.vehicle.shipped import VehicleFileError
 from gcs.errors import input_error
 
 

@@ -36,8 +36,9 @@ from autopilot.geometry.so3 import rotation_from_quat
 from autopilot.trajectory.flatness import flat_outputs
 from autopilot.trajectory.signals import evaluate, signal_table
 from autopilot.vehicle import file as vehicle_file
-from autopilot.vehicle.file import VehicleFileError, load_vehicle
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.parameters import LAWS, autopilot_parameters
+from autopilot.vehicle.shipped import VehicleFileError
 from autopilot.wire.parameter_table import ParameterTable
 from benchmarks import cascade_margin
 from missions.fileformat import load_mission

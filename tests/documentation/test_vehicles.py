@@ -10,9 +10,10 @@ from pathlib import Path
 
 from pydantic.fields import FieldInfo
 
-from autopilot.vehicle.file import VEHICLES, load_vehicle
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.layout import FEWEST, GREATEST_FORCE_N, MOST
 from autopilot.vehicle.model import LEAST_ROTOR_MAX_N, SHARE_OF_ARM, Moment, Offset, OneRotor, Vehicle
+from autopilot.vehicle.shipped import VEHICLES
 from missions.toml_files import bounds
 
 DOCS = Path(__file__).parents[2] / "docs"

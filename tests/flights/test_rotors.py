@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from autopilot.supervisor.state import Phase
-from autopilot.vehicle.file import VEHICLES
+from autopilot.vehicle.shipped import VEHICLES
 from autopilot.wire.dialect import plumbline as mavlink
 from missions.model import Delay, Land, Takeoff
 from tests.doubles.craft import ACCEPTED, Craft, at_phase

@@ -8,7 +8,7 @@ from importlib.resources import files
 import pytest
 from click.testing import CliRunner
 
-from autopilot.vehicle.file import VEHICLES
+from autopilot.vehicle.shipped import VEHICLES
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
 from gcs.workflows.flight_inputs import check_flight_inputs, doubts

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from autopilot.vehicle.file import VEHICLES, load_vehicle
+from autopilot.vehicle.file import load_vehicle
+from autopilot.vehicle.shipped import VEHICLES
 from missions.fileformat import MISSIONS, load_mission
 from missions.toml_files import FileError, TomlFiles
 from sitl.sensors.files import load_profile

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import plumbline
-from autopilot.vehicle.file import VEHICLES
+from autopilot.vehicle.shipped import VEHICLES
 from missions.fileformat import load_mission, shipped
 from plumbline import (
     AttitudeRun,

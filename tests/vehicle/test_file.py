@@ -8,10 +8,11 @@ from importlib.resources import files
 
 import pytest
 
-from autopilot.vehicle.file import VEHICLES, VehicleFileError, belief_of, load_belief, load_vehicle
+from autopilot.vehicle.file import belief_of, load_belief, load_vehicle
 from autopilot.vehicle.layout import PLUS
 from autopilot.vehicle.model import SHARE_OF_ARM, Vehicle
 from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.vehicle.shipped import VEHICLES, VehicleFileError
 from sitl.vehicles.sim_parameters import sim_parameters
 from sitl.vehicles.truth import AIR_KEYS, CHAIN_KEYS, DRIVE_KEYS, truth_of
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from autopilot.vehicle.file import VEHICLES, load_vehicle
+from autopilot.vehicle.file import load_vehicle
 from autopilot.vehicle.model import Vehicle
 from autopilot.vehicle.parameters import (
     DEFAULT_LAW,
@@ -20,6 +20,7 @@ from autopilot.vehicle.parameters import (
     definitions,
     vehicle_values,
 )
+from autopilot.vehicle.shipped import VEHICLES
 from autopilot.wire.convert.simulator import ROTOR_FMAX
 from sitl.vehicles.sim_parameters import definitions as sim_definitions
 from sitl.vehicles.sim_parameters import sim_parameters
