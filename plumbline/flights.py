@@ -154,9 +154,9 @@ class Flight:
             pictures[name].draw(view, png)
         return Picture(png.getvalue())
 
-    def report(self, out: str | Path, quiet: bool = True) -> Path:
+    def report(self, out: str | Path, quiet: bool = True, pictures: bool = False) -> Path:
         """Write what `gcs fly` leaves into the directory `out`, but for the autopilot's own log; the path of
-        the page."""
+        the page. With `pictures` also those that `gcs fly --pictures` draws."""
         from gcs.workflows.report import make_report
 
         folder = file_path("out", out)
@@ -164,7 +164,7 @@ class Flight:
             make_folder(folder)
             keep_others(folder, TLOG_FILE)
             (folder / TLOG_FILE).write_bytes(self.tlog)
-            make_report(folder / TLOG_FILE, folder, self._meta, quiet)
+            make_report(folder / TLOG_FILE, folder, self._meta, quiet, all_pictures=pictures)
         return folder / PAGE_FILE
 
     @cached_property

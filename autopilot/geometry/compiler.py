@@ -16,12 +16,51 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from numba import _dynfunc, types
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 from numba.extending import intrinsic as _intrinsic
+
+
+class _Library(JITCodeLibrary):  # type: ignore[misc]
+    """Code as numba keeps it, whose intermediate code is read only to be linked into other code: a kernel is
+    found in the cache in half the time."""
+
+    _bitcode: bytes | None = None  # of what was found in the cache
+    _parsed: Any = None
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> Any:
+        name, kind, data = state
+        if kind != "object":
+            return super()._unserialize(codegen, state)
+        library = codegen.create_library(name)
+        machine_code, library._bitcode = data
+        library.enable_object_caching()
+        library._set_compiled_object(machine_code)
+        library._finalize_final_module()
+        return library
+
+    @property
+    def _shared_module(self) -> Any:
+        if self._parsed is None and self._bitcode is not None:
+            self._parsed = llvm.parse_bitcode(self._bitcode)
+        return self._parsed
+
+    @_shared_module.setter
+    def _shared_module(self, module: Any) -> None:
+        self._parsed = module
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """The address of one of its functions; 0 if there is none by that name."""
+        if self._bitcode is None:
+            return int(super().get_pointer_to_function(name))
+        return int(self._codegen._engine.get_function_address(name))
+
+
+JITCPUCodegen._library_class = _Library
 
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc]

@@ -19,6 +19,7 @@ from gcs.commands.options import (
     mission_argument,
     own_options,
     page_options,
+    pictures_option,
     print_json,
     require_options,
     sensors_option,
@@ -102,6 +103,7 @@ _OWN = (
 @click.option("--overwrite", is_flag=True, help="Replace an earlier flight in --out.")
 @click.option("--view", is_flag=True, help="Show the flight live in a browser; see gcs view.")
 @page_options
+@pictures_option
 @require_options
 @json_option
 @click.option("--quiet", is_flag=True, help="Print only the outcome, no progress and no table.")
@@ -129,6 +131,7 @@ def fly_command(
     view: bool,
     port: int | None,
     bind: str,
+    pictures: bool,
     required: tuple[str, ...],
     junit: Path | None,
     as_json: bool,
@@ -225,6 +228,7 @@ def fly_command(
         estimator=estimator or "",
         planner=planner or "",
         truth_at=truth_at,
+        pictures=pictures,
     )
     run = f"gcs fly {mission}"
     with reporting(run, junit):

@@ -175,6 +175,12 @@ def truth_option(function: F) -> F:
     )(function)
 
 
+def pictures_option(function: F) -> F:
+    """--pictures of every command that writes a report."""
+    help_text = "Draw track.png, position.png, error.png and the other pictures too (docs/report.md)."
+    return click.option("--pictures", is_flag=True, help=help_text)(function)
+
+
 def page_options(function: F) -> F:
     """--port and --bind of every command that serves a page."""
     port = click.option(

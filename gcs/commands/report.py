@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gcs.commands.options import OUTPUT_FOLDER, json_option, print_json
+from gcs.commands.options import OUTPUT_FOLDER, json_option, pictures_option, print_json
 from gcs.errors import InputError
 
 
@@ -17,6 +17,7 @@ from gcs.errors import InputError
     type=OUTPUT_FOLDER,
     help="Folder of the report.  [default: that of the log]",
 )
+@pictures_option
 @click.option("--mcap", is_flag=True, help="Write flight.mcap too, for Foxglove, PlotJuggler and Rerun.")
 @click.option(
     "--common-tlog",
@@ -27,12 +28,12 @@ from gcs.errors import InputError
 @json_option
 @click.option("--quiet", is_flag=True, help="Print no progress and no table.")
 def report_command(
-    source: Path, out: Path | None, mcap: bool, common: bool, as_json: bool, quiet: bool
+    source: Path, out: Path | None, pictures: bool, mcap: bool, common: bool, as_json: bool, quiet: bool
 ) -> None:
     """Write the report of a captured flight again.
 
     DIR is the output of gcs fly or gcs capture, TLOG any telemetry log of a Plumbline vehicle. The command
-    writes summary.json, flight.parquet, plots and report.html, all from the telemetry alone.
+    writes summary.json, flight.parquet, overview.png and report.html, all from the telemetry alone.
     """
     from gcs.shell.display import say
     from gcs.workflows.report import make_common, make_mcap, print_record, report_again
@@ -41,7 +42,7 @@ def report_command(
         from gcs.analysis.mcap import require_libraries
 
         require_libraries()  # before the work, not after it
-    record, folder = report_again(source, out, quiet or as_json)
+    record, folder = report_again(source, out, quiet or as_json, pictures)
     if as_json:
         print_json(record)
     elif not quiet:

@@ -13,7 +13,7 @@ from gcs.folders import PAGE_FILE, SUMMARY_FILE
 
 META_FILE = "meta.json"
 PARQUET_FILE = "flight.parquet"
-MCAP_FILE = "flight.mcap"
+MCAP_FILE, COMMON_FILE = "flight.mcap", "flight.common.tlog"
 
 # steps done, steps in all, what is done next
 Progress = Callable[[int, int, str], None]
@@ -44,12 +44,14 @@ def build_report(
     meta: FlightMeta | None = None,
     progress: Progress | None = None,
     figures: Callable[[Record], None] | None = None,
+    all_pictures: bool = False,
 ) -> Record:
-    """Writes summary.json, meta.json, flight.parquet, the pictures and report.html; returns the record.
+    """Writes summary.json, meta.json, flight.parquet, overview.png and report.html; returns the record.
 
-    `figures` is given the record as soon as it stands, before what takes longer. Without `meta`, meta.json
+    `figures` is given the record as soon as it stands, before what takes longer. `meta` is that of a new
+    flight, and what was made on demand of another one in the directory is deleted; without it, meta.json
     beside the log is read. A log that is cut short, empty or of a lost flight gives a record all the same,
-    with None for what cannot be known.
+    with None for what cannot be known. With `all_pictures` those that no page needs are drawn too.
     """
     from gcs.report.draw import Drawing
     from gcs.report.plots import PICTURES, View
@@ -57,10 +59,15 @@ def build_report(
     tell = progress or (lambda done, total, text: None)
     if not tlog_path.is_file():
         raise ReportError(f"{tlog_path}: no such file; give a .tlog that `gcs fly` or `gcs capture` wrote")
-    meta = load_meta(tlog_path.parent / META_FILE) if meta is None else meta
     out_dir.mkdir(parents=True, exist_ok=True)
+    if meta is None:
+        meta = load_meta(tlog_path.parent / META_FILE)
+    else:
+        for name in (MCAP_FILE, COMMON_FILE, *(picture.file for picture in PICTURES)):
+            (out_dir / name).unlink(missing_ok=True)
 
-    ahead = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in PICTURES), PAGE_FILE]
+    pictures = PICTURES if all_pictures else PICTURES[:1]
+    ahead = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
     total = len(ahead)
 
     def done(step: str) -> None:
@@ -75,7 +82,7 @@ def build_report(
     _write_json(out_dir / META_FILE, meta.to_json())
     _write_json(out_dir / SUMMARY_FILE, record)
     done(ahead[0])
-    with Drawing(View(telemetry, samples, record, meta), out_dir) as drawing:
+    with Drawing(View(telemetry, samples, record, meta), out_dir, pictures) as drawing:
         if figures is not None:
             figures(record)
 

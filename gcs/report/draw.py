@@ -1,27 +1,28 @@
-"""All pictures of a report, drawn by two processes where there are two cores."""
+"""The pictures of a report, drawn by two processes where there are two cores."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import Any
 
-from gcs.report.plots import PICTURES, Picture, View
+from gcs.report.plots import Picture, View
 from gcs.report.style import style
 
 
 class Drawing:
     """The pictures in the making: a second process begins at once, `finish` joins in."""
 
-    def __init__(self, view: View, directory: Path) -> None:
+    def __init__(self, view: View, directory: Path, pictures: Sequence[Picture]) -> None:
         self._view = view
         self._directory = directory
-        self._missing = {picture.file: picture for picture in PICTURES}
+        self._pictures = pictures
+        self._missing = {picture.file: picture for picture in pictures}
         self._helper: Any = None
         if (os.cpu_count() or 1) < 2 or "fork" not in multiprocessing.get_all_start_methods():
             self._taken: Synchronized[int] | None = None
@@ -50,15 +51,15 @@ class Drawing:
     def _next(self) -> Iterator[Picture]:
         """Those that the other process has not taken."""
         if self._taken is None:
-            yield from PICTURES
+            yield from self._pictures
             return
         while True:
             with self._taken.get_lock():
                 index = self._taken.value
                 self._taken.value = index + 1
-            if index >= len(PICTURES):
+            if index >= len(self._pictures):
                 return
-            yield PICTURES[index]
+            yield self._pictures[index]
 
     def _draw(self, picture: Picture) -> None:
         picture.draw(self._view, self._directory / picture.file)

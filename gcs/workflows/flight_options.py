@@ -43,6 +43,7 @@ class FlightOptions:
     estimator: str = ""  # that somebody has brought; empty: the built-in one
     planner: str = ""
     truth_at: Address | None = None  # where the world of `connect` tells what is true
+    pictures: bool = False  # all of the report, not only that of its page
 
     @property
     def own(self) -> Own:

@@ -218,7 +218,9 @@ def _end(
         outcome = outcome.because(too_slow(tlog))
     try:
         meta = meta_of(mission, options, outcome, wall_s, truth_missing)
-        record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome))
+        record = make_report(
+            tlog, out, meta, options.quiet, lambda record: told(record, outcome), options.pictures
+        )
     except KeyboardInterrupt:
         _tell_abandoned(tlog)
         raise

@@ -16,8 +16,6 @@ from gcs.shell.display import StepDisplay
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
 
-COMMON_FILE = "flight.common.tlog"
-
 
 def make_report(
     tlog: Path,
@@ -25,14 +23,15 @@ def make_report(
     meta: FlightMeta | None,
     quiet: bool,
     figures: Callable[[Record], None] | None = None,
+    all_pictures: bool = False,
 ) -> Record:
     """Make it in `out`; without `meta`, what stands in meta.json beside the log is taken. `figures` is given
-    the record before the pictures are drawn."""
+    the record before anything is drawn. `all_pictures`: also those that the page does not contain."""
     from gcs.report.build import ReportError, build_report
 
     with StepDisplay("report", quiet) as display:
         try:
-            return build_report(tlog, out, meta, display.update, figures)
+            return build_report(tlog, out, meta, display.update, figures, all_pictures)
         except ReportError as error:
             raise InputError(str(error)) from None
         except OSError as error:
@@ -71,13 +70,15 @@ def find_log(source: Path) -> Path:
     return tlog
 
 
-def report_again(source: Path, out: Path | None, quiet: bool) -> tuple[Record, Path]:
+def report_again(
+    source: Path, out: Path | None, quiet: bool, all_pictures: bool = False
+) -> tuple[Record, Path]:
     """The report of a log, or of the directory that holds it, made again; the record and its directory."""
     tlog = find_log(source)
     beside = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else beside)
     keep_others(folder, TLOG_FILE)
-    return make_report(tlog, folder, None, quiet), folder
+    return make_report(tlog, folder, None, quiet, all_pictures=all_pictures), folder
 
 
 def make_mcap(source: Path, folder: Path) -> Path:
@@ -94,6 +95,8 @@ def make_mcap(source: Path, folder: Path) -> Path:
 
 def make_common(source: Path, folder: Path) -> Path:
     """flight.common.tlog of a log: without the private dialect."""
+    from gcs.report.build import COMMON_FILE
+
     path = folder / COMMON_FILE
     try:
         write_common(find_log(source), path)

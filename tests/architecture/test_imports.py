@@ -30,6 +30,7 @@ SHAPE = ("autopilot.vehicle.layout", "autopilot.vehicle.rotors")  # where rotors
 VEHICLE = (  # the record of a vehicle, its file, and where its rotors are
     "autopilot.vehicle.model",
     "autopilot.vehicle.file",
+    "autopilot.vehicle.shipped",
     "autopilot.vehicle.layout",
 )
 PLANT = ("sitl.plant.records", "sitl.plant.rotors")  # what the sensors may know of it

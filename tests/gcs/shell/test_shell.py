@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from autopilot.shell.options import ARGUMENTS_FOLLOW
 from autopilot.wire.codec import FrameWriter, decode
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.tlog import TlogWriter
@@ -335,6 +336,38 @@ def test_a_child_is_stopped_and_reaped(tmp_path):
         assert processes.ended() == ""
         assert os.getpgid(child.pid) == child.pid, "Ctrl-C of the terminal must not reach it"
     assert child.exit_code == -signal.SIGTERM
+
+
+def test_a_loaded_program_starts_with_the_arguments_that_follow_and_writes_to_its_log(tmp_path):
+    log = tmp_path / "log"
+    log.write_text("of an earlier flight")
+    with Processes() as processes:
+        processes.load("sitl")
+        assert processes.ended() == "", "it is none of the flight's yet"
+        child = processes.start("sitl", ["--vehicle", "no such"], log)
+        assert child.wait(WAIT_S)
+        assert processes.ended().startswith("sitl ended with exit code 2: unknown vehicle 'no such'")
+    assert log.read_text().startswith("sitl: unknown vehicle 'no such'")
+
+
+def test_a_loaded_program_that_has_ended_is_started_anew(tmp_path):
+    with Processes() as processes:
+        processes.load("no_such_module")
+        (waiting,) = processes._loaded.values()
+        assert waiting.wait(WAIT_S)
+        child = processes.start("no_such_module", [], tmp_path / "log")
+        assert child is not waiting and child.wait(WAIT_S)
+        assert processes.ended().endswith("No module named no_such_module")
+
+
+def test_a_loaded_program_that_is_never_started_is_stopped():
+    with Processes() as processes:
+        processes.load("sitl")
+        (waiting,) = processes._loaded.values()
+    assert waiting.exit_code == -signal.SIGTERM
+    command = [sys.executable, "-m", "sitl", ARGUMENTS_FOLLOW]
+    ended = subprocess.run(command, check=True, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAIT_S)
+    assert (ended.stdout, ended.stderr) == (b"", b""), "nobody is there any more to start it"
 
 
 def test_a_deaf_child_is_killed(tmp_path, monkeypatch):
