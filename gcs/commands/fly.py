@@ -189,7 +189,7 @@ def fly_command(
 
     processes = ctx.with_resource(Processes())
     if connect is None and firmware is None:
-        processes.load("sitl", "autopilot")  # while we load ourselves, and look at what is to be flown
+        processes.load("autopilot", "sitl")  # while we load ourselves; the longer one first
     from gcs.workflows.flight_options import FlightOptions
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record

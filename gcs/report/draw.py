@@ -1,65 +1,86 @@
-"""The pictures of a report, drawn by two processes where there are two cores."""
+"""The pictures of a report, drawn by a process beside ours where there are two cores.
+
+What pictures are drawn with takes most of a second to load: the other process does that while the flight is
+flown, or read from its log.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import Any
 
-from gcs.report.plots import Picture, View
+from gcs.report.plots import PICTURES, Picture, View
 from gcs.report.style import style
+from gcs.report.warm import load_drawing
 
 
 class Drawing:
-    """The pictures in the making: a second process begins at once, `finish` joins in."""
+    """The pictures in the making: the other process loads from `start` on and draws from `begin` on."""
 
-    def __init__(self, view: View, directory: Path, pictures: Sequence[Picture]) -> None:
-        self._view = view
+    def __init__(self, directory: Path, all_pictures: bool = False) -> None:
+        """Without `all_pictures` the one that the page contains is drawn."""
         self._directory = directory
-        self._pictures = pictures
-        self._missing = {picture.file: picture for picture in pictures}
+        self.pictures = PICTURES if all_pictures else PICTURES[:1]
+        self._missing = {picture.file: picture for picture in self.pictures}
+        self._view: View
         self._helper: Any = None
-        if (os.cpu_count() or 1) < 2 or "fork" not in multiprocessing.get_all_start_methods():
-            self._taken: Synchronized[int] | None = None
+        self._taken: Synchronized[int] | None = None
+
+    def start(self) -> None:
+        """Begin the other process, unless it runs already or there is one core."""
+        alone = (os.cpu_count() or 1) < 2 or "fork" not in multiprocessing.get_all_start_methods()
+        if self._taken is not None or alone:
             return
-        context = multiprocessing.get_context("fork")  # it draws from the same memory
+        context = multiprocessing.get_context("fork")  # with what is loaded here
         self._taken = context.Value("i", 0)
-        self._done, theirs = context.Pipe(duplex=False)
+        self._pipe, theirs = context.Pipe()
         self._helper = context.Process(target=self._help, args=(theirs,), daemon=True)
         self._helper.start()
         theirs.close()
 
+    def begin(self, view: View) -> None:
+        """What is drawn."""
+        self._view = view
+        self.start()
+        if self._helper is not None:
+            with suppress(OSError):  # it was killed
+                self._pipe.send(view)
+
     def finish(self, done: Callable[[Picture], None]) -> None:
-        """Draw what nobody draws yet and wait for the rest; `done` is told of each picture."""
-        with style():
-            for picture in self._next():
-                self._draw(picture)
-                self._tell(picture.file, done)
-                while self._helper is not None and self._done.poll():
-                    self._receive(done)
-            while self._helper is not None:
-                self._receive(done)
-            for picture in list(self._missing.values()):  # the helper was killed
-                self._draw(picture)
-                self._tell(picture.file, done)
+        """Wait until all are drawn, of which `done` is told. Of several we draw some, too."""
+        if self._helper is None or len(self.pictures) > 1:
+            with style():
+                for picture in self._next():
+                    self._draw(picture)
+                    self._tell(picture.file, done)
+                    while self._helper is not None and self._pipe.poll():
+                        self._receive(done)
+        while self._helper is not None:
+            self._receive(done)
+        if self._missing:  # the helper was killed
+            with style():
+                for picture in list(self._missing.values()):
+                    self._draw(picture)
+                    self._tell(picture.file, done)
 
     def _next(self) -> Iterator[Picture]:
         """Those that the other process has not taken."""
         if self._taken is None:
-            yield from self._pictures
+            yield from self.pictures
             return
         while True:
             with self._taken.get_lock():
                 index = self._taken.value
                 self._taken.value = index + 1
-            if index >= len(self._pictures):
+            if index >= len(self.pictures):
                 return
-            yield self._pictures[index]
+            yield self.pictures[index]
 
     def _draw(self, picture: Picture) -> None:
         picture.draw(self._view, self._directory / picture.file)
@@ -70,16 +91,20 @@ class Drawing:
     def _receive(self, done: Callable[[Picture], None]) -> None:
         """Take one word of the helper, or note that it has ended."""
         try:
-            self._tell(self._done.recv(), done)
-        except EOFError:
+            self._tell(self._pipe.recv(), done)
+        except (EOFError, OSError):
             self._helper.join()
             self._helper = None
 
-    def _help(self, answer: Connection) -> None:
-        with suppress(KeyboardInterrupt, OSError), style():  # our parent has its own, and draws what is left
-            for picture in self._next():
-                self._draw(picture)
-                answer.send(picture.file)
+    def _help(self, parent: Connection) -> None:
+        self._pipe.close()  # our parent's end, which we would not see closed
+        with suppress(KeyboardInterrupt, OSError, EOFError):  # our parent is gone, or draws what is left
+            load_drawing()
+            self._view = parent.recv()
+            with style():
+                for picture in self._next():
+                    self._draw(picture)
+                    parent.send(picture.file)
 
     def __enter__(self) -> Drawing:
         return self

@@ -15,12 +15,11 @@ _NEEDED = (
     "gcs.report.draw",
     "gcs.report.html",
     "jinja2",
-    "matplotlib.backends.backend_agg",
-    "mpl_toolkits.mplot3d",
     "pyarrow.parquet",
     "rich.console",
     "rich.table",
 )
+_DRAWN_WITH = ("matplotlib.backends.backend_agg", "mpl_toolkits.mplot3d")
 
 
 def load(enough: Callable[[], bool] = lambda: False) -> None:
@@ -31,10 +30,17 @@ def load(enough: Callable[[], bool] = lambda: False) -> None:
         import_module(name)
 
 
+def load_drawing() -> None:
+    """Import what pictures are drawn with."""
+    for name in _DRAWN_WITH:
+        import_module(name)
+
+
 def main() -> None:
     """Draw a picture of nothing."""
     print("matplotlib", flush=True)
     load()
+    load_drawing()
     from matplotlib.figure import Figure
 
     from gcs.report.style import style

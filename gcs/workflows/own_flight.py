@@ -21,6 +21,7 @@ from gcs.workflows.stopwatch import Stopwatch
 from missions.model import Mission
 
 if TYPE_CHECKING:
+    from gcs.report.draw import Drawing
     from gcs.workflows.flight_page import FlightPage
 
 
@@ -45,8 +46,10 @@ def fly_own(
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None = None,
+    drawing: Drawing | None = None,
 ) -> FlightClient:
-    """Fly with the simulator and the autopilot that were started for it."""
+    """Fly with the simulator and the autopilot that were started for it. In lockstep there is a core to
+    spare, on which `drawing` loads meanwhile."""
     # one of our programs that is stopped for long is named before the vehicle is taken for lost
     silence_us = round(1e6 * STOPPED_LIMIT_S) + LINK_TIMEOUT_US
     client = flight_client(mission, options, Home(), silence_us)
@@ -55,6 +58,8 @@ def fly_own(
         watch.start()
         if options.speed is None:
             own.processes.share_one_core()
+            if drawing is not None:
+                drawing.start()
 
     with FlightDisplay(mission.name, options.quiet) as display:
         link = own.vehicle, own.truth, own.processes.ended, display, stop, begun, page

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from gcs.report import draw
 from gcs.report.draw import Drawing
 from gcs.report.plots import Picture
 from gcs.shell.stopping import StopRequest
@@ -17,7 +18,7 @@ from gcs.shell.stopping import StopRequest
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core: one process draws")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
 def test_who_draws_beside_us_leaves_the_terminals_signals_to_us(
-    capfd: pytest.CaptureFixture[str], number: signal.Signals
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], number: signal.Signals
 ) -> None:
     ours = os.getpid()
 
@@ -29,9 +30,10 @@ def test_who_draws_beside_us_leaves_the_terminals_signals_to_us(
 
     heard, told = os.pipe()
     view: Any = None
-    pictures = [Picture("one", "", asked_to_stop)]
+    monkeypatch.setattr(draw, "PICTURES", [Picture("one", "", asked_to_stop)])
     drawn: list[str] = []
-    with StopRequest("stopping") as stop, Drawing(view, Path(), pictures) as drawing:
+    with StopRequest("stopping") as stop, Drawing(Path()) as drawing:
+        drawing.begin(view)
         assert os.read(heard, 5) == b"drawn"
         drawing.finish(lambda picture: drawn.append(picture.file))
         assert not stop
