@@ -189,7 +189,8 @@ def fly_command(
 
     processes = ctx.with_resource(Processes())
     if connect is None and firmware is None:
-        processes.load("autopilot", "sitl")  # while we load ourselves; the longer one first
+        for name in ("autopilot", "sitl"):  # the longer one first
+            processes.load(name)  # while we load ourselves
     from gcs.workflows.flight_options import FlightOptions
     from gcs.workflows.fly import fly
     from gcs.workflows.report import print_record

@@ -152,12 +152,12 @@ class Processes:
         self._works = False
         self._stopped_s: dict[int, float] = {}  # since when a child is seen to be stopped, by its id
 
-    def load(self, *names: str) -> None:
-        """Have these programs of ours load what they need, which takes a second, before they are started."""
-        for name in names:
-            with suppress(OSError):  # of which `start` will tell
-                command = [sys.executable, "-m", name, ARGUMENTS_FOLLOW]
-                self._loaded[name] = Child(name, command, Path(os.devnull), waits=True)
+    def load(self, name: str) -> Child:
+        """Have a program of ours load what it needs, which takes it a second, before it is started."""
+        with _told(name):
+            command = [sys.executable, "-m", name, ARGUMENTS_FOLLOW]
+            child = self._loaded[name] = Child(name, command, Path(os.devnull), waits=True)
+        return child
 
     def start(self, name: str, arguments: Sequence[str], log: Path, inherits: Sequence[int] = ()) -> Child:
         """Start `python -m NAME ARGUMENTS` with its output in `log`: the one that is loaded, or else a new

@@ -352,8 +352,7 @@ def test_a_loaded_program_starts_with_the_arguments_that_follow_and_writes_to_it
 
 def test_a_loaded_program_that_has_ended_is_started_anew(tmp_path):
     with Processes() as processes:
-        processes.load("no_such_module")
-        (waiting,) = processes._loaded.values()
+        waiting = processes.load("no_such_module")
         assert waiting.wait(WAIT_S)
         child = processes.start("no_such_module", [], tmp_path / "log")
         assert child is not waiting and child.wait(WAIT_S)
@@ -362,8 +361,7 @@ def test_a_loaded_program_that_has_ended_is_started_anew(tmp_path):
 
 def test_a_loaded_program_that_is_never_started_is_stopped():
     with Processes() as processes:
-        processes.load("sitl")
-        (waiting,) = processes._loaded.values()
+        waiting = processes.load("sitl")
     assert waiting.exit_code == -signal.SIGTERM
     command = [sys.executable, "-m", "sitl", ARGUMENTS_FOLLOW]
     ended = subprocess.run(command, check=True, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAIT_S)
