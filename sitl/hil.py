@@ -27,6 +27,7 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.convert.simulator import padded, read_hil_actuator_controls
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.parameter_table import ParameterTable
+from autopilot.wire.periods import next_multiple
 from autopilot.wire.simulator_frames import Answer, answer_in
 from sitl.interfaces.frame import Frame, frame_of
 from sitl.messages import (
@@ -375,7 +376,7 @@ class HilSimulator:
         periods_us = [self._status_us, _BOOT_PERIOD_US]
         if core.truth.drive.battery > 0.0:
             periods_us.append(_BATTERY_PERIOD_US)
-        return min(core.pulse_changes_us, *(now_us - now_us % each_us + each_us for each_us in periods_us))
+        return min(core.pulse_changes_us, *(next_multiple(now_us, each_us) for each_us in periods_us))
 
     def ran(self, framed: bool) -> None:
         """Take over what machine code has made of `running`; `framed`: the sensors of the tick at which the

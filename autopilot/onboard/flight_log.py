@@ -19,6 +19,7 @@ from autopilot.services.streams import NEVER_US
 from autopilot.wire import ulog
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.parameter_table import ParameterTable
+from autopilot.wire.periods import next_multiple
 from autopilot.wire.ulog import UlogWriter
 
 TAIL_US = 1_000_000  # so long the log goes on behind the disarming
@@ -131,7 +132,7 @@ class FlightLog:
             self._follow_parameters(now_us)
         if now_us >= self._due_us and rate_hz > 0.0:
             period_us = round(1e6 / rate_hz)
-            self._due_us = now_us - now_us % period_us + period_us
+            self._due_us = next_multiple(now_us, period_us)
             self._log(make(), now_us)
         if rate_hz > 0.0:
             self._next_us = self._due_us
@@ -199,7 +200,7 @@ class FlightLog:
         state = (sample.snapshot.armed, sample.snapshot.phase)
         self._add(self._records.of(sample, now_us), now_us)
         if now_us >= self._slow_us or state != self._state:
-            self._slow_us = now_us - now_us % SLOW_US + SLOW_US
+            self._slow_us = next_multiple(now_us, SLOW_US)
             self._state = state
             for number, (_, build) in enumerate(SLOW, start=len(FAST)):
                 self._record(number, build(sample), now_us)

@@ -79,6 +79,7 @@ from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.dialect import plumbline as mavlink
 from autopilot.wire.fence import read_fence, read_rally
 from autopilot.wire.items import WireItem, endless_from, located_steps, unflown
+from autopilot.wire.periods import next_multiple
 from autopilot.wire.signing import Signing
 from missions.model import ReturnHome, Signals, Step, Term, Waypoint
 
@@ -544,14 +545,16 @@ class Onboard:
         self._ground.follow(self.parameters)
         self._moments.battery = battery_constants(self.parameters)
         pack(self._moments.battery, self._battery_row, 0)
+        values, learned = self.parameters.values(), self.parameters.learned
+        followed = {name: value for name, value in values.items() if name not in learned}, self._shortest_us
+        if followed == self._followed:  # the simulator has told more of its own, by which nobody flies
+            return
+        self._followed = followed
         gains = Gains(self.parameters, every, self._options.own)
         if self._options.clock_waits or self.tick <= FIRST_TICKS:
             self._take_setup(gains.done())
-        values, learned = self.parameters.values(), self.parameters.learned
-        followed = {name: value for name, value in values.items() if name not in learned}, self._shortest_us
-        if followed != self._followed and self.tick > FIRST_TICKS and not self._options.clock_waits:
+        else:
             self._gains = gains
-        self._followed = followed
 
     def _take_setup(self, setup: Setup) -> None:
         """Fly by other parameters from the next tick on."""
@@ -613,7 +616,7 @@ class Onboard:
         """
         if self.now_us < self._next_question_us:
             return None
-        self._next_question_us = self.now_us - self.now_us % GROUND_WINDOW_US + GROUND_WINDOW_US
+        self._next_question_us = next_multiple(self.now_us, GROUND_WINDOW_US)
         return self.endpoint.datagram(link, (_TIMESYNC, (0, self.now_us * 1000)), LOCKSTEP_COMPONENT)
 
     def restore_world(self, values: Mapping[str, float]) -> None:

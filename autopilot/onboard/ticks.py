@@ -66,6 +66,7 @@ from autopilot.onboard.running import (
 )
 from autopilot.services.stream_frames import STREAMS_ROOM
 from autopilot.wire.compiled import FRAME_ROOM, Origin, put_frame
+from autopilot.wire.periods import next_multiple
 
 # what becomes of a tick: it is FLOWN, and a window may have ENDED with it; or Python is to fly it: since what
 # was HEARD is not the plain next tick, or since its estimate is made and the supervisor is to DECIDE upon it
@@ -165,7 +166,7 @@ def _tell(run: Running, now_us: int, sane: bool) -> bool:
         _put_streams(run, bits)
     ends = now_us >= numbers[QUESTION_US]
     if ends:
-        numbers[QUESTION_US] = now_us - now_us % numbers[WINDOW_US] + numbers[WINDOW_US]
+        numbers[QUESTION_US] = next_multiple(now_us, numbers[WINDOW_US])
         origin = Origin(numbers[ASIDE_SEQUENCE], numbers[OWN_SYSTEM], numbers[ASIDE_COMPONENT])
         values = (0, now_us * 1000)
         end = put_frame(TIMESYNC, values, streams.payload, streams.said, numbers[SAID], origin)
@@ -182,7 +183,7 @@ def _tell(run: Running, now_us: int, sane: bool) -> bool:
 def _put_records(run: Running, now_us: int, sane: bool) -> None:
     """Write the records of an instant that has been put together."""
     numbers, log = run.numbers, run.log
-    numbers[LOG_US] = now_us - now_us % numbers[LOG_PERIOD_US] + numbers[LOG_PERIOD_US]
+    numbers[LOG_US] = next_multiple(now_us, numbers[LOG_PERIOD_US])
     rows = (run.streams.instant, run.readings.imu, log.home, now_us, log.row)
     call_kernel_at(run.code.put_sample, (rows, log.copies, log.wide, log.records))
     at = numbers[LOGGED]

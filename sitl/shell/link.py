@@ -11,6 +11,7 @@ from collections.abc import Callable
 from autopilot.shell.options import Address, datagram_socket, reason, receive, send, set_timeout, shown
 from autopilot.wire.codec import FrameWriter
 from autopilot.wire.dialect import plumbline as mavlink
+from autopilot.wire.periods import next_multiple
 from sitl.hil import HilSimulator
 from sitl.messages import SIMULATOR_COMPONENT, VEHICLE_SYSTEM
 
@@ -95,7 +96,7 @@ class Link:
         if truth:
             self._gathered.append(truth)
         if not self.window_ends_us - TRUTH_WINDOW_US < now_us < self.window_ends_us:
-            self.window_ends_us = now_us - now_us % TRUTH_WINDOW_US + TRUTH_WINDOW_US
+            self.window_ends_us = next_multiple(now_us, TRUTH_WINDOW_US)
             self._tell_gathered()
 
     def take_gathered(self) -> bytes:

@@ -24,6 +24,7 @@ from autopilot.shell.machine_sockets import (
 )
 from autopilot.shell.options import LARGEST_DATAGRAM, Address
 from autopilot.wire.compiled import Bytes
+from autopilot.wire.periods import next_multiple
 from sitl.hil import HilSimulator
 from sitl.running import NOW_US, RAN, Ints, Running
 from sitl.shell.link import TRUTH_WINDOW_US, Link
@@ -57,7 +58,7 @@ def _tell(wire: Wire, run: Running) -> None:
     wire.sizes[_GATHERED] += put_truth_due(run, wire.gathered[wire.sizes[_GATHERED] :])
     ends_us = wire.window_ends_us[0]
     if not ends_us - TRUTH_WINDOW_US < now_us < ends_us:
-        wire.window_ends_us[0] = now_us - now_us % TRUTH_WINDOW_US + TRUTH_WINDOW_US
+        wire.window_ends_us[0] = next_multiple(now_us, TRUTH_WINDOW_US)
         if wire.sizes[_GATHERED] > 0:
             send_to_at(
                 wire.truth_fd,
