@@ -35,8 +35,8 @@ _PR_SET_TIMERSLACK = 29
 class ProgramCommand(click.Command):
     """A program that tells wrong usage in one line, and ends with 2.
 
-    Whoever starts it for a flight may have it load before it is known which: with `ARGUMENTS_FOLLOW` alone it
-    waits for a line on stdin.
+    It can be loaded before it is known with what it is to start: with `ARGUMENTS_FOLLOW` alone it waits for
+    its arguments on stdin.
     """
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:

@@ -5,6 +5,9 @@ seven and last seven are decided by position and six derivatives at the two ends
 from whatever comes before it, and hands over to what follows, without a jump of a rotor force. The rest is
 free: what an optimisation chooses (`autopilot.trajectory.shaping`, `autopilot.trajectory.waypoint_path`).
 
+SciPy's splines, and its optimiser, are named in full (`scipy.interpolate.BSpline`): it loads them when they
+are first used, which takes a quarter of a second, and most missions need none.
+
 For flight a spline becomes a table: for each interval the coefficients of (t - t_k)^n, so that `evaluate` is
 Horner's rule with all derivatives at once.
 """
