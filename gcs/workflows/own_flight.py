@@ -55,11 +55,11 @@ def fly_own(
     client = flight_client(mission, options, Home(), silence_us)
 
     def begun() -> None:
-        watch.start()
         if options.speed is None:
             own.processes.share_one_core()
             if drawing is not None:
                 drawing.start()
+        watch.start()
 
     with FlightDisplay(mission.name, options.quiet) as display:
         link = own.vehicle, own.truth, own.processes.ended, display, stop, begun, page
