@@ -157,7 +157,6 @@ class Flight:
     def report(self, out: str | Path, quiet: bool = True, pictures: bool = False) -> Path:
         """Write what `gcs fly` leaves into the directory `out`, but for the autopilot's own log; the path of
         the page. With `pictures` also those that `gcs fly --pictures` draws."""
-        from gcs.report.draw import Drawing
         from gcs.workflows.report import make_report
 
         folder = file_path("out", out)
@@ -165,7 +164,7 @@ class Flight:
             make_folder(folder)
             keep_others(folder, TLOG_FILE)
             (folder / TLOG_FILE).write_bytes(self.tlog)
-            make_report(folder / TLOG_FILE, folder, self._meta, quiet, drawing=Drawing(folder, pictures))
+            make_report(folder / TLOG_FILE, folder, self._meta, quiet, all_pictures=pictures)
         return folder / PAGE_FILE
 
     @cached_property

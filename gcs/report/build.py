@@ -5,15 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gcs.analysis.record import FlightMeta, Record, flight_record
 from gcs.analysis.samples import samples_of
 from gcs.analysis.telemetry import load_telemetry
 from gcs.folders import PAGE_FILE, SUMMARY_FILE
-
-if TYPE_CHECKING:
-    from gcs.report.draw import Drawing
 
 META_FILE = "meta.json"
 PARQUET_FILE = "flight.parquet"
@@ -48,15 +44,14 @@ def build_report(
     meta: FlightMeta | None = None,
     progress: Progress | None = None,
     figures: Callable[[Record], None] | None = None,
-    drawing: Drawing | None = None,
+    all_pictures: bool = False,
 ) -> Record:
     """Writes summary.json, meta.json, flight.parquet, overview.png and report.html; returns the record.
 
     `figures` is given the record as soon as it stands, before what takes longer. `meta` is that of a new
     flight, and what was made on demand of another one in the directory is deleted; without it, meta.json
     beside the log is read. A log that is cut short, empty or of a lost flight gives a record all the same,
-    with None for what cannot be known. `drawing` draws into the same directory; without it the picture of the
-    page alone is drawn.
+    with None for what cannot be known. With `all_pictures` those that no page needs are drawn too.
     """
     from gcs.report.draw import Drawing
     from gcs.report.plots import PICTURES, View
@@ -71,8 +66,8 @@ def build_report(
         for name in (MCAP_FILE, COMMON_FILE, *(picture.file for picture in PICTURES)):
             (out_dir / name).unlink(missing_ok=True)
 
-    drawing = drawing or Drawing(out_dir)
-    ahead = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in drawing.pictures), PAGE_FILE]
+    pictures = PICTURES if all_pictures else PICTURES[:1]
+    ahead = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
     total = len(ahead)
 
     def done(step: str) -> None:
@@ -80,8 +75,7 @@ def build_report(
         tell(total - len(ahead), total, ahead[0] if ahead else "done")
 
     tell(0, total, ahead[0])
-    with drawing:
-        drawing.start()
+    with Drawing(out_dir, pictures) as drawing:
         telemetry = load_telemetry(tlog_path)
         samples = samples_of(telemetry)
         record = flight_record(telemetry, meta, samples)
@@ -89,9 +83,9 @@ def build_report(
         _write_json(out_dir / META_FILE, meta.to_json())
         _write_json(out_dir / SUMMARY_FILE, record)
         done(ahead[0])
-        drawing.begin(View(telemetry, samples, record, meta))
         if figures is not None:
             figures(record)
+        drawing.begin(View(telemetry, samples, record, meta))
 
         from gcs.analysis.parquet import write_flight
         from gcs.report.html import render_page

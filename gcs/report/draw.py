@@ -1,41 +1,35 @@
 """The pictures of a report, drawn by a process beside ours where there are two cores.
 
-What pictures are drawn with takes most of a second to load: the other process does that while the flight is
-flown, or read from its log.
+What pictures are drawn with takes half a second to load: the other process does that while we read the log.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import Any
 
-from gcs.report.plots import PICTURES, Picture, View
+from gcs.report.plots import Picture, View
 from gcs.report.style import style
 from gcs.report.warm import load_drawing
 
 
 class Drawing:
-    """The pictures in the making: the other process loads from `start` on and draws from `begin` on."""
+    """The pictures in the making: the other process loads at once, and draws from `begin` on."""
 
-    def __init__(self, directory: Path, all_pictures: bool = False) -> None:
-        """Without `all_pictures` the one that the page contains is drawn."""
+    def __init__(self, directory: Path, pictures: Sequence[Picture]) -> None:
         self._directory = directory
-        self.pictures = PICTURES if all_pictures else PICTURES[:1]
-        self._missing = {picture.file: picture for picture in self.pictures}
+        self._pictures = pictures
+        self._missing = {picture.file: picture for picture in pictures}
         self._view: View
         self._helper: Any = None
         self._taken: Synchronized[int] | None = None
-
-    def start(self) -> None:
-        """Begin the other process, unless it runs already or there is one core."""
-        alone = (os.cpu_count() or 1) < 2 or "fork" not in multiprocessing.get_all_start_methods()
-        if self._taken is not None or alone:
+        if (os.cpu_count() or 1) < 2 or "fork" not in multiprocessing.get_all_start_methods():
             return
         context = multiprocessing.get_context("fork")  # with what is loaded here
         self._taken = context.Value("i", 0)
@@ -45,16 +39,15 @@ class Drawing:
         theirs.close()
 
     def begin(self, view: View) -> None:
-        """What is drawn."""
+        """What is drawn; waits until the other process has loaded."""
         self._view = view
-        self.start()
         if self._helper is not None:
             with suppress(OSError):  # it was killed
                 self._pipe.send(view)
 
     def finish(self, done: Callable[[Picture], None]) -> None:
         """Wait until all are drawn, of which `done` is told. Of several we draw some, too."""
-        if self._helper is None or len(self.pictures) > 1:
+        if self._helper is None or len(self._pictures) > 1:
             with style():
                 for picture in self._next():
                     self._draw(picture)
@@ -72,15 +65,15 @@ class Drawing:
     def _next(self) -> Iterator[Picture]:
         """Those that the other process has not taken."""
         if self._taken is None:
-            yield from self.pictures
+            yield from self._pictures
             return
         while True:
             with self._taken.get_lock():
                 index = self._taken.value
                 self._taken.value = index + 1
-            if index >= len(self.pictures):
+            if index >= len(self._pictures):
                 return
-            yield self.pictures[index]
+            yield self._pictures[index]
 
     def _draw(self, picture: Picture) -> None:
         picture.draw(self._view, self._directory / picture.file)

@@ -37,7 +37,6 @@ from missions.model import Mission
 if TYPE_CHECKING:
     from gcs.analysis.record import Record
     from gcs.clients.flight import FlightClient, Outcome
-    from gcs.report.draw import Drawing
     from gcs.shell.processes import Processes
     from gcs.workflows.flight_page import FlightPage, PageOptions
 
@@ -89,11 +88,8 @@ def fly(
             warm_up(flight_parts(laws), options.quiet)
             if not options.quiet:
                 say("starting the simulator and the autopilot")
-        from gcs.report.draw import Drawing
-
         with (
             StopRequest("stopping; Ctrl-C again abandons the report") as stop,
-            Drawing(out, options.pictures) as drawing,
             _page(mission, options, view, stop) as page,
         ):
             watch = Stopwatch()
@@ -103,7 +99,7 @@ def fly(
                 if options.firmware is not None:
                     client = _fly_firmware(mission, options, options.firmware, log, out, stop, watch, page)
                 elif options.connect is None:
-                    client = _fly_own(mission, options, log, out, stop, watch, page, processes, drawing)
+                    client = _fly_own(mission, options, log, out, stop, watch, page, processes)
                 else:
                     client, truth_missing = _fly_running(
                         mission, options, options.connect, log, stop, watch, page
@@ -116,9 +112,7 @@ def fly(
                 if page is not None:
                     page.tell(outcome=outcome.name, reason=outcome.reason)
 
-            flight = _end(
-                mission, options, client, truth_missing, watch.stop(), out, folder, stop, tell, drawing
-            )
+            flight = _end(mission, options, client, truth_missing, watch.stop(), out, folder, stop, tell)
             if page is not None:
                 page.tell(report=str(out.resolve()))
                 stop.hint = "the page is closed"  # there is no report left to be abandoned
@@ -150,7 +144,6 @@ def _fly_own(
     watch: Stopwatch,
     page: FlightPage | None,
     processes: Processes | None,
-    drawing: Drawing,
 ) -> FlightClient:
     with own_vehicle(options, out, processes) as own:
         from gcs.workflows.own_flight import fly_own  # while they load
@@ -160,7 +153,7 @@ def _fly_own(
             from gcs.report.warm import load as load_report
 
             load_report(lambda: own.vehicle.waiting)  # there is a core to spare until the vehicle speaks
-        return fly_own(mission, options, log, own, stop, watch, page, drawing)
+        return fly_own(mission, options, log, own, stop, watch, page)
 
 
 def _fly_firmware(
@@ -204,7 +197,6 @@ def _end(
     folder: FlightFolder,
     stop: StopRequest,
     told: Told,
-    drawing: Drawing,
 ) -> Flight:
     from gcs.clients.flight import Outcome
 
@@ -226,7 +218,9 @@ def _end(
         outcome = outcome.because(too_slow(tlog))
     try:
         meta = meta_of(mission, options, outcome, wall_s, truth_missing)
-        record = make_report(tlog, out, meta, options.quiet, lambda record: told(record, outcome), drawing)
+        record = make_report(
+            tlog, out, meta, options.quiet, lambda record: told(record, outcome), options.pictures
+        )
     except KeyboardInterrupt:
         _tell_abandoned(tlog)
         raise

@@ -21,7 +21,6 @@ from gcs.workflows.stopwatch import Stopwatch
 from missions.model import Mission
 
 if TYPE_CHECKING:
-    from gcs.report.draw import Drawing
     from gcs.workflows.flight_page import FlightPage
 
 
@@ -46,20 +45,16 @@ def fly_own(
     stop: StopRequest,
     watch: Stopwatch,
     page: FlightPage | None = None,
-    drawing: Drawing | None = None,
 ) -> FlightClient:
-    """Fly with the simulator and the autopilot that were started for it. In lockstep there is a core to
-    spare, on which `drawing` loads meanwhile."""
+    """Fly with the simulator and the autopilot that were started for it."""
     # one of our programs that is stopped for long is named before the vehicle is taken for lost
     silence_us = round(1e6 * STOPPED_LIMIT_S) + LINK_TIMEOUT_US
     client = flight_client(mission, options, Home(), silence_us)
 
     def begun() -> None:
+        watch.start()
         if options.speed is None:
             own.processes.share_one_core()
-            if drawing is not None:
-                drawing.start()
-        watch.start()
 
     with FlightDisplay(mission.name, options.quiet) as display:
         link = own.vehicle, own.truth, own.processes.ended, display, stop, begun, page

@@ -15,7 +15,6 @@ from gcs.shell.display import StepDisplay
 
 if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
-    from gcs.report.draw import Drawing
 
 
 def make_report(
@@ -24,15 +23,15 @@ def make_report(
     meta: FlightMeta | None,
     quiet: bool,
     figures: Callable[[Record], None] | None = None,
-    drawing: Drawing | None = None,
+    all_pictures: bool = False,
 ) -> Record:
     """Make it in `out`; without `meta`, what stands in meta.json beside the log is taken. `figures` is given
-    the record before anything is drawn, by `drawing` if more is to be drawn than the page contains."""
+    the record before anything is drawn. `all_pictures`: also those that the page does not contain."""
     from gcs.report.build import ReportError, build_report
 
     with StepDisplay("report", quiet) as display:
         try:
-            return build_report(tlog, out, meta, display.update, figures, drawing)
+            return build_report(tlog, out, meta, display.update, figures, all_pictures)
         except ReportError as error:
             raise InputError(str(error)) from None
         except OSError as error:
@@ -75,13 +74,11 @@ def report_again(
     source: Path, out: Path | None, quiet: bool, all_pictures: bool = False
 ) -> tuple[Record, Path]:
     """The report of a log, or of the directory that holds it, made again; the record and its directory."""
-    from gcs.report.draw import Drawing
-
     tlog = find_log(source)
     beside = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else beside)
     keep_others(folder, TLOG_FILE)
-    return make_report(tlog, folder, None, quiet, drawing=Drawing(folder, all_pictures)), folder
+    return make_report(tlog, folder, None, quiet, all_pictures=all_pictures), folder
 
 
 def make_mcap(source: Path, folder: Path) -> Path:

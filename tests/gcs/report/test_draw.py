@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from gcs.report import draw
 from gcs.report.draw import Drawing
 from gcs.report.plots import Picture
 from gcs.shell.stopping import StopRequest
@@ -18,7 +17,7 @@ from gcs.shell.stopping import StopRequest
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core: one process draws")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
 def test_who_draws_beside_us_leaves_the_terminals_signals_to_us(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], number: signal.Signals
+    capfd: pytest.CaptureFixture[str], number: signal.Signals
 ) -> None:
     ours = os.getpid()
 
@@ -30,9 +29,9 @@ def test_who_draws_beside_us_leaves_the_terminals_signals_to_us(
 
     heard, told = os.pipe()
     view: Any = None
-    monkeypatch.setattr(draw, "PICTURES", [Picture("one", "", asked_to_stop)])
+    pictures = [Picture("one", "", asked_to_stop)]
     drawn: list[str] = []
-    with StopRequest("stopping") as stop, Drawing(Path()) as drawing:
+    with StopRequest("stopping") as stop, Drawing(Path(), pictures) as drawing:
         drawing.begin(view)
         assert os.read(heard, 5) == b"drawn"
         drawing.finish(lambda picture: drawn.append(picture.file))

@@ -23,7 +23,6 @@ from gcs.analysis.record import FlightMeta, Record, jsonable
 from gcs.analysis.telemetry import load_telemetry
 from gcs.report import style
 from gcs.report.build import ReportError, build_report, load_meta
-from gcs.report.draw import Drawing
 from gcs.report.plots import PICTURES
 from gcs.report.table import record_table
 from gcs.report.track import snapshots
@@ -50,7 +49,7 @@ def built(tmp_path_factory):
     out = tmp_path_factory.mktemp("report")
     told = []
     tlog = flights.case_b(duration_s=12.0).write(out / "flight.tlog")
-    record = build_report(tlog, out, META, lambda *step: told.append(step), drawing=Drawing(out, True))
+    record = build_report(tlog, out, META, lambda *step: told.append(step), all_pictures=True)
     return out, record, told
 
 
@@ -92,7 +91,7 @@ def test_the_same_log_gives_the_same_report_without_what_imports_pandas(built, t
     for name in ("array", "table"):
         monkeypatch.delattr(pyarrow, name)
     # meta.json lies beside the log: it is read when nothing is passed
-    again = build_report(out / "flight.tlog", tmp_path, drawing=Drawing(tmp_path, True))
+    again = build_report(out / "flight.tlog", tmp_path, all_pictures=True)
     assert again == {**record, "report_dir": str(tmp_path)}
     for name in FILES - {"summary.json", "flight.parquet"}:
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
@@ -235,7 +234,7 @@ def test_the_table_shows_what_is_known(built):
 @pytest.mark.parametrize("content", [b"", b"no telemetry at all, but a text" * 9])
 def test_a_log_without_a_flight_gives_a_report(tmp_path, content):
     (tmp_path / "flight.tlog").write_bytes(content)
-    record = build_report(tmp_path / "flight.tlog", tmp_path, drawing=Drawing(tmp_path, True))
+    record = build_report(tmp_path / "flight.tlog", tmp_path, all_pictures=True)
     assert record["outcome"] == "no telemetry"
     assert record["load_error_max_m"] is None
     assert {path.name for path in tmp_path.iterdir()} == FILES | {"flight.tlog"}
@@ -255,7 +254,7 @@ def test_a_flight_that_is_lost_gives_a_report(tmp_path):
     path = flight.write(tmp_path / "flight.tlog")
     path.write_bytes(path.read_bytes()[:-11])  # and the last record is torn
     told = FlightMeta(outcome="diverged", reason="no finite state")
-    record = build_report(path, tmp_path, told, drawing=Drawing(tmp_path, True))
+    record = build_report(path, tmp_path, told, all_pictures=True)
     assert record["outcome"] == "diverged"
     assert "end where the flight was given up" in (tmp_path / "report.html").read_text(encoding="utf-8")
     text = (tmp_path / "summary.json").read_text()
@@ -269,7 +268,7 @@ def test_a_flight_that_is_lost_gives_a_report(tmp_path):
 def test_a_message_that_never_came_gives_a_report(tmp_path, silent):
     flight = flights.flight(1.0, flights.still)
     flight.drop = lambda i, kind: kind == silent
-    record = build_report(flight.write(tmp_path / "flight.tlog"), tmp_path, drawing=Drawing(tmp_path, True))
+    record = build_report(flight.write(tmp_path / "flight.tlog"), tmp_path, all_pictures=True)
     missing = {
         "load_setpoint": "load_error_max_m",
         "load_state": "load_error_max_m",
@@ -371,7 +370,7 @@ def test_the_figures_are_told_before_the_pictures_are_drawn(tmp_path):
 
 def test_pictures_beside_the_one_of_the_page_are_drawn_on_demand_and_are_of_the_last_flight(tmp_path):
     made = flights.flight(1.0, flights.still).write(tmp_path / "flight.tlog")
-    build_report(made, tmp_path, META, drawing=Drawing(tmp_path, True))
+    build_report(made, tmp_path, META, all_pictures=True)
     earlier = [tmp_path / name for name in ("flight.mcap", "flight.common.tlog")]
     for path in earlier:
         path.write_bytes(b"of an earlier flight")
@@ -398,5 +397,5 @@ def test_a_helper_that_dies_leaves_its_pictures_to_us(tmp_path, monkeypatch):
     for picture in PICTURES:
         monkeypatch.setattr(picture, "draw", only_here(picture.draw))
     made = flights.case_b(duration_s=2.0).write(tmp_path / "flight.tlog")
-    build_report(made, tmp_path, drawing=Drawing(tmp_path, True))
+    build_report(made, tmp_path, all_pictures=True)
     assert all((tmp_path / picture.file).stat().st_size for picture in PICTURES)
