@@ -80,6 +80,10 @@ class Gcs(click.Group):
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
         extra.pop("standalone_mode", None)
+        if None in (sys.stdin, sys.stdout, sys.stderr):
+            from autopilot.shell.options import open_closed_streams
+
+            open_closed_streams()
         if sys.stdout.isatty() or sys.stderr.isatty():
             from autopilot.shell.options import outlive_terminal
 

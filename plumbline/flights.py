@@ -155,14 +155,17 @@ class Flight:
         return Picture(png.getvalue())
 
     def report(self, out: str | Path, quiet: bool = True, pictures: bool = False) -> Path:
-        """Write what `gcs fly` leaves into the directory `out`, but for the autopilot's own log; the path of
-        the page. With `pictures` also those that `gcs fly --pictures` draws."""
+        """Write what `gcs fly` leaves into the directory `out`, but for the logs of its programs, in place of
+        another flight; the path of the page. With `pictures` also those that `gcs fly --pictures` draws."""
+        from gcs.workflows.own_vehicle import LOGS
         from gcs.workflows.report import make_report
 
         folder = file_path("out", out)
         with told_in_python():
             make_folder(folder)
             keep_others(folder, TLOG_FILE)
+            for name in LOGS:  # of another flight
+                (folder / name).unlink(missing_ok=True)
             (folder / TLOG_FILE).write_bytes(self.tlog)
             make_report(folder / TLOG_FILE, folder, self._meta, quiet, all_pictures=pictures)
         return folder / PAGE_FILE

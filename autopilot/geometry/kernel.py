@@ -19,7 +19,7 @@ from numba.extending import register_jitable
 
 from autopilot.geometry.compiler import Kernel
 from autopilot.geometry.jitable import register_with
-from autopilot.geometry.machine_code import CHOSEN_BY_USER, ROOT, folder_of, note_use, sources_hash
+from autopilot.geometry.machine_code import ROOT, folder_of, note_use, sources_hash
 
 _LONGEST_S = 600.0  # that another process is waited for; then we compile what it does not deliver
 
@@ -27,6 +27,10 @@ _ADDRESS = re.compile(r" at 0x[0-9a-f]+")  # of a function that is an argument
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+
+def _is_ours(file: str) -> bool:
+    return Path(file).resolve().is_relative_to(ROOT)
 
 
 class _ContentLocator:
@@ -42,7 +46,7 @@ class _ContentLocator:
     @classmethod
     def from_function(cls, function: Any, file: str) -> _ContentLocator | None:
         """A locator of a function of this project; None for any other, and where nothing can be written."""
-        if CHOSEN_BY_USER or not Path(file).is_file() or not Path(file).resolve().is_relative_to(ROOT):
+        if not Path(file).is_file() or not _is_ours(file):
             return None
         locator = cls(function, file)
         try:
@@ -133,6 +137,15 @@ class _SharedCache(caching.FunctionCache):
         return lock
 
 
+def _cache_of(function: Any) -> Any:
+    """The cache of a kernel: of this project none but ours, which keeps nothing where nothing can be written.
+    numba would keep it beside the sources, and go on serving it after these have changed."""
+    file = function.__code__.co_filename
+    if _is_ours(file) and _ContentLocator.from_function(function, file) is None:
+        return caching.NullCache()
+    return _SharedCache(function)
+
+
 def _release(cache: Any) -> None:
     """Give up the lock on the function with this cache, the innermost one that is being compiled."""
     if _held and _held[-1][0] is cache:
@@ -166,7 +179,7 @@ def kernel(function: Callable[P, T]) -> Callable[P, T]:
     """
     if config.DISABLE_JIT:
         return function
-    compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache), function)
+    compiled: Callable[P, T] = update_wrapper(Kernel(function, _cache_of), function)
     return compiled
 
 
@@ -177,5 +190,5 @@ def threaded(function: Callable[P, T]) -> Callable[P, T]:
     """
     if config.DISABLE_JIT:
         return function
-    compiled: Callable[P, T] = update_wrapper(Kernel(function, _SharedCache, nogil=True), function)
+    compiled: Callable[P, T] = update_wrapper(Kernel(function, _cache_of, nogil=True), function)
     return compiled

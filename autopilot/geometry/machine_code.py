@@ -100,7 +100,9 @@ def sources_hash(path: Path, root: Path = ROOT) -> str:
 
 
 def _kernels() -> Path:
-    return user_cache_path("plumbline") / "kernels"
+    """In the user's cache, or in the folder that NUMBA_CACHE_DIR names."""
+    cache = Path(CHOSEN_BY_USER) / "plumbline" if CHOSEN_BY_USER else user_cache_path("plumbline")
+    return cache / "kernels"
 
 
 def folder_of(path: Path) -> Path:
@@ -142,7 +144,7 @@ def _machine() -> str:
 
 
 def _marks() -> Path:
-    return (Path(CHOSEN_BY_USER) if CHOSEN_BY_USER else _kernels()) / _MARKS
+    return _kernels() / _MARKS
 
 
 def _mark(source: Path, part: str) -> Path:

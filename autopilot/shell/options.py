@@ -41,6 +41,7 @@ class ProgramCommand(click.Command):
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **extra: Any) -> Any:
         extra["standalone_mode"] = False
+        open_closed_streams()
         outlive_terminal()
         if args is None and sys.argv[1:] == [ARGUMENTS_FOLLOW]:
             args = _following_arguments()
@@ -131,6 +132,21 @@ class LastingStream:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
+
+
+def open_closed_streams() -> None:
+    """Let stdin, stdout and stderr lead nowhere if we were started without (`>&-`): the next files that are
+    opened would take their places."""
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        try:
+            os.fstat(number)
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
 def outlive_terminal() -> None:

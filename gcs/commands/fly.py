@@ -183,8 +183,10 @@ def fly_command(
         from gcs.workflows.flight_page import PageOptions
 
         page = PageOptions(bind, port)
-    elif port is not None:
-        raise click.UsageError("--port is that of the page: add --view", ctx)
+    else:
+        for name in ("port", "bind"):
+            if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+                raise click.UsageError(f"--{name} is that of the page: add --view", ctx)
     from gcs.shell.processes import Processes
 
     processes = ctx.with_resource(Processes())
@@ -202,11 +204,16 @@ def fly_command(
 
         requirements = read_requirements(required, list(METRICS), "gcs fly --json and docs/report.md")
 
+    unread: list[OSError] = []
+
     def told(record: Record, outcome: Outcome) -> None:
-        if as_json:
-            to_reader(lambda: print_json(record))
-        elif not quiet:
-            to_reader(lambda: print_record(record))
+        try:
+            if as_json:
+                to_reader(lambda: print_json(record))
+            elif not quiet:
+                to_reader(lambda: print_record(record))
+        except OSError as error:  # of stdout, as on a full disk: the report is made all the same
+            unread.append(error)
         reason = f": {outcome.reason}" if outcome.reason else ""
         say(f"{mission}: {outcome.name}{reason}")
 
@@ -234,6 +241,8 @@ def fly_command(
     run = f"gcs fly {mission}"
     with reporting(run, junit):
         flight = fly(options, told, page, processes)
+    if unread:
+        raise unread[0]
     if not (as_json or quiet):
         to_reader(lambda: click.echo(f"report: {flight.out / 'report.html'}"))
     wall_s = flight.record["wall_s"] or 0.0

@@ -15,7 +15,7 @@ from gcs.errors import InputError
 @click.option(
     "--out",
     type=OUTPUT_FOLDER,
-    help="Folder of the report.  [default: that of the log]",
+    help="Folder of the report.  [default: that of flight.tlog; for another log, one of its name beside it]",
 )
 @pictures_option
 @click.option("--mcap", is_flag=True, help="Write flight.mcap too, for Foxglove, PlotJuggler and Rerun.")

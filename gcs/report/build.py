@@ -49,8 +49,8 @@ def build_report(
     """Writes summary.json, meta.json, flight.parquet, overview.png and report.html; returns the record.
 
     `figures` is given the record as soon as it stands, before what takes longer. `meta` is that of a new
-    flight, and what was made on demand of another one in the directory is deleted; without it, meta.json
-    beside the log is read. A log that is cut short, empty or of a lost flight gives a record all the same,
+    flight, and the report of another one in the directory is deleted; without it, meta.json beside the log is
+    read. A log that is cut short, empty or of a lost flight gives a record all the same,
     with None for what cannot be known. With `all_pictures` those that no page needs are drawn too.
     """
     from gcs.report.draw import Drawing
@@ -63,8 +63,7 @@ def build_report(
     if meta is None:
         meta = load_meta(tlog_path.parent / META_FILE)
     else:
-        for name in (MCAP_FILE, COMMON_FILE, *(picture.file for picture in PICTURES)):
-            (out_dir / name).unlink(missing_ok=True)
+        forget_report(out_dir)
 
     pictures = PICTURES if all_pictures else PICTURES[:1]
     ahead = ["reading telemetry", PARQUET_FILE, *(picture.file for picture in pictures), PAGE_FILE]
@@ -102,6 +101,15 @@ def build_report(
     (out_dir / PAGE_FILE).write_text(page, encoding="utf-8")
     done(PAGE_FILE)
     return record
+
+
+def forget_report(directory: Path) -> None:
+    """Delete the report of an earlier flight, with what was made on demand."""
+    from gcs.report.plots import PICTURES
+
+    made = (SUMMARY_FILE, META_FILE, PARQUET_FILE, PAGE_FILE, MCAP_FILE, COMMON_FILE)
+    for name in (*made, *(picture.file for picture in PICTURES)):
+        (directory / name).unlink(missing_ok=True)
 
 
 def build_mcap(tlog_path: Path, out_dir: Path, meta: FlightMeta | None = None) -> Path:

@@ -27,7 +27,7 @@ from gcs.workflows.before_flight import check_mission, check_options, planner_do
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FirmwareProgram, FlightOptions
 from gcs.workflows.mission_file import load
-from gcs.workflows.own_vehicle import AUTOPILOT_LOG, FIRMWARE_LOG, ONBOARD_LOG, SIMULATOR_LOG, own_vehicle
+from gcs.workflows.own_vehicle import LOGS, own_vehicle
 from gcs.workflows.report import make_report
 from gcs.workflows.stopwatch import Stopwatch
 from gcs.workflows.too_slow import too_slow
@@ -112,6 +112,7 @@ def fly(
                 if page is not None:
                     page.tell(outcome=outcome.name, reason=outcome.reason)
 
+            stop.hint = "the flight is over, and its report is made; Ctrl-C again abandons the report"
             flight = _end(mission, options, client, truth_missing, watch.stop(), out, folder, stop, tell)
             if page is not None:
                 page.tell(report=str(out.resolve()))
@@ -232,9 +233,10 @@ def _tell_abandoned(tlog: Path) -> None:
 
 
 class FlightFolder:
-    """The output directory; if the flight came to nothing, what we put there is taken away again."""
+    """The output directory, without the flight that is overwritten; if the new one came to nothing, what we
+    put there is taken away again."""
 
-    _OURS = (TLOG_FILE, ONBOARD_LOG, SIMULATOR_LOG, AUTOPILOT_LOG, FIRMWARE_LOG)
+    _OURS = (TLOG_FILE, *LOGS)
 
     def __init__(self, path: Path, overwrite: bool) -> None:
         self._path = path
@@ -257,6 +259,12 @@ class FlightFolder:
         except FileExistsError:
             text = f"--out {self._path}: holds a flight already; name another, or add --overwrite"
             raise InputError(text) from None
+        if self._overwrite:
+            from gcs.report.build import forget_report
+
+            forget_report(self._path)
+            for name in LOGS:
+                (self._path / name).unlink(missing_ok=True)
         return self
 
     def __exit__(self, _: object, error: BaseException | None, *__: object) -> None:

@@ -78,6 +78,8 @@ def report_again(
     beside = tlog.with_suffix("") if tlog.suffix else tlog.with_name(f"{tlog.name}-report")
     folder = out or (tlog.parent if tlog.name == TLOG_FILE else beside)
     keep_others(folder, TLOG_FILE)
+    if (folder / TLOG_FILE).exists() and not (folder / TLOG_FILE).samefile(tlog):
+        raise InputError(f"{folder}: holds another flight; name another folder by --out")
     return make_report(tlog, folder, None, quiet, all_pictures=all_pictures), folder
 
 

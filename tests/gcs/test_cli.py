@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -519,6 +520,13 @@ def test_parameters(live, tmp_path):
     assert vehicle.parameters == before
     file.write_text("P001 one\n")
     assert "must be NAME value" in one_line(run("param", "load", str(file), "--connect", port), EXIT_USAGE)
+
+
+@pytest.mark.parametrize("program", ["gcs missions", "sitl --help", "autopilot --help"])
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_program_that_is_started_without_streams_does_its_work(program, closed):
+    command = f"exec {shlex.quote(sys.executable)} -m {program} {closed}"
+    assert subprocess.run(["sh", "-c", command], check=False, capture_output=True).returncode == EXIT_DONE
 
 
 def test_status(live, monkeypatch):

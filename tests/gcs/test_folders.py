@@ -23,7 +23,8 @@ from gcs.folders import (
     reserved,
 )
 from gcs.workflows.fly import UNFLOWN_FILE, FlightFolder
-from gcs.workflows.report import make_report
+from gcs.workflows.report import make_report, report_again
+from tests.doubles import recorded_flights
 
 
 def arrow_on_a_full_disk(_: Path) -> None:
@@ -53,6 +54,27 @@ def test_of_two_flights_into_one_folder_the_first_has_it(tmp_path: Path) -> None
             FlightFolder(tmp_path, overwrite=False).__enter__()
         with FlightFolder(tmp_path, overwrite=True) as folder:
             folder.keep()
+
+
+def test_of_a_flight_that_is_overwritten_nothing_is_left_beside_the_new_one(tmp_path: Path) -> None:
+    ours = [TLOG_FILE, SUMMARY_FILE, PAGE_FILE, "meta.json", "flight.parquet", "flight.ulg", "flight.mcap"]
+    ours += ["flight.common.tlog", "sitl.log", "autopilot.log", "overview.png", "track.png", "tension.png"]
+    for name in [*ours, "notes.txt"]:
+        (tmp_path / name).write_text("of the earlier flight", encoding="utf-8")
+    with pytest.raises(KeyboardInterrupt), FlightFolder(tmp_path, overwrite=True):
+        (tmp_path / TLOG_FILE).write_bytes(b"telemetry")
+        raise KeyboardInterrupt
+    assert {path.name for path in tmp_path.iterdir()} == {TLOG_FILE, "notes.txt"}
+
+
+def test_the_report_of_a_log_does_not_take_the_place_of_another_flights(tmp_path: Path) -> None:
+    logs = [tmp_path / name / TLOG_FILE for name in ("one", "other")]
+    for seconds, log in enumerate(logs, start=1):
+        log.parent.mkdir()
+        recorded_flights.flight(float(seconds), recorded_flights.still).write(log)
+    with pytest.raises(InputError, match=r"other: holds another flight; name another folder by --out$"):
+        report_again(logs[0], tmp_path / "other", quiet=True)
+    assert list((tmp_path / "other").iterdir()) == [logs[1]]
 
 
 def test_what_was_recorded_outlives_two_interrupts(tmp_path: Path) -> None:

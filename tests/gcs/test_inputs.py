@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from autopilot.vehicle.shipped import VEHICLES
 from gcs.cli import gcs
 from gcs.errors import EXIT_DONE, EXIT_USAGE
+from gcs.shell.processes import Processes
 from gcs.workflows.flight_inputs import check_flight_inputs, doubts
 from sitl.sensors.shipped import PROFILES
 
@@ -25,12 +26,13 @@ WRONG_VEHICLES = [
 
 @pytest.fixture(autouse=True)
 def no_process(monkeypatch):
-    """Whoever starts a process fails."""
+    """Whoever starts a process fails; those that are only loaded, to be started, are not there."""
 
     def refuse(*_args, **_kwargs):
         raise AssertionError("a process was started")
 
     monkeypatch.setattr(subprocess, "Popen", refuse)
+    monkeypatch.setattr(Processes, "load", lambda processes, name: None)
 
 
 def refused(*arguments, code=EXIT_USAGE):

@@ -104,6 +104,28 @@ def test_a_kernel_that_cannot_be_compiled_for_some_types_holds_up_nobody(empty: 
     assert compiled(empty, ("so3",)) == Counter()
 
 
+@NUMBA_IS_OFF
+def test_where_nothing_can_be_written_nothing_is_kept_beside_the_sources(
+    tmp_path: Path, empty: dict[str, str]
+) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    nowhere = {**empty, "XDG_CACHE_HOME": str(tmp_path / "file")}
+    before = set(Path(s2.__file__).parent.rglob("*.nb[ci]"))
+    assert compiled(nowhere, ("so3",)) == compiled(nowhere, ("so3",)) != Counter(), "each compiles anew"
+    assert set(Path(s2.__file__).parent.rglob("*.nb[ci]")) == before
+
+
+@NUMBA_IS_OFF
+def test_the_folder_that_the_user_names_for_numba_is_kept_by_content_too(
+    tmp_path: Path, empty: dict[str, str]
+) -> None:
+    chosen = {**empty, "NUMBA_CACHE_DIR": str(tmp_path / "chosen")}
+    assert compiled(chosen, ("so3",))
+    assert compiled(chosen, ("so3",)) == Counter()
+    kept = machine_code.sources_hash(Path(s2.__file__).with_name("so3.py"))
+    assert (tmp_path / "chosen" / "plumbline" / "kernels" / kept).is_dir()
+
+
 def test_what_is_ready_is_known_by_its_sources_and_its_part(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
