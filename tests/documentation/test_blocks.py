@@ -107,7 +107,9 @@ def flies_with(own: Own, law: str, sensors: str, vehicle: str, settings: tuple[s
 def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """`gcs fly`, `gcs sweep` and `plumbline.sweep` as the head of this file says."""
 
-    def fly(options: FlightOptions, told: Callable[..., None], page: Any = None) -> Flight:
+    def fly(
+        options: FlightOptions, told: Callable[..., None], page: Any = None, processes: Any = None
+    ) -> Flight:
         mission = load(options.mission)
         if options.connect is None:
             check_options(options)
@@ -134,6 +136,7 @@ def small(flown: Path, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
         few = [replace(one, values=one.values[:2]) for one in varied]
         return make_plan(short, vehicle, sensors, laws, (1,), few, settings, min(sample, 2), own)
 
+    monkeypatch.setattr("gcs.shell.processes.Processes.load", lambda processes, name: None)
     monkeypatch.setattr("gcs.workflows.fly.fly", fly)
     monkeypatch.setattr("gcs.workflows.sweep.make_plan", made)
     monkeypatch.setattr("gcs.workflows.sweep.own_processes", in_this_process)
@@ -252,8 +255,8 @@ class Shell:
         return found or [word]
 
     def _have_flights(self, arguments: list[str]) -> None:
-        for name in arguments:
-            if name.startswith("-") or Path(name).exists():
+        for before, name in pairwise(["", *arguments]):
+            if name.startswith("-") or before == "--out" or Path(name).exists():
                 continue
             if name.endswith(".tlog"):
                 Path(name).parent.mkdir(parents=True, exist_ok=True)

@@ -66,7 +66,7 @@ def test_the_outcome_of_a_flight_in_real_time_says_that_the_machine_was_too_slow
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, real_time: bool, name: Any, says: bool
 ) -> None:
     @contextmanager
-    def no_vehicle(options: FlightOptions, out: Path) -> Iterator[None]:
+    def no_vehicle(options: FlightOptions, out: Path, processes: None) -> Iterator[None]:
         yield
 
     def flown(mission: Any, options: Any, log: TlogWriter, own: Any, stop: Any, watch: Any, page: Any) -> Any:
@@ -76,7 +76,7 @@ def test_the_outcome_of_a_flight_in_real_time_says_that_the_machine_was_too_slow
 
     monkeypatch.setattr(workflow, "own_vehicle", no_vehicle)
     monkeypatch.setattr(workflow, "warm_up", lambda parts, quiet: None)
-    monkeypatch.setattr(workflow, "make_report", lambda tlog, out, meta, quiet, figures: meta)
+    monkeypatch.setattr(workflow, "make_report", lambda tlog, out, meta, quiet, figures, pictures: meta)
     monkeypatch.setattr(own_flight, "fly_own", flown)
     options = FlightOptions(
         **{"mission": "hover", "law": "thesis", "sensors": "lab", "vehicle": "bebop", "seed": 1},
