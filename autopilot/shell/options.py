@@ -59,12 +59,18 @@ def _following_arguments() -> list[str]:
     if not line:
         sys.exit(0)
     log, *arguments = cast("list[str]", json.loads(line))
-    for path, flags, numbers in ((os.devnull, os.O_RDONLY, (0,)), (log, os.O_WRONLY | os.O_APPEND, (1, 2))):
-        opened = os.open(path, flags)
-        for number in numbers:
-            os.dup2(opened, number)
-        os.close(opened)
+    _lead(os.devnull, os.O_RDONLY, 0)
+    _lead(log, os.O_WRONLY | os.O_APPEND, 1, 2)
     return arguments
+
+
+def _lead(path: str, flags: int, *numbers: int) -> None:
+    """Let these descriptors lead to a file."""
+    opened = os.open(path, flags)
+    for number in numbers:
+        os.dup2(opened, number)
+    if opened not in numbers:
+        os.close(opened)
 
 
 def complain(program: str, exit_code: int, *lines: str) -> int:
@@ -126,9 +132,8 @@ class LastingStream:
         except OSError as error:
             if error.errno != errno.EIO:
                 raise
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())  # what is left in its buffer goes there, too
-            os.close(nowhere)
+            # what is left in its buffer goes there, too
+            _lead(os.devnull, os.O_WRONLY, self._stream.fileno())
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -141,10 +146,7 @@ def open_closed_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            nowhere = os.open(os.devnull, os.O_RDWR)
-            if nowhere != number:
-                os.dup2(nowhere, number)
-                os.close(nowhere)
+            _lead(os.devnull, os.O_RDWR, number)
         if getattr(sys, name) is None:
             setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 

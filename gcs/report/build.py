@@ -50,8 +50,8 @@ def build_report(
 
     `figures` is given the record as soon as it stands, before what takes longer. `meta` is that of a new
     flight, and the report of another one in the directory is deleted; without it, meta.json beside the log is
-    read. A log that is cut short, empty or of a lost flight gives a record all the same,
-    with None for what cannot be known. With `all_pictures` those that no page needs are drawn too.
+    read. A log that is cut short, empty or of a lost flight gives a record all the same, with None for what
+    cannot be known. With `all_pictures` those that no page needs are drawn too.
     """
     from gcs.report.draw import Drawing
     from gcs.report.plots import PICTURES, View

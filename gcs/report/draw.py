@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import Synchronized
@@ -28,7 +28,7 @@ class Drawing:
         self._missing = {picture.file: picture for picture in pictures}
         self._view: View
         self._helper: Any = None
-        self._taken: Synchronized[int] | None = None
+        self._taken: Synchronized[int]
         if (os.cpu_count() or 1) < 2 or "fork" not in multiprocessing.get_all_start_methods():
             return
         context = multiprocessing.get_context("fork")  # with what is loaded here
@@ -47,26 +47,24 @@ class Drawing:
 
     def finish(self, done: Callable[[Picture], None]) -> None:
         """Wait until all are drawn, of which `done` is told. Of several we draw some, too."""
-        if self._helper is None or len(self._pictures) > 1:
-            with style():
-                for picture in self._next():
-                    self._draw(picture)
-                    self._tell(picture.file, done)
-                    while self._helper is not None and self._pipe.poll():
-                        self._receive(done)
+        if self._helper is not None and len(self._pictures) > 1:
+            self._draw_here(self._next(), done)
         while self._helper is not None:
             self._receive(done)
-        if self._missing:  # the helper was killed
-            with style():
-                for picture in list(self._missing.values()):
-                    self._draw(picture)
-                    self._tell(picture.file, done)
+        if self._missing:  # there is no helper, or it was killed
+            self._draw_here(list(self._missing.values()), done)
+
+    def _draw_here(self, pictures: Iterable[Picture], done: Callable[[Picture], None]) -> None:
+        """Draw these ourselves, and tell meanwhile what the helper has drawn."""
+        with style():
+            for picture in pictures:
+                self._draw(picture)
+                self._tell(picture.file, done)
+                while self._helper is not None and self._pipe.poll():
+                    self._receive(done)
 
     def _next(self) -> Iterator[Picture]:
         """Those that the other process has not taken."""
-        if self._taken is None:
-            yield from self._pictures
-            return
         while True:
             with self._taken.get_lock():
                 index = self._taken.value
