@@ -12,6 +12,8 @@ PIP := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 UV := VIRTUAL_ENV=$(VENV) $(BIN)/uv pip install --quiet
 install = @{ $(PIP) 'uv>=0.4' && $(UV) --editable '.$(1)'; } || $(PIP) --editable '.$(1)'
 export PYTHONDONTWRITEBYTECODE :=
+# where colorama is installed numba colours each text of a candidate that it tries, which nobody reads: a twentieth
+export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 
 .PHONY: help install fly test lint types docs thesis figures pictures robustness renew bench clean
 

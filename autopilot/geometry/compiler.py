@@ -23,6 +23,8 @@ from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 from numba.extending import intrinsic as _intrinsic
 
+from autopilot.geometry import resolution  # noqa: F401 - what numba finds is found once from now on
+
 
 class _Library(JITCodeLibrary):  # type: ignore[misc]
     """Code as numba keeps it, whose intermediate code is read only to be linked into other code: a kernel is
@@ -196,7 +198,8 @@ class _InnerCompiler(_Compiler):
 
 _OPTIONS = {"nopython": True, "error_model": "numpy", "_nrt": False}
 # of functions that only kernels call, and of those of which less than a call is left
-INSIDE: Any = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler}
+_UNWRAPPED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+INSIDE: Any = {"error_model": "numpy", "_nrt": False, "pipeline_class": _InnerCompiler, **_UNWRAPPED}
 INLINED: Any = {**INSIDE, "forceinline": True}
 
 
@@ -228,7 +231,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
     @cached_property
     def _inner(self) -> _Inner:
         """Made only where something is compiled: a few hundred of them take a while."""
-        inner = dict(_OPTIONS, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        inner = dict(_OPTIONS, **_UNWRAPPED)
         return _Inner(self.py_func, targetoptions=inner, pipeline_class=_InnerCompiler)
 
     def compile(self, sig: Any) -> Any:
