@@ -15,7 +15,7 @@ export PYTHONDONTWRITEBYTECODE :=
 # where colorama is installed numba colours each text of a candidate that it tries, which nobody reads: a twentieth
 export NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING := 1
 
-.PHONY: help install fly test lint types docs thesis figures pictures robustness renew bench clean
+.PHONY: help install fly test lint types docs oldest thesis figures pictures robustness renew bench clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -64,6 +64,12 @@ docs: $(DOCS_STAMP) ## build the documentation as a site: site/index.html
 	NO_MKDOCS_2_WARNING=1 RUN_NOTEBOOKS=true $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
+oldest: $(STAMP) ## fly with the oldest versions of all libraries that pyproject.toml allows
+	$(PYTHON) -m venv --clear $(VENV)-oldest
+	VIRTUAL_ENV=$(VENV)-oldest $(BIN)/uv pip install --quiet --resolution lowest-direct --editable .
+	$(VENV)-oldest/bin/gcs fly case-b --sensors lab --pictures
+	$(VENV)-oldest/bin/gcs sweep case-b --seeds 4
+
 thesis: $(STAMP) ## repeat the thesis's experiments and renew docs/thesis.md
 	$(BIN)/gcs experiments thesis --docs docs/thesis.md
 
@@ -90,4 +96,4 @@ bench: $(STAMP) ## measure this machine
 	$(BIN)/python benchmarks/peers.py --docs docs/performance.md
 
 clean: ## remove what was made here
-	rm -rf $(VENV) site build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-oldest site build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

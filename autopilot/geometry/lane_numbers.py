@@ -97,7 +97,7 @@ Made = Callable[[Any, Any, Any, Any], Any]  # (context, builder, signature, valu
 def define(function: Any, made: Made, *signatures: Any) -> None:
     """Let kernels call `function` with these types."""
     template = type(f"Lanes_{function.__name__}", (ConcreteTemplate,), {"key": function, "cases": signatures})
-    infer_global(function)(template)
+    infer_global(function, types.Function(template))  # NumPy 1 does not say where its functions are
     for one in signatures:
         lower_builtin(function, *one.args)(made)
 
