@@ -22,8 +22,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from gcs.closed_loop import Conditions
@@ -181,7 +182,7 @@ def machine() -> str:
     return f"{os.cpu_count()} cores of {named}{vectors}, Python {platform.python_version()}."
 
 
-Rows = list[tuple[str, ...]]
+Rows = Iterator[tuple[str, ...]]  # each as soon as it is measured
 
 
 def lockstep_rows(repeat: int, folder: Path) -> Rows:
@@ -200,26 +201,23 @@ def lockstep_rows(repeat: int, folder: Path) -> Rows:
         fly_with_wire(mission, conditions, NoLog())
         one.append(record["recorded_s"] / (time.perf_counter() - began))
     median = statistics.median
-    return [
-        (
-            "three processes over UDP in lockstep",
-            f"{median(flown):.0f} x real time",
-            f"{median(floor):.0%} of a ping-pong of UDP datagrams, as many and as large",
-        ),
-        (
-            "the same cores in one process",
-            f"{median(one):.0f} x real time",
-            f"{median(one) / median(flown):.1f} x three processes",
-        ),
-        ("`gcs fly`, from the command to the vehicle's first word", f"{median(heard):.1f} s", ""),
-        ("`gcs fly`, from the command to the prompt, with its report", f"{median(whole):.1f} s", ""),
-    ]
+    yield (
+        "three processes over UDP in lockstep",
+        f"{median(flown):.0f} x real time",
+        f"{median(floor):.0%} of a ping-pong of UDP datagrams, as many and as large",
+    )
+    yield (
+        "the same cores in one process",
+        f"{median(one):.0f} x real time",
+        f"{median(one) / median(flown):.1f} x three processes",
+    )
+    yield "`gcs fly`, from the command to the vehicle's first word", f"{median(heard):.1f} s", ""
+    yield "`gcs fly`, from the command to the prompt, with its report", f"{median(whole):.1f} s", ""
 
 
 def sweep_rows(repeat: int, flights: int) -> Rows:
     """One flight without the wire, and many on all cores."""
     mission = load_mission(MISSION)
-    rows: Rows = []
     for sensors in ("lab", "ideal"):
         board = boarding(mission, Conditions(sensors=sensors))
         flown = fly(mission, Conditions(sensors=sensors), board)
@@ -228,28 +226,22 @@ def sweep_rows(repeat: int, flights: int) -> Rows:
             for k in range(max(repeat, 5))
         ]
         speed = flown.flight_s / statistics.median(timed)
-        rows.append(
-            (
-                f"one flight without the wire, {sensors}",
-                f"{speed:.0f} x real time",
-                f"{1e6 * statistics.median(timed) / (flown.flight_s * TICKS_PER_S):.1f} us a tick",
-            )
+        yield (
+            f"one flight without the wire, {sensors}",
+            f"{speed:.0f} x real time",
+            f"{1e6 * statistics.median(timed) / (flown.flight_s * TICKS_PER_S):.1f} us a tick",
         )
     wall_s = sweep_s(flights)
     cores = len(os.sched_getaffinity(0))
-    rows.append(
-        (
-            f"a sweep of {flights} flights on {cores} cores",
-            f"{flights / wall_s:.1f} flights/s",
-            f"10,000 flights in {1e4 * wall_s / flights:.0f} s",
-        )
+    yield (
+        f"a sweep of {flights} flights on {cores} cores",
+        f"{flights / wall_s:.1f} flights/s",
+        f"10,000 flights in {1e4 * wall_s / flights:.0f} s",
     )
-    return rows
 
 
 def light_rows(repeat: int) -> Rows:
     """Processor time of commands that only say something; `gcs status` listens for a vehicle, in vain."""
-    rows: Rows = []
     for words in (["--help"], ["status", "--connect", "14573"]):
         timed = []
         for _ in range(max(repeat, 5)):
@@ -257,13 +249,11 @@ def light_rows(repeat: int) -> Rows:
             subprocess.run([sys.executable, "-m", "gcs", *words], capture_output=True, check=False)
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             timed.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-        rows.append((f"`gcs {words[0]}`", f"{statistics.median(timed):.2f} s", "processor time"))
-    return rows
+        yield f"`gcs {words[0]}`", f"{statistics.median(timed):.2f} s", "processor time"
 
 
 def linear_rows() -> Rows:
     """Microseconds a tick over three decades of flights and of ticks, and over the rates there are."""
-    rows: Rows = []
     mission, conditions = load_mission(MISSION), Conditions()
     board = boarding(mission, conditions)
 
@@ -274,19 +264,32 @@ def linear_rows() -> Rows:
 
     for count in (1, 10, 100, 1000):
         cost = flown(((mission, Conditions(seed=k)) for k in range(count)), TICKS_PER_S)
-        rows.append((f"{count} flights of {MISSION}", cost))
+        yield f"{count} flights of {MISSION}", cost
     for seconds in (10.0, 100.0, 1000.0, 10_000.0):
         cost = flown([(holding(seconds), conditions)], TICKS_PER_S)
-        rows.append((f"one flight that holds for {seconds:g} s", cost))
+        yield f"one flight that holds for {seconds:g} s", cost
     for rate in (250, 500, 1000):
         faster = Conditions(settings={"SIM_RATE_HZ": float(rate)})
-        rows.append((f"{MISSION} at {rate} Hz", flown([(mission, faster)], rate)))
-    return rows
+        yield f"{MISSION} at {rate} Hz", flown([(mission, faster)], rate)
+
+
+def all_rows(options: argparse.Namespace, folder: Path) -> Rows:
+    """The first table."""
+    yield from lockstep_rows(options.repeat, folder)
+    yield from sweep_rows(options.repeat, options.flights)
+    yield from light_rows(options.repeat)
+    if options.real_time:
+        label = f"real time at {REAL_TIME_HZ} Hz, {options.real_time:g} s"
+        yield label, *real_time(options.real_time, folder)
 
 
 def table(head: Sequence[str], rows: Rows) -> str:
-    """Markdown."""
-    lines = ["| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *rows)]
+    """Markdown, each line printed as soon as it stands."""
+    lines = []
+    for cells in chain((head, ["---"] * len(head)), rows):
+        lines.append("| " + " | ".join(cells) + " |")
+        print(lines[-1], flush=True)
+    print()
     return "\n".join(lines)
 
 
@@ -301,18 +304,12 @@ def main() -> None:
     parser.add_argument("--linear", action="store_true", help="the table of cost over three decades")
     parser.add_argument("--docs", type=Path)
     options = parser.parse_args()
+    print(machine())
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        rows = lockstep_rows(options.repeat, folder) + sweep_rows(options.repeat, options.flights)
-        rows += light_rows(options.repeat)
-        if options.real_time:
-            label = f"real time at {REAL_TIME_HZ} Hz, {options.real_time:g} s"
-            rows.append((label, *real_time(options.real_time, folder)))
-    text = f"{machine()}\n\n"
-    text += table(("Case B", "measured", "beside it"), rows) + "\n"
+        text = table(("Case B", "measured", "beside it"), all_rows(options, Path(name)))
+    text = f"{machine()}\n\n{text}\n"
     if options.linear:
         text += "\n" + table(("without the wire, sensors of the lab", "us a tick"), linear_rows()) + "\n"
-    print(text)
     if options.docs:
         page = options.docs.read_text(encoding="utf-8")
         made = re.sub(f"{BEGIN}.*{END}", f"{BEGIN}\n{text}{END}", page, flags=re.DOTALL)
