@@ -19,7 +19,7 @@ _LONGEST = 3.5  # the longest side of the box over the shortest; beyond, the axe
 _LEAST_M = 1.2  # of a side of the box
 _NEAR_GROUND = 0.25  # of the height of the box: nearer than that, the box stands on the ground
 _FAR_M = 1e3  # a flight that was lost may end anywhere; the picture keeps to what is near
-_LABELS = 0.14  # of a room: ticks and labels outside the box
+_BESIDE, _ABOVE, _BELOW = 0.07, 0.03, 0.12  # of a room: what is left around the box, for ticks and labels
 
 Indices = NDArray[np.intp]
 Room = tuple[float, float, float, float]  # left, bottom, width, height, as parts of the figure
@@ -139,31 +139,37 @@ def _fit(figure: Any, ax: Any, room: Room, low: Floats, high: Floats) -> None:
         return placed.min(axis=0), placed.max(axis=0)
 
     least, greatest = extent()
-    wanted = np.array(room[2:]) * (1.0 - _LABELS)
+    wanted = np.array(room[2:]) * (1.0 - 2.0 * _BESIDE, 1.0 - _ABOVE - _BELOW)
     ax.set_box_aspect(ax._box_aspect, zoom=float((wanted / (greatest - least)).min()))
     # set_box_aspect normalises again: the shape stays, the size is new
     least, greatest = extent()
-    x, y = np.array(room[:2]) + 0.5 * np.array(room[2:]) - 0.5 * (least + greatest)
+    middle = np.array(room[:2]) + 0.5 * np.array(room[2:]) * (1.0, 1.0 + _BELOW - _ABOVE)
+    x, y = middle - 0.5 * (least + greatest)
     ax.set_position((room[0] + x, room[1] + y, room[2], room[3]))
 
 
 def _hang(ax: Any, samples: Samples, mission: Indices, low: Floats, high: Floats) -> None:
-    """Vehicle, cable and load at some instants."""
+    """Vehicle, cable and load at some instants; once the load is released, the vehicle and its path."""
     box = _box(high - low)
     stretch = (high - low) / box
     mission = mission[np.isfinite(samples.vehicle_m[mission]).all(axis=1)]
     apart = _APART * float(np.linalg.norm(box))
-    chosen = mission[snapshots(samples.actual_m[mission] / stretch, apart)]
-    # arms keep their shape in the picture where the axes are not to scale
-    reach = _ARM * float(box.max()) * stretch
-    forward, left = body_axes(samples.quat_wxyz[chosen])
-    for i, index in enumerate(chosen):
+    carried, alone = mission[samples.attached[mission]], mission[~samples.attached[mission]]
+    hanging = carried[snapshots(samples.actual_m[carried] / stretch, apart)]
+    for index in hanging:
         load, vehicle = samples.actual_m[index], samples.vehicle_m[index]
         ax.plot(*np.stack((load, vehicle)).T, color=GREY, linewidth=0.9, zorder=5)
         ax.plot(*load[:, None], marker="o", markersize=5, color=INK, zorder=6)
-        if not np.isfinite(forward[i]).all():
+    ax.plot(*samples.vehicle_m[_thin(alone)].T, color=GREY, linewidth=0.9, linestyle=(0, (1, 2)))
+    chosen = np.concatenate((hanging, alone[snapshots(samples.vehicle_m[alone] / stretch, apart)]))
+    # arms keep their shape in the picture where the axes are not to scale
+    reach = _ARM * float(box.max()) * stretch
+    forward, left = body_axes(samples.quat_wxyz[chosen])
+    for index, *axes in zip(chosen, forward, left, strict=True):
+        vehicle = samples.vehicle_m[index]
+        if not np.isfinite(axes).all():
             continue
-        for axis in (forward[i], left[i]):
+        for axis in axes:
             ends = np.stack((vehicle - reach * axis, vehicle + reach * axis))
             ax.plot(*ends.T, color=INK, linewidth=1.8, marker="o", markersize=2.8, zorder=6)
 

@@ -411,3 +411,24 @@ def test_a_cable_that_never_comes_taut_ends_the_climb() -> None:
     sky.run(lambda s: s.flight.phase == Phase.DISARMED)
     assert any("never taut" in text for text in sky.texts)
     assert max(jet[0][2] for _, _, jet in sky.setpoints) < 0.02 + 1.35 * SETTINGS.cable_length_m
+
+
+def test_a_load_that_hangs_on_a_shorter_cable_than_is_believed_ends_the_climb() -> None:
+    """It swings from under the vehicle, which would go on moving over it."""
+    sky = Sky()
+    sky.ask(Arm(True, False))
+    assert sky.ask(TakeoffRequest(2.0)).result == ACCEPTED
+    ideal, short_m = Sky.obey, 0.5 * SETTINGS.cable_length_m
+
+    def hanging_short() -> View:
+        seen = ideal(sky)._replace(taut=False)
+        if seen.x_quad[2] < short_m:
+            return seen
+        swing = 0.2 * math.sin(3.0 * sky.now_us * 1e-6)
+        load = (seen.x_quad[0] + swing, seen.x_quad[1], seen.x_quad[2] - short_m)
+        return seen._replace(x_load=load, pull_n=SETTINGS.load_weight_n)
+
+    sky.obey = hanging_short  # type: ignore[method-assign]
+    sky.run(lambda s: s.flight.phase != Phase.TAUTEN and s.now_us > 1_000_000)
+    assert sky.flight.phase in (Phase.LOWER, Phase.SET_DOWN)
+    assert sky.texts[-1].startswith("Cable pulls at 0.") and "VEH_CABLE_LEN" in sky.texts[-1]

@@ -292,3 +292,14 @@ def test_a_reposition_that_may_not_change_the_mode_needs_a_hold(phase: Phase) ->
         1
     ]
     assert verdict.result == LATER
+
+
+@pytest.mark.parametrize("request_", [R.Land(), R.Pause()])
+def test_a_takeoff_that_waits_for_arming_is_taken_back(request_: Any) -> None:
+    sky = Sky()
+    assert sky.ask(R.Takeoff(2.0)).result == ACCEPTED
+    assert sky.flight.selected == Selected.TAKEOFF
+    assert sky.ask(request_).result == ACCEPTED
+    assert sky.flight.selected == Selected.NOTHING
+    assert sky.ask(R.Arm(True, False)).result == ACCEPTED
+    assert sky.flight.phase == Phase.ARMED

@@ -39,9 +39,9 @@ def hold(flight: Flight, request: Any, view: View, settings: Settings) -> Decisi
 
 
 def land(flight: Flight, request: Any, view: View, settings: Settings) -> Decision:
-    """Set the load down where it is, and the vehicle beside it."""
+    """Set the load down where it is, and the vehicle beside it; on the ground, select nothing."""
     if flight.phase in ON_GROUND:
-        return flight, ACCEPTED
+        return hold(flight, request, view, settings)
     here = replace(flight, returning=False)
     if flight.phase in (Phase.LOWER, Phase.SET_DOWN):
         return here, ACCEPTED

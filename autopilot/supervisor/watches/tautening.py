@@ -24,6 +24,7 @@ from autopilot.supervisor.watches.watched import Watched
 ASTRAY = 0.08  # m beside the load at which the vehicle that pulls the cable taut is moved over it
 LIFTING = "Cable taut, lifting the load"
 LIFTING_UNSEEN = "Cable taut, lifting the load; no load sensor"
+LONG_AFTER = 2.0  # times as long as rising from the ground until then takes
 TAUT_LATEST = 1.3  # cable lengths over the load by which the cable must have come taut
 
 
@@ -36,7 +37,12 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
         length = norm(sub(view.x_quad, view.x_load))
         flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
         return Watched(flight, Event.TAUT, ((INFO, LIFTING_UNSEEN if view.unseen else LIFTING),))
-    flight = _over_load(flight, view)
+    if _astray(flight, view):
+        if _hangs(flight, view, settings):
+            length = norm(sub(view.x_quad, view.x_load))
+            text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
+            return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
+        flight = _over_load(flight, view)
     creeps = len(flight.legs) == 1 and flight.still_since_us < 0
     if creeps and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
         flight, view, settings
@@ -57,14 +63,26 @@ def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
     return replace(flight, still_since_us=view.now_us if pulls else -1)
 
 
+def _astray(flight: Flight, view: View) -> bool:
+    """Whether the load is not where the vehicle rises, as one is that was not seen well from the ground."""
+    at = flight.legs[0].jet(leg_time_s(flight, view.now_us))[0]
+    return not norm(sub((view.x_load[0], view.x_load[1], at[2]), at)) <= ASTRAY
+
+
+def _hangs(flight: Flight, view: View, settings: Settings) -> bool:
+    """Whether it is astray because it swings, on a cable shorter than it is believed to be: the cable pulls,
+    long after it should have come taut, and is not as long as one that is."""
+    latest_s = LONG_AFTER * TAUT_LATEST * settings.cable_length_m / settings.motion.taut_speed_m_s
+    late = view.now_us - flight.phase_start_us > latest_s * 1e6
+    return late and not view.taut and share_pulled(view, settings) > PULLED
+
+
 def _over_load(flight: Flight, view: View) -> Flight:
-    """The rising vehicle, moved over a load that was not seen well from the ground."""
+    """The rising vehicle, moved over the load."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
     at = creep.jet(leg_time_s(flight, view.now_us))[0]
     over = (view.x_load[0], view.x_load[1], at[2])
-    if norm(sub(over, at)) <= ASTRAY:
-        return flight
     legs = (
         transfer_leg(at, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
         replace(creep, begin=over),
