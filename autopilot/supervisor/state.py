@@ -231,8 +231,10 @@ def forbidden(fence: Fence, x_load: Vec3, settings: Settings) -> str:
     """Why load or vehicle may not be there, the vehicle a cable length above; an empty string if they may."""
     if settings.fence.radius_m > 0.0 and hypot(x_load[0], x_load[1]) > settings.fence.radius_m:
         return f"beyond the fence, GF_MAX_HOR_DIST {settings.fence.radius_m:g} m from home"
-    if settings.fence.height_m > 0.0 and x_load[2] + settings.cable_length_m > settings.fence.height_m:
-        return f"beyond the fence, GF_MAX_VER_DIST {settings.fence.height_m:g} m above home"
+    height_m = x_load[2] + settings.cable_length_m
+    if settings.fence.height_m > 0.0 and height_m > settings.fence.height_m:
+        limit = f"GF_MAX_VER_DIST {settings.fence.height_m:g} m above home"
+        return f"beyond the fence, {limit} (vehicle at {height_m:.2f} m)"
     return fence.complaint(x_load[0], x_load[1])
 
 

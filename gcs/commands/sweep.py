@@ -46,7 +46,8 @@ from gcs.shell.display import say, to_results
     "varied",
     metavar="NAME=VALUES",
     multiple=True,
-    help="Vary a parameter: NAME=LOW:HIGH:COUNT or NAME=A,B,C, with --sample also NAME=LOW:HIGH; repeatable.",
+    help="Vary a parameter: NAME=LOW:HIGH:COUNT or NAME=A,B,C, with --sample NAME=LOW:HIGH or NAME=A,B,C; "
+    "repeatable.",
 )
 @click.option(
     "--set",
@@ -132,7 +133,15 @@ def sweep_command(
         raise click.UsageError("--jobs is for processes of our own; a Dask cluster has its workers", ctx)
 
     from gcs.batch.progress import pace
-    from gcs.workflows.requirements import COMPLETED, conclude, judge, read_requirements, reporting
+    from gcs.workflows.requirements import (
+        COMPLETED,
+        WHOLE,
+        conclude,
+        judge,
+        read_requirements,
+        reporting,
+        unjudged,
+    )
     from gcs.workflows.sweep import FIGURES, SweepOptions, run_sweep
 
     requirements = read_requirements(required, FIGURES, "gcs sweep --json")
@@ -156,7 +165,7 @@ def sweep_command(
         quiet=quiet or as_json,
         command=shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]),
     )
-    with reporting(run, junit):
+    with reporting(run, junit, WHOLE):
         sweep = run_sweep(options)
     if as_json:
         print_json(sweep.record)
@@ -175,5 +184,8 @@ def sweep_command(
                 )
             click.echo(f"{'table' if table_only else 'report'}: {sweep.result}")
     outcome = COMPLETED if sweep.done.whole else "interrupted"
-    met = conclude(run, junit, outcome, sweep.done.wall_s, judge(requirements, sweep.record))
+    verdicts = judge(requirements, sweep.record)
+    met = conclude(run, junit, outcome, sweep.done.wall_s, verdicts, case=WHOLE)
+    if sweep.done.whole and (remark := unjudged(requirements, sweep.done.flights, sweep.done.completed)):
+        say(remark)
     return sweep.exit_code or (EXIT_DONE if met else EXIT_REQUIRED)

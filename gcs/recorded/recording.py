@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import zlib
+from collections.abc import Collection
+from io import BufferedIOBase
 from pathlib import Path
 from typing import NamedTuple
 
@@ -78,21 +80,54 @@ def is_log(path: Path) -> bool:
 def is_table(path: Path) -> bool:
     """Whether a file begins with rows of comma-separated numbers, behind one line of headings at most."""
     try:
-        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
-            lines = [file.readline(_LONGEST_ROW) for _ in range(2)]
+        lines = _first_lines(path)
     except (OSError, EOFError, zlib.error):  # the last two of a torn archive
         return False
     return any(_is_row(line) for line in lines)
 
 
+def _has_headings(path: Path) -> bool:
+    """Whether the first line of a table holds no number at all, and the second is a row of numbers."""
+    try:
+        first, second = _first_lines(path)
+    except (OSError, EOFError, zlib.error):
+        return False
+    return not any(_is_number(cell) for cell in first.split(b",")) and _is_row(second)
+
+
+def _first_lines(path: Path) -> tuple[bytes, bytes]:
+    with _opened(path) as file:
+        return file.readline(_LONGEST_ROW), file.readline(_LONGEST_ROW)
+
+
+def _opened(path: Path) -> BufferedIOBase:
+    return gzip.open(path) if path.suffix == ".gz" else path.open("rb")
+
+
 def _is_row(line: bytes) -> bool:
     cells = line.split(b",")
+    return len(cells) > 1 and all(_is_number(cell or b"nan") for cell in cells)
+
+
+def _is_number(cell: bytes) -> bool:
     try:
-        for cell in cells:
-            float(cell or b"nan")
+        float(cell)
     except ValueError:
         return False
-    return len(cells) > 1
+    return True
+
+
+def _no_number(path: Path, headings: int, missing: Collection[str]) -> str:
+    """Where the first cell stands that is neither a number nor one of the words for a `missing` one; empty if
+    there is none."""
+    with _opened(path) as file:
+        for number, line in enumerate(file, start=1):
+            for cell in line.split(b",") if number > headings else ():
+                word = cell.decode(errors="replace").strip(' \t\r\n"')
+                if not (word in missing or _is_number(word.encode())):
+                    hint = "; one line of headings can be skipped, no more" if number == 1 else ""
+                    return f"line {number}: {word[:40]!r} is not a number{hint}"
+    return ""
 
 
 def _rows(path: Path, columns: ColumnMap) -> Recording:
@@ -106,11 +141,14 @@ def _rows(path: Path, columns: ColumnMap) -> Recording:
         raise RecordingError(f"{path}: the column map says neither time nor rate_hz")
     if path.stat().st_size > _MOST_BYTES:
         raise RecordingError(f"{path}: more than {_MOST_BYTES // 2**20} MiB")
+    headings = int(_has_headings(path))
     try:
-        table = csv.read_csv(path, csv.ReadOptions(autogenerate_column_names=True))
+        table = csv.read_csv(path, csv.ReadOptions(autogenerate_column_names=True, skip_rows=headings))
         values = np.column_stack([np.asarray(column, dtype=np.float64) for column in table.columns])
     except (ArrowInvalid, ValueError, TypeError) as error:
         reason = " ".join(str(error).split())[:200]
+        if not isinstance(error, ArrowInvalid):
+            reason = _no_number(path, headings, csv.ConvertOptions().null_values) or reason
         raise RecordingError(f"{path}: not rows of comma-separated numbers: {reason}") from None
     pose, load = columns.vehicle, columns.load
     order = pose.quaternion if pose.quaternion_order == "xyzw" else [*pose.quaternion[1:], pose.quaternion[0]]

@@ -37,7 +37,8 @@ _WAYS = (
 )  # keys of the record that say how it was flown
 _CLOCK = {"wall_s", "real_time_factor"}  # of the machine and not of the flight: no best
 STAR = "*: the best of the completed flights, and what is within 1 % of it."
-DEFAULT = "default"  # of a parameter that was not changed, where its number is not known
+DEFAULT = "default"  # of a parameter that was not changed, where its number is not known, as of an own law
+_LAW_PARAMETER = "CTL_LAW"  # what the law is in the table of parameters
 _AS_GOOD = 0.01  # as a share of the best value: a difference that is none
 _PARTS = 3  # of a label; what differs beyond is in the table
 STEPS = "mission steps"
@@ -103,6 +104,8 @@ def differences(runs: Sequence[Run]) -> list[Difference]:
     others = [_unchanged(run, names) for run in runs]
     for name in names:
         rows[name] = [found.get(name, other[name]) for found, other in zip(settings, others, strict=True)]
+    if len(set(rows["law"])) > 1 and UNKNOWN not in rows["law"]:
+        rows.pop(_LAW_PARAMETER, None)
     rows[STEPS] = _different_steps(runs)
     rows["version"] = [_shown(run.meta.version) for run in runs]
     return [
@@ -113,10 +116,12 @@ def differences(runs: Sequence[Run]) -> list[Difference]:
 
 
 def _unchanged(run: Run, names: Sequence[str]) -> dict[str, str]:
-    """What those of the parameters that were not changed are as people read it."""
+    """What those of the parameters that were not changed are as people read it. A vehicle that told its
+    parameters has none but these."""
     if not (run.meta.command or run.telemetry.parameters):
         return dict.fromkeys(names, UNKNOWN)
-    return {**dict.fromkeys(names, DEFAULT), **unchanged_settings(names, run.telemetry, run.meta)}
+    otherwise = UNKNOWN if run.telemetry.parameters else DEFAULT
+    return {**dict.fromkeys(names, otherwise), **unchanged_settings(names, run.telemetry, run.meta)}
 
 
 def figures(runs: Sequence[Run]) -> list[tuple[Group, list[Figure]]]:

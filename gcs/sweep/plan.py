@@ -151,7 +151,7 @@ def _drawn(varied: Varied, share: float) -> float:
 
 
 def read_varied(text: str, sampled: bool) -> Varied:
-    """NAME=LOW:HIGH:COUNT, NAME=A,B,C, or, if values are `sampled`, NAME=LOW:HIGH."""
+    """NAME=A,B,C, or NAME=LOW:HIGH:COUNT, or, if values are `sampled`, NAME=LOW:HIGH."""
     name, equals, values = text.partition("=")
     name = name.strip().upper()
     if not equals or not name or not values.strip():
@@ -174,6 +174,9 @@ def read_varied(text: str, sampled: bool) -> Varied:
         if not sampled:
             raise PlanError(f"--vary {text}: a range without a count is for --sample; append a count, as :7")
         return Varied(name, (low, high), True)
+    if sampled:
+        drawn = f"{name}={parts[0].strip()}:{parts[1].strip()}"
+        raise PlanError(f"--vary {text}: --sample draws from the whole range, without a count; give {drawn}")
     count = _number(text, parts[2])
     if count != int(count) or not 2 <= count <= _MOST_VALUES:
         raise PlanError(f"--vary {text}: the count must be a whole number, 2 ... {_MOST_VALUES}")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.trajectory.route import PlanError, Planner
 from autopilot.trajectory.timeline import MissionState, cable_trouble, timeline
+from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import belief_of, load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
@@ -84,6 +85,21 @@ def remarks_on(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
             )
 
 
+def reeled(mission: Mission, vehicle: str) -> Iterator[str]:
+    """A line about each cable that is reeled while the load is carried, which no path report tells of."""
+    table = autopilot_parameters(load_belief(vehicle))
+    start = MissionState(cable_m=table["VEH_CABLE_LEN"])
+    for entry in timeline(mission.steps, start):
+        step, length_m = entry.step, entry.after.cable_m
+        if isinstance(step, Winch) and not entry.before.released:
+            speed_m_s = step.speed_m_s or table["WNC_SPEED"]
+            duration_s = transfer_duration(abs(step.length_m), speed_m_s, table["WNC_ACCEL"])
+            yield (
+                f"note: items[{entry.item}] (winch): {duration_s:.1f} s, to a cable of {length_m:.2f} m; "
+                "the vehicle stays in place, no path to report"
+            )
+
+
 def flown_alone(mission: Mission) -> Iterator[str]:
     """A line about what comes behind a release, which no path report tells of."""
     released = [i for i, step in enumerate(mission.steps) if isinstance(step, Release)]
@@ -125,7 +141,7 @@ def check_mission(name_or_path: str, vehicle: str, as_asked: bool, planner: Plan
             "note: how near a law without preview keeps to this, and whether its own errors lose the flight, "
             f"only a flight tells: gcs fly {shlex.quote(name_or_path)} --law thesis",
         )
-    warnings += tuple(flown_alone(mission))
+    warnings += (*reeled(mission, vehicle), *flown_alone(mission))
     if planner is not None and (unused := without_planning(mission)):
         warnings += (f"the planner {unused}",)
     return Check(mission.name, vehicle, tuple(found), tuple(reports), warnings)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -271,12 +272,22 @@ class FlightFolder:
         trouble, tlog = disk_trouble(error), self._path / TLOG_FILE
         if trouble:
             size = tlog.stat().st_size if tlog.exists() else 0
-            raise GcsError(f"{self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}") from None
+            if not size:
+                with suppress(OSError):  # the disk may be at fault, too
+                    self._clear()
+                raise GcsError(f"{self._path}: {trouble}; no telemetry could be kept") from None
+            raise GcsError(
+                f"{self._path}: {trouble}; {size} bytes of telemetry are kept in {tlog}; "
+                f"gcs report {shlex.quote(str(self._path))} reads them"
+            ) from None
         if self._kept:
             return
         if isinstance(error, KeyboardInterrupt) and tlog.exists() and tlog.stat().st_size > 0:
             _tell_abandoned(tlog)
             return
+        self._clear()
+
+    def _clear(self) -> None:
         for name in self._OURS:
             (self._path / name).unlink(missing_ok=True)
         if not any(self._path.iterdir()):

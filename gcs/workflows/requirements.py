@@ -17,6 +17,9 @@ from gcs.shell.display import say
 from missions.nearest import nearest_few
 
 COMPLETED = "completed"
+WHOLE = "all flights flown"  # the test case of a sweep: of its flights some may be lost
+_COUNTS = ("completed", "completed_fraction", "failed")  # figures of a sweep that lost flights change
+_NO_FIGURE = "this run has no such figure, for example because nothing happened that it measures"
 Value = float | str
 _SIGNS: dict[str, Callable[[Any, Any], bool]] = {
     "<=": operator.le,
@@ -51,7 +54,8 @@ class Verdict:
     def line(self) -> str:
         """For people."""
         found = "not known" if self.found is None else f"{self.found}"
-        return f"required {self.requirement.text}; found {found}"
+        why = f"; {_NO_FIGURE}" if self.found is None else ""
+        return f"required {self.requirement.text}; found {found}{why}"
 
 
 def read_requirements(texts: Iterable[str], keys: Sequence[str], listed: str) -> list[Requirement]:
@@ -96,15 +100,26 @@ def judge(requirements: Iterable[Requirement], record: Mapping[str, Any]) -> lis
     return found
 
 
+def unjudged(requirements: Sequence[Requirement], flights: int, completed: int) -> str:
+    """That no requirement on a sweep judges its flights that were not completed, and what to add; empty if
+    there are none, or if nothing is required."""
+    if not requirements or completed == flights or any(one.key in _COUNTS for one in requirements):
+        return ""
+    return (
+        f"--require judges the {completed} completed of {flights} flights; "
+        f'add --require "completed == {flights}" if all must be'
+    )
+
+
 @contextmanager
-def reporting(run: str, junit: Path | None) -> Iterator[None]:
-    """A run that does not come about is in the test report as well."""
+def reporting(run: str, junit: Path | None, case: str = COMPLETED) -> Iterator[None]:
+    """A run that does not come about is in the test report as well, as the test case `case`."""
     try:
         yield
     except GcsError as error:
         if junit is not None:
             suite = _suite(run, errors=1)
-            ET.SubElement(_case(suite, run, "completed"), "error", message=str(error))
+            ET.SubElement(_case(suite, run, case), "error", message=str(error))
             _write(junit, suite)
         raise
 
@@ -116,20 +131,22 @@ def conclude(
     wall_s: float,
     verdicts: Sequence[Verdict],
     reason: str = "",
+    case: str = COMPLETED,
 ) -> bool:
     """Tell each requirement that was not met on stderr, and write the test report: whether the run was
-    completed, or else the `reason`, and each requirement. True if all requirements were met."""
+    completed, as the test case `case`, or else the `reason`, and each requirement. True if all requirements
+    were met."""
     missed = [verdict for verdict in verdicts if not verdict.met]
     for verdict in missed:
         say(verdict.line)
     if junit is not None:
-        cases = [("completed", outcome == COMPLETED, ": ".join(filter(None, (f"outcome {outcome}", reason))))]
+        cases = [(case, outcome == COMPLETED, ": ".join(filter(None, (f"outcome {outcome}", reason))))]
         cases += [(verdict.requirement.text, verdict.met, verdict.line) for verdict in verdicts]
         suite = _suite(run, len(cases), sum(not met for _, met, _ in cases), wall_s=wall_s)
         for name, met, said in cases:
-            case = _case(suite, run, name)
+            element = _case(suite, run, name)
             if not met:
-                ET.SubElement(case, "failure", message=said)
+                ET.SubElement(element, "failure", message=said)
         _write(junit, suite)
     return not missed
 

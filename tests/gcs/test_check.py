@@ -17,7 +17,7 @@ from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
 from gcs.errors import EXIT_USAGE, InputError
-from gcs.workflows.check_mission import Check, check_mission, flown_alone, reels_too_far, remarks_on
+from gcs.workflows.check_mission import Check, check_mission, flown_alone, reeled, reels_too_far, remarks_on
 from gcs.workflows.vehicle_limits import load_limits
 from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
 
@@ -84,6 +84,15 @@ def test_what_is_flown_without_the_load_is_told_to_have_no_path() -> None:
     assert note.startswith("note: items[2]: flown without the load")
     assert list(flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Land())))) == []
     assert list(flown_alone(Mission("m", "M", "", (), (Takeoff(2.0), Release())))) == []
+
+
+def test_a_cable_that_is_reeled_is_told_with_its_duration() -> None:
+    steps = (Takeoff(5.0), Winch(0.6), Winch(-0.6, 0.1), Release(), Winch(0.1), Land())
+    longer, shorter = reeled(Mission("m", "M", "", (), steps), "bebop")
+    assert longer == (
+        "note: items[1] (winch): 5.9 s, to a cable of 1.30 m; the vehicle stays in place, no path to report"
+    )
+    assert shorter.startswith("note: items[2] (winch): 17.6 s, to a cable of 0.70 m")
 
 
 def test_a_law_is_not_checked_and_its_paths_are() -> None:

@@ -92,6 +92,18 @@ def test_what_was_recorded_outlives_two_interrupts(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("telemetry", [b"", b"telemetry"])
+def test_on_a_full_disk_it_is_told_what_is_kept_and_what_reads_it(tmp_path: Path, telemetry: bytes) -> None:
+    out, tlog = tmp_path / "out", tmp_path / "out" / TLOG_FILE
+    with pytest.raises(GcsError) as error, FlightFolder(out, overwrite=False):
+        tlog.write_bytes(telemetry)
+        raise OSError(errno.ENOSPC, "full")
+    kept = f"9 bytes of telemetry are kept in {tlog}; gcs report {out} reads them"
+    told = kept if telemetry else "no telemetry could be kept"
+    assert str(error.value) == f"{out}: no space left on device; {told}"
+    assert out.exists() == bool(telemetry)
+
+
+@pytest.mark.parametrize("telemetry", [b"", b"telemetry"])
 def test_a_folder_into_which_nothing_was_flown_is_free_for_the_next_flight(
     tmp_path: Path, telemetry: bytes
 ) -> None:

@@ -15,7 +15,7 @@ from gcs.cli import gcs
 from gcs.clients.flight import Outcome
 from gcs.errors import GcsError, InputError
 from gcs.workflows.fly import Flight
-from gcs.workflows.requirements import conclude, judge, read_requirements, reporting
+from gcs.workflows.requirements import conclude, judge, read_requirements, reporting, unjudged
 
 KEYS = ("load_error_max_m", "outcome", "slack_events")
 RECORD = {"load_error_max_m": 0.004, "outcome": "completed", "slack_events": None}
@@ -61,6 +61,29 @@ def test_what_is_no_requirement_is_refused_with_what_to_write(text: str, says: s
     with pytest.raises(InputError) as told:
         read_requirements([text], KEYS, "gcs fly --json")
     assert says in str(told.value) and repr(text) in str(told.value)
+
+
+def test_a_figure_that_there_is_not_is_told_with_a_possible_reason() -> None:
+    (verdict,) = judge(read_requirements(["slack_events == 0"], KEYS, "gcs fly --json"), RECORD)
+    assert verdict.line.startswith("required slack_events == 0; found not known; this run has no such figure")
+
+
+@pytest.mark.parametrize(
+    ("required", "completed", "told"),
+    [
+        (["load_error_max_m < 1"], 1, True),
+        (["load_error_max_m < 1"], 4, False),
+        (["load_error_max_m < 1", "completed == 1"], 1, False),
+        (["failed < 4"], 1, False),
+        (["completed_fraction > 0.2"], 1, False),
+        ([], 1, False),
+    ],
+)
+def test_lost_flights_that_nothing_judges_are_told(required: list[str], completed: int, told: bool) -> None:
+    keys = ("load_error_max_m", "completed", "failed", "completed_fraction")
+    line = unjudged(read_requirements(required, keys, "gcs sweep --json"), 4, completed)
+    assert ('judges the 1 completed of 4 flights; add --require "completed == 4"' in line) == told
+    assert told or not line
 
 
 def test_a_command_refuses_it_before_it_flies() -> None:
@@ -118,19 +141,24 @@ def test_a_report_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         conclude("run", tmp_path / "file" / "report.xml", "completed", 1.0, [])
 
 
-@pytest.mark.parametrize(
-    ("required", "code"),
-    [(("completed_fraction >= 0.99", "load_error_max_m < 0.05"), 0), (("completed_fraction > 1",), 4)],
-)
-def test_a_sweep_is_judged_as_a_whole(
-    required: tuple[str, ...], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def one_after_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps fly in this process."""
+
     @contextmanager
     def here(_: int) -> Iterator[tuple[Executor, int]]:
         with ThreadPoolExecutor(1) as executor:
             yield executor, 1
 
     monkeypatch.setattr("gcs.workflows.sweep.own_processes", here)
+
+
+@pytest.mark.usefixtures("one_after_another")
+@pytest.mark.parametrize(
+    ("required", "code"),
+    [(("completed_fraction >= 0.99", "load_error_max_m < 0.05"), 0), (("completed_fraction > 1",), 4)],
+)
+def test_a_sweep_is_judged_as_a_whole(required: tuple[str, ...], code: int, tmp_path: Path) -> None:
     words = [word for text in required for word in ("--require", text)]
     files = ["--out", str(tmp_path / "out"), "--junit", str(tmp_path / "sweep.xml")]
     result = CliRunner().invoke(gcs, ["sweep", "hover", "--seeds", "2", *words, *files, "--quiet"])
@@ -139,6 +167,26 @@ def test_a_sweep_is_judged_as_a_whole(
     assert (suite.get("tests"), suite.get("failures")) == (str(1 + len(required)), "1" if code else "0")
     if code:
         assert "required completed_fraction > 1; found 1.0" in result.stderr
+
+
+@pytest.mark.usefixtures("one_after_another")
+def test_a_sweep_whose_lost_flights_nothing_judges_says_so(tmp_path: Path) -> None:
+    junit = tmp_path / "sweep.xml"
+    words = ["sweep", "hover", "--vary", "SIM_LOAD_MASS=0.1,5", "--table-only", "--quiet"]
+    words += ["--require", "load_error_max_m < 0.05", "--out", str(tmp_path / "out"), "--junit", str(junit)]
+    result = CliRunner().invoke(gcs, words, prog_name="gcs")
+    assert result.exit_code == 0, result.output
+    assert "--require judges the 1 completed of 2 flights; add " in result.stderr
+    (suite,) = ET.parse(junit).getroot()
+    assert [case.get("name") for case in suite] == ["all flights flown", "load_error_max_m < 0.05"]
+
+
+def test_a_sweep_that_does_not_come_about_is_an_error_of_the_same_test_case(tmp_path: Path) -> None:
+    junit = tmp_path / "sweep.xml"
+    words = ["sweep", "nowhere", "--junit", str(junit), "--out", str(tmp_path / "out")]
+    assert CliRunner().invoke(gcs, words, prog_name="gcs").exit_code == 2
+    (suite,) = ET.parse(junit).getroot()
+    assert [case.get("name") for case in suite] == ["all flights flown"] and suite.get("errors") == "1"
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,6 @@ def test_a_disk_that_is_full_is_one_line_and_what_was_captured_is_kept(gcs: Gcs,
     out = tmp_path / "out"
     flown = gcs("fly", "hover", "--sensors", "ideal", "--out", str(out), "--quiet", file_bytes=500_000)
     assert flown.returncode == 1
-    kept = f"500000 bytes of telemetry are kept in {out / 'flight.tlog'}"
+    kept = f"500000 bytes of telemetry are kept in {out / 'flight.tlog'}; gcs report {out} reads them"
     assert flown.stderr == f"gcs: {out}: file too large; {kept}\n"
     assert (out / "flight.tlog").stat().st_size == 500_000

@@ -27,6 +27,7 @@ from autopilot.supervisor.state import (
     MissionProgress,
     Phase,
     Setpoints,
+    View,
 )
 from missions import model
 from missions.model import AttitudeRun, Delay, Signals, Sine, Speed, Takeoff, Term, Waypoint

@@ -202,7 +202,12 @@ REFUSALS = [
     ([UP, item(42600, 1.0, 2.0, 0.5)], 1, "INVALID_PARAM2", "winch action = 2; must be one of 1"),
     ([UP, item(42600, 1.0, 1.0, math.nan)], 1, "INVALID_PARAM3", "length = nan m"),
     ([UP, item(42600, 1.0, 1.0, 0.5, 2.0)], 1, "INVALID_PARAM4", "rate = 2 m/s"),
-    ([UP, item(42600, 1.0, 1.0, 4.8)], 1, "INVALID_PARAM3", "leave the load at 0.20 m; least 0.3 m"),
+    (
+        [UP, item(42600, 1.0, 1.0, 4.8)],
+        1,
+        "INVALID_PARAM3",
+        "at 0.20 m; must be at least 0.3 m",
+    ),
     ([UP, item(211, 1.0, 0.0), item(42600, 1.0, 1.0, 0.5)], 2, "INVALID", "needs the load"),
     ([item(177, 3.0, 1.0)], 0, "INVALID_PARAM1", "item to jump to = 3; must be 0 ... 0"),
     (

@@ -159,5 +159,5 @@ def reel_trouble(wanted: float, height: float, settings: Settings) -> str:
     if beyond:
         return beyond
     if height < LEAST_ALTITUDE_M - LEAST_REEL_M:
-        return f"load height {height:.2f} m, least {LEAST_ALTITUDE_M} m"
+        return f"load height {height:.2f} m, min {LEAST_ALTITUDE_M} m"
     return ""

@@ -52,9 +52,9 @@ def orbit(flight: Flight, request: Orbit, view: View, settings: Settings) -> Dec
 def _complaint(flight: Flight, centre: Vec3, radius: float, speed: float, settings: Settings) -> str:
     """Why a circle cannot be flown, or an empty string."""
     if not (math.isfinite(speed) and LEAST_RADIUS_M <= radius <= FARTHEST_M):
-        return f"radius {radius:g} m, least {LEAST_RADIUS_M} m"
+        return f"radius {radius:g} m, min {LEAST_RADIUS_M} m"
     if not all(abs(value) <= FARTHEST_M for value in centre) or centre[2] < LEAST_ALTITUDE_M:
-        return f"load height {centre[2]:.2f} m, least {LEAST_ALTITUDE_M} m"
+        return f"load height {centre[2]:.2f} m, min {LEAST_ALTITUDE_M} m"
     if not LEAST_SPEED_M_S <= abs(speed) <= settings.setpoints.fastest_m_s:
         limits = f"{LEAST_SPEED_M_S:g} ... {settings.setpoints.fastest_m_s:g} m/s"
         return f"{speed:.2f} m/s; must be {limits}"

@@ -51,7 +51,7 @@ def reposition(flight: Flight, request: Reposition, view: View, settings: Settin
     if max(map(abs, there)) > FARTHEST_M:
         return flight, denied(f"Reposition denied: more than {FARTHEST_M:g} m from home")
     if there[2] < LEAST_ALTITUDE_M:
-        return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, least {LEAST_ALTITUDE_M} m")
+        return flight, denied(f"Reposition denied: load height {there[2]:.2f} m, min {LEAST_ALTITUDE_M} m")
     place = below(there, settings) if flight.cable.released else there
     beyond = forbidden(flight.area.fence, place, settings) if fenced(flight, settings) else ""
     if beyond:

@@ -22,7 +22,7 @@ def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) ->
     """Take off to a height of the load; on the ground and disarmed, when the vehicle is armed."""
     altitude = settings.motion.takeoff_altitude_m if request.altitude_m is None else request.altitude_m
     if not altitude >= LEAST_ALTITUDE_M:
-        return flight, denied(f"Take-off denied: load height {altitude:.2f} m, least {LEAST_ALTITUDE_M} m")
+        return flight, denied(f"Take-off denied: load height {altitude:.2f} m, min {LEAST_ALTITUDE_M} m")
     flight_up = replace(
         flight,
         mission=replace(flight.mission, takeoff_altitude_m=altitude, active=False, waiting=False),
@@ -32,4 +32,5 @@ def takeoff(flight: Flight, request: Takeoff, view: View, settings: Settings) ->
         return flight_up, ACCEPTED
     if flight.phase == Phase.ARMED:
         return take_off(flight_up, view, settings), ACCEPTED
-    return flight, denied("Take-off denied: in the air")
+    begun = flight.phase in (Phase.TAUTEN, Phase.LIFT)
+    return flight, denied(f"Take-off denied: {'it has begun already' if begun else 'in the air'}")

@@ -104,7 +104,7 @@ def winch(asked: Asked) -> Iterator[Step]:
         )
     if left_at[2] < LEAST_REELED_M:
         at = f"it would leave the load at {left_at[2]:.2f} m"
-        text = f"{at}; least {LEAST_REELED_M} m: begin higher, or reel out less"
+        text = f"{at}; must be at least {LEAST_REELED_M} m: begin higher, or reel out less"
         raise asked.refused(text, mavlink.MAV_MISSION_INVALID_PARAM3)
     yield step
 

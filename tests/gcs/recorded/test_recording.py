@@ -59,7 +59,10 @@ def test_columns_are_taken_as_the_map_says(tmp_path: Path, columns: Path) -> Non
     [
         (b"", "not rows of comma-separated numbers"),
         (b"\x00\xff\xfe" * 100, "not rows of comma-separated numbers"),
-        (b"a,b,c\n" * 300, "not rows of comma-separated numbers"),
+        (b"a,b,c\n" * 300, "line 1: 'a' is not a number; one line of headings can be skipped, no more"),
+        (b"t" + b",x" * 10 + b"\ns" + b",m" * 10 + b"\n" + rows().encode(), "line 1: 't' is not a number"),
+        (b"t,x\n" + rows().encode() + b"NA" + b",y" * 10, "line 302: 'y' is not a number"),
+        (rows().replace("0,0,2", "o,0,2", 1).encode(), "line 1: 'o' is not a number"),
         (b"1,2,3\n" * 300, "3 columns; the column map asks for column 10"),
         (rows(20).encode(), "20 rows of 20 with a position and a unit quaternion"),
         (rows().replace(",2,1,0,0,0,", ",2,0,0,0,0,").encode(), "0 rows of 300"),
@@ -78,6 +81,16 @@ def test_a_broken_file_is_told_in_one_line(
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"gcs: {path}: ")
     assert says in line
+
+
+@pytest.mark.parametrize("name", ["flight.csv", "flight.csv.gz"])
+def test_a_line_of_headings_is_skipped(tmp_path: Path, columns: Path, name: str) -> None:
+    path = tmp_path / name
+    content = b"time,x,y,z\n" + rows().encode()
+    path.write_bytes(gzip.compress(content, mtime=0) if name.endswith(".gz") else content)
+    found = read_recording(path, load_map(columns))
+    assert found.time_s is not None
+    assert (len(found.time_s), found.time_s[0]) == (300, 0.0)
 
 
 def test_a_torn_archive_and_a_file_that_is_not_there(tmp_path: Path, columns: Path) -> None:

@@ -80,6 +80,9 @@ def test_what_was_not_changed_is_the_number_that_was_told_or_that_of_the_default
     assert found["SIM_WIND_E"] == ("0", "2", "0")
     assert found["SIM_LOAD_MASS"] == ("0.1", "0.25", "0.1")
     assert found["OWN_GAIN"] == ("default", "3", "1.5")
+    without = replace(base, telemetry=replace(base.telemetry, parameters={"SIM_WIND_E": 0.0}))
+    found = {one.name: one.values for one in differences([changed, without])}
+    assert found["OWN_GAIN"] == ("3", "–")  # it told its parameters, and this is none of them
     captured = replace(base, meta=replace(base.meta, command=""))
     assert differences([captured, changed])[0].values == ("–", "3")
 
@@ -148,6 +151,12 @@ def test_what_was_set_is_told_before_what_follows_from_it(runs: list[Path]) -> N
     set_ = replace(base, telemetry=told, meta=replace(base.meta, settings={"SIM_ACT_DELAY_MS": 72.0}))
     names = [one.name for one in differences([base, set_])]
     assert names == ["SIM_ACT_DELAY_MS", "CTL_LAW", "VEH_ACT_DELAY"]
+
+
+def test_the_number_of_a_law_is_not_told_beside_its_name(runs: list[Path]) -> None:
+    found = [loaded(run) for run in runs[:2]]
+    found[1] = replace(found[1], telemetry=replace(found[1].telemetry, parameters={"CTL_LAW": 1.0}))
+    assert "CTL_LAW" not in [one.name for one in differences(found)]
 
 
 def test_of_the_steps_only_those_are_told_that_differ(runs: list[Path]) -> None:

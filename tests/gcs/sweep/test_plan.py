@@ -49,6 +49,12 @@ def test_what_is_no_variation_is_refused_with_its_text(text: str) -> None:
     assert caught.value.exit_code == 2
 
 
+def test_a_count_where_values_are_drawn_is_refused_with_what_to_give() -> None:
+    with pytest.raises(PlanError, match=r"without a count; give SIM_WIND_E=0:4$") as caught:
+        read_varied("SIM_WIND_E=0:4:3", True)
+    assert caught.value.exit_code == 2
+
+
 def planned(short: str, varied: list[Varied], settings: dict[str, float], sample: int = 0) -> SweepPlan:
     return make_plan(short, "bebop", "lab", ["thesis"], [1], varied, settings, sample)
 
