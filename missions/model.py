@@ -6,7 +6,7 @@ autopilot and the feasibility check all speak of these records. A step is flown 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 Axis = Literal["x", "y", "z"]
@@ -79,12 +79,18 @@ class Sine:
     start_s: float = 0.0
 
 
+def _no_rise() -> float:
+    """A field behind one with a default needs a default too."""
+    raise TypeError("Term() misses the argument 'rise_s'")
+
+
 @dataclass(frozen=True, slots=True)
 class Term:
     """amplitude_m * envelope(t) * product of factors, added to one axis of the load's path.
 
     The envelope is 0 before `start_s`, rises to 1 along half a cosine in `rise_s`, stays for `hold_s` (None:
-    for ever), and falls back to 0 along half a cosine in `fall_s`. A rise or fall of 0 s is a jump.
+    for ever), and falls back to 0 along half a cosine in `fall_s`. A rise or fall of 0 s is a jump. `rise_s`
+    must be given.
 
     `rise_90_by_s` (None: as the envelope has it) asks that nine tenths of the rise be made so many seconds
     after `start_s` at the latest: a path that is shaped for the vehicle keeps to it. Only without factors.
@@ -92,10 +98,10 @@ class Term:
 
     axis: Axis
     amplitude_m: float
-    start_s: float
-    rise_s: float
-    hold_s: float | None
-    fall_s: float
+    start_s: float = 0.0
+    rise_s: float = field(default_factory=_no_rise)
+    hold_s: float | None = None
+    fall_s: float = 0.0
     factors: tuple[Sine, ...] = ()
     rise_90_by_s: float | None = None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from inspect import signature
 from operator import index
@@ -103,13 +103,10 @@ def whole(name: str, value: Any, least: int, most: int | None = None) -> int:
 
 def numbers(name: str, values: Any) -> tuple[float, ...]:
     """Finite numbers, one at least, or `Error`."""
-    try:
-        found = tuple(number(f"{name}[{i}]", value) for i, value in enumerate(values))
-    except TypeError:
-        found = ()
-    if not found or isinstance(values, str | Mapping):
-        raise GcsError(f"{name} = {shown(values)}; must be a list of numbers")
-    return found
+    listed = items(name, values, "a list of numbers")
+    if not listed:
+        raise GcsError(f"{name} is empty; must be a list of one number at least")
+    return tuple(number(f"{name}[{i}]", value) for i, value in enumerate(listed))
 
 
 def text(name: str, value: Any, example: str) -> str:
@@ -139,7 +136,8 @@ def name_or_file(name: str, value: Any) -> str:
 def items(name: str, values: Any, what: str) -> tuple[Any, ...]:
     """The members of a list or of another iterable, or `Error`, which says `what` it must be."""
     if isinstance(values, Iterable) and not isinstance(values, str | bytes | Mapping):
-        return tuple(values)
+        with suppress(TypeError):  # an array of numpy that has no dimension
+            return tuple(values)
     raise GcsError(f"{name} = {shown(values)}; must be {what}")
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from autopilot.vehicle.parameters import DEFAULT_LAW
 from autopilot.wire.tlog import TlogWriter, read_tlog
-from gcs.errors import GcsError
+from gcs.errors import GcsError, not_written
 from gcs.folders import PAGE_FILE, TLOG_FILE, keep_others, make_folder
 from gcs.workflows.flight_meta import meta_of
 from gcs.workflows.flight_options import FlightOptions
@@ -79,7 +79,7 @@ def fly(
     from gcs.workflows.flight_here import fly_here
 
     known = isinstance(mission, model.Mission)
-    flown = mission if isinstance(mission, model.Mission) else Mission.load(mission)
+    flown = mission if isinstance(mission, model.Mission) else Mission.load(name_or_path("mission", mission))
     options = FlightOptions(
         mission=flown.name if known else str(mission),
         law=law_reference(law),
@@ -154,9 +154,15 @@ class Flight:
             pictures[name].draw(view, png)
         return Picture(png.getvalue())
 
-    def report(self, out: str | Path, quiet: bool = True, pictures: bool = False) -> Path:
-        """Write what `gcs fly` leaves into the directory `out`, but for the logs of its programs, in place of
-        another flight; the path of the page. With `pictures` also those that `gcs fly --pictures` draws."""
+    def report(
+        self, out: str | Path, quiet: bool = True, pictures: bool = False, *, overwrite: bool = False
+    ) -> Path:
+        """Write what `gcs fly` leaves into the directory `out`, but for the logs of its programs; the path of
+        the page. With `pictures` also those that `gcs fly --pictures` draws.
+
+        `Error` if the directory holds another flight, unless `overwrite`, which replaces it; this flight may
+        be written there again.
+        """
         from gcs.workflows.own_vehicle import LOGS
         from gcs.workflows.report import make_report
 
@@ -164,6 +170,10 @@ class Flight:
         with told_in_python():
             make_folder(folder)
             keep_others(folder, TLOG_FILE)
+            if not overwrite and _holds_another(folder / TLOG_FILE, self.tlog):
+                raise GcsError(
+                    f"report out: {folder} holds another flight; name another folder, or give overwrite=True"
+                )
             for name in LOGS:  # of another flight
                 (folder / name).unlink(missing_ok=True)
             (folder / TLOG_FILE).write_bytes(self.tlog)
@@ -189,6 +199,14 @@ class Flight:
 
     def _repr_png_(self) -> bytes:
         return self.plot().png
+
+
+def _holds_another(file: Path, tlog: bytes) -> bool:
+    """Whether the file is there, not empty, and of another flight than this telemetry."""
+    try:
+        return file.exists() and file.read_bytes() not in (b"", tlog)
+    except OSError as error:
+        raise not_written(error, file, by="") from None
 
 
 class Picture:

@@ -17,7 +17,7 @@ from typing import Protocol
 from platformdirs import user_cache_path
 
 from gcs.errors import GcsError
-from plumbline.arguments import shown
+from plumbline.arguments import name_or_file, shown
 
 
 class Savable(Protocol):
@@ -31,7 +31,7 @@ def name_or_path(argument: str, given: str | PathLike[str] | Savable) -> str:
     """A name or a path as the argument gives it; of a thing made in Python the path of its file, which has
     its name, or that of the argument."""
     if isinstance(given, str | PathLike):
-        return str(given)
+        return name_or_file(argument, given)
     kind = argument.capitalize()
     if not hasattr(given, "save") or kind not in (one.__name__ for one in type(given).__mro__):
         raise GcsError(

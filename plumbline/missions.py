@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
 from os import PathLike
+from typing import Any
 
-from gcs.errors import input_error
+from gcs.errors import GcsError, InputError, input_error
 from missions import model
 from missions.fileformat import MissionFileError, load_mission, mission_of
-from missions.model import Step
+from missions.model import KINDS, Signals, Step, Term
 from missions.toml_files import FileError
 from missions.writing import mission_table, write_toml
-from plumbline.arguments import file_path, items, name_or_file, text
+from plumbline.arguments import file_path, items, name_or_file, shown, text
 
 
 class Mission(model.Mission):
@@ -38,12 +40,15 @@ class Mission(model.Mission):
         assumptions: Iterable[str] = (),
     ) -> None:
         text("name", name, "there")
-        table = mission_table(
-            title or name,
-            description,
-            items("assumptions", assumptions, "a list of texts"),
-            items("steps", steps, "a list of steps, as [Takeoff(1.0), Land()]"),
-        )
+        if not name.strip():
+            raise GcsError(f"name = {shown(name)}; must be a text that is not empty, as 'there'")
+        if name.splitlines() != [name] or not (title or name.isprintable()):
+            raise GcsError(f"name = {shown(name)}; must be one line of printable characters, as 'there'")
+        texts = items("assumptions", assumptions, "a list of texts")
+        listed = items("steps", steps, "a list of steps, as [Takeoff(1.0), Land()]")
+        if wrong := list(_mistakes(listed)):
+            raise InputError(*(f"{name}: {line}" for line in wrong))
+        table = mission_table(title or name, description, texts, listed)
         try:
             made = mission_of(table, name, name)
         except MissionFileError as error:
@@ -66,3 +71,27 @@ class Mission(model.Mission):
             write_toml(file_path("path", path), table)
         except FileError as error:
             raise input_error(error) from None
+
+
+def _mistakes(steps: Iterable[Any]) -> Iterator[str]:
+    """What can be wrong with steps in Python, and not with the items of a file."""
+    for index, step in enumerate(steps):
+        at = f"items[{index}]"
+        if isinstance(step, type) and step in KINDS:
+            yield _class_problem(at, step)
+        terms: Any = step.terms if isinstance(step, Signals) else None
+        if not isinstance(terms, Sequence) or isinstance(terms, str):
+            continue
+        if not terms:
+            yield f"{at}.terms is empty; must be a list of one Term at least"
+        for ordinal, term in enumerate(terms):
+            part = f"{at}.terms[{ordinal}]"
+            if term is Term:
+                yield _class_problem(part, Term)
+            elif isinstance(term, Term) and term.hold_s is None and term.fall_s:
+                yield f"{part} has fall_s without hold_s; give both, or neither to stay at the top"
+
+
+def _class_problem(at: str, kind: type[Any]) -> str:
+    call = f"{kind.__name__}({'...' if fields(kind) else ''})"
+    return f"{at} is the class {kind.__name__}; write {call}"

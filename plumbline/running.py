@@ -177,7 +177,10 @@ class RunningVehicle:
             self.wait(lambda state: _is_there(state, place), limit_s)
 
     def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
-        """Set the load down, and the vehicle beside it."""
+        """Set the load down, and the vehicle beside it.
+
+        With a disarmed vehicle it returns at once; a take-off or mission that waits for arming is taken back.
+        """
         limit_s = positive("timeout_s", timeout_s)
         self._command(lambda session: command.land(session.target))
         if wait:

@@ -68,7 +68,6 @@ def sweep(
     pandas, or of polars, or a table of Arrow, as `kind` says. The flights are flown by a program of their
     own, so a script needs no guard around what it does. `Error` if the sweep cannot be flown.
     """
-    check_kind(kind)
     with ExitStack() as stack:
         words = []
         if out is None:
@@ -93,6 +92,7 @@ def sweep(
             words += ["--jobs", str(whole("jobs", jobs, 1))]
         if scheduler is not None:
             words += ["--scheduler", _address(scheduler)]
+        check_kind(kind)
         with told_in_python():
             _run([*words, "--out", str(folder)], quiet)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import plumbline
@@ -37,7 +38,10 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "fly timeout": (lambda v: plumbline.fly("hover", timeout_s=v), NO_NUMBER),
     "sweep mission": (plumbline.sweep, (None, *NO_TEXT)),
     "sweep vary": (lambda v: plumbline.sweep("hover", vary=v), NO_MAPPING),
-    "sweep varied": (lambda v: plumbline.sweep("hover", vary={"SIM_WIND_E": v}), (None, 3, "12", {1: 2})),
+    "sweep varied": (
+        lambda v: plumbline.sweep("hover", vary={"SIM_WIND_E": v}),
+        (None, 3, "12", b"12", {1: 2}, np.array(3)),
+    ),
     "sweep settings": (lambda v: plumbline.sweep("hover", settings=v), NO_MAPPING),
     "sweep seeds": (lambda v: plumbline.sweep("hover", seeds=v), (0, 1.5, "x", None)),
     "sweep laws": (lambda v: plumbline.sweep("hover", laws=v), (None, [], [3], *NO_LIST)),
@@ -47,7 +51,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "connect": (plumbline.connect, (None, 15999, "", "x", *NO_TEXT)),
     "connect timeout": (lambda v: plumbline.connect("15999", timeout_s=v), (None, 0, *NO_NUMBER)),
     "connect key": (lambda v: plumbline.connect("15999", signing_key=v), (3, "x", b"x", [1])),
-    "mission name": (lambda v: Mission(v, STEPS), (None, "", *NO_TEXT)),
+    "mission name": (lambda v: Mission(v, STEPS), (None, "", " ", "x\ny", "x\n", *NO_TEXT)),
     "mission steps": (lambda v: Mission("a", v), (None, [], [3], *NO_LIST)),
     "mission title": (lambda v: Mission("a", STEPS, v), NO_TEXT),
     "mission assumptions": (lambda v: Mission("a", STEPS, assumptions=v), (None, [3], *NO_LIST)),

@@ -118,6 +118,12 @@ def test_numbers_of_numpy_and_whole_ones_are_numbers(tmp_path: Path) -> None:
     assert Mission.load(tmp_path / "m.toml").steps[2] == Waypoint(1.0, 0.5, 2.0)
 
 
+def test_a_term_has_the_defaults_of_a_file() -> None:
+    assert Term(axis="y", amplitude_m=1.0, rise_s=1.0) == Term("y", 1.0, 0.0, 1.0, None, 0.0, (), None)
+    with pytest.raises(TypeError, match="rise_s"):
+        Term("y", 1.0)
+
+
 WRONG: dict[str, tuple[Any, str]] = {
     "value": (
         lambda: Mission("m", [Takeoff(1.0), Waypoint(0.0, 0.0, -1.0), Land()]),
@@ -126,6 +132,27 @@ WRONG: dict[str, tuple[Any, str]] = {
     "type": (lambda: Mission("m", [Takeoff("1"), Land()]), 'items[0].altitude_m = "1"; must be a number'),  # type: ignore[arg-type]
     "no step": (lambda: Mission("m", [Takeoff(1.0), "land", Land()]), 'items[1].type = "str"; must be one'),  # type: ignore[list-item]
     "order": (lambda: Mission("m", [Takeoff(1.0)]), "a mission ends on the ground"),
+    "no name": (lambda: Mission("", [Land()]), "name = ''; must be a text that is not empty, as 'there'"),
+    "name": (
+        lambda: Mission("x\ny", [Land()], "Title"),
+        "name = 'x\\ny'; must be one line of printable characters, as 'there'",
+    ),
+    "classes": (
+        lambda: Mission("m", [Takeoff, Land]),  # type: ignore[list-item]
+        "m: items[0] is the class Takeoff; write Takeoff(...); m: items[1] is the class Land; write Land()",
+    ),
+    "class of a term": (
+        lambda: Mission("m", [Takeoff(1.0), Signals(5.0, (Term,)), Land()]),  # type: ignore[arg-type]
+        "m: items[1].terms[0] is the class Term; write Term(...)",
+    ),
+    "no terms": (
+        lambda: Mission("m", [Takeoff(1.0), Signals(5.0, ()), Land()]),
+        "m: items[1].terms is empty; must be a list of one Term at least",
+    ),
+    "fall alone": (
+        lambda: Mission("m", [Takeoff(1.0), Signals(5.0, (Term("y", 1.0, rise_s=1.0, fall_s=1.0),)), Land()]),
+        "m: items[1].terms[0] has fall_s without hold_s; give both, or neither to stay at the top",
+    ),
     "nothing": (lambda: Mission("m", []), "items = []; must be a list of at least 1"),
     "after release": (lambda: Mission("m", [Takeoff(1.0), Release(), Winch(0.1), Land()]), "needs the load"),
     "load": (lambda: Mission.load("hovr"), "did you mean hover?"),

@@ -75,6 +75,28 @@ def test_pictures_and_report(flight: plumbline.Flight, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "flight.tlog").read_bytes() == flight.tlog
 
 
+def test_a_report_replaces_another_flight_only_when_asked(flight: plumbline.Flight, tmp_path: Path) -> None:
+    log, out = tmp_path / "flight.tlog", tmp_path
+    log.touch()
+    flight.report(out)
+    flight.report(out)
+    log.write_bytes(flight.tlog[:-1])
+    with pytest.raises(plumbline.Error) as told:
+        flight.report(out)
+    assert str(told.value) == (
+        f"report out: {out} holds another flight; name another folder, or give overwrite=True"
+    )
+    assert log.read_bytes() == flight.tlog[:-1]
+    flight.report(out, overwrite=True)
+    assert log.read_bytes() == flight.tlog
+
+
+def test_a_report_where_the_log_is_a_folder(flight: plumbline.Flight, tmp_path: Path) -> None:
+    (tmp_path / "flight.tlog").mkdir()
+    with pytest.raises(plumbline.Error, match=r"flight\.tlog: Is a directory; name another folder$"):
+        flight.report(tmp_path)
+
+
 def test_a_sweep_is_a_table() -> None:
     vary = {"SIM_ACT_DELAY_MS": (0, 12.0)}
     found = plumbline.sweep("hover", vary=vary, seeds=2, sensors="ideal", jobs=1, quiet=True)
@@ -96,6 +118,8 @@ def test_a_library_that_is_missing_is_named_before_anything_is_flown(
             match=r"pandas is not .*; pip install -e '.\[pandas\]' in the clone of Plumbline, or",
         ):
             call()
+    with pytest.raises(plumbline.Error, match="seeds = 0"):
+        plumbline.sweep("hover", seeds=0)
     assert capsys.readouterr().err == ""
 
 
@@ -159,7 +183,15 @@ WRONG: dict[str, tuple[Any, str]] = {
     ),
     "nothing varied": (
         lambda: plumbline.sweep("hover", vary={"SIM_WIND_E": []}),
-        "vary['SIM_WIND_E'] = []; must be a list of numbers",
+        "vary['SIM_WIND_E'] is empty; must be a list of one number at least",
+    ),
+    "varied as on the command line": (
+        lambda: plumbline.sweep("hover", vary={"SIM_ACT_DELAY_MS": "0:3:3"}),  # type: ignore[dict-item]
+        "vary['SIM_ACT_DELAY_MS'] = '0:3:3'; must be a list of numbers",
+    ),
+    "no mission": (
+        lambda: plumbline.fly(plumbline.Vehicle.load("bebop")),  # type: ignore[arg-type]
+        "; must be a name, the path of a file, or a plumbline.Mission",
     ),
     "one law": (lambda: plumbline.sweep("hover", laws="lqr"), "must be a list of laws, as ['plumbline']"),
     "no such law": (lambda: plumbline.sweep("hover", laws=["pid"]), "law 'pid': no control law of that name"),
