@@ -304,10 +304,11 @@ def main() -> None:
     parser.add_argument("--linear", action="store_true", help="the table of cost over three decades")
     parser.add_argument("--docs", type=Path)
     options = parser.parse_args()
-    print(machine())
+    about = machine()
+    print(about)
     with tempfile.TemporaryDirectory() as name:
         text = table(("Case B", "measured", "beside it"), all_rows(options, Path(name)))
-    text = f"{machine()}\n\n{text}\n"
+    text = f"{about}\n\n{text}\n"
     if options.linear:
         text += "\n" + table(("without the wire, sensors of the lab", "us a tick"), linear_rows()) + "\n"
     if options.docs:

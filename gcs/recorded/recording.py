@@ -79,25 +79,22 @@ def is_log(path: Path) -> bool:
 
 def is_table(path: Path) -> bool:
     """Whether a file begins with rows of comma-separated numbers, behind one line of headings at most."""
-    try:
-        lines = _first_lines(path)
-    except (OSError, EOFError, zlib.error):  # the last two of a torn archive
-        return False
-    return any(_is_row(line) for line in lines)
+    return any(_is_row(line) for line in _first_lines(path))
 
 
 def _has_headings(path: Path) -> bool:
     """Whether the first line of a table holds no number at all, and the second is a row of numbers."""
-    try:
-        first, second = _first_lines(path)
-    except (OSError, EOFError, zlib.error):
-        return False
+    first, second = _first_lines(path)
     return not any(_is_number(cell) for cell in first.split(b",")) and _is_row(second)
 
 
 def _first_lines(path: Path) -> tuple[bytes, bytes]:
-    with _opened(path) as file:
-        return file.readline(_LONGEST_ROW), file.readline(_LONGEST_ROW)
+    """Empty where they cannot be read."""
+    try:
+        with _opened(path) as file:
+            return file.readline(_LONGEST_ROW), file.readline(_LONGEST_ROW)
+    except (OSError, EOFError, zlib.error):  # the last two of a torn archive
+        return b"", b""
 
 
 def _opened(path: Path) -> BufferedIOBase:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from autopilot.trajectory.feasibility import PathReport, Violation, check, paths
 from autopilot.trajectory.route import PlanError, Planner
-from autopilot.trajectory.timeline import MissionState, cable_trouble, timeline
+from autopilot.trajectory.timeline import MissionState, TimelineEntry, cable_trouble, timeline
 from autopilot.trajectory.transfer import transfer_duration
 from autopilot.vehicle.file import belief_of, load_belief
-from autopilot.vehicle.parameters import autopilot_parameters
+from autopilot.vehicle.parameters import AutopilotParameters, autopilot_parameters
 from autopilot.wire.convert.geodesy import Home
 from autopilot.wire.items import WireItem, decode_items
 from gcs.errors import GcsError
@@ -45,15 +45,19 @@ def reels_too_far(mission: Mission, vehicle: str) -> Iterator[Violation]:
     """Where it asks for a cable that the winch, as the vehicle comes, does not make; refused at its start."""
     table = autopilot_parameters(load_belief(vehicle))
     least_m, most_m = table["WNC_LEN_MIN"], table["WNC_LEN_MAX"]
-    for entry in timeline(mission.steps, MissionState(cable_m=table["VEH_CABLE_LEN"])):
-        length_m = entry.after.cable_m
-        if not isinstance(entry.step, Winch) or length_m is None:
-            continue
+    for entry, _, length_m in _reelings(mission, table):
         beyond = cable_trouble(length_m, least_m, most_m)
         if beyond:
             text = f"items[{entry.item}] (winch): {beyond}: change length_m, or these of the vehicle"
             limit_m = least_m if length_m < least_m else most_m
             yield Violation(entry.item, "cable length", length_m, limit_m, entry.transfer_s, text)
+
+
+def _reelings(mission: Mission, table: AutopilotParameters) -> Iterator[tuple[TimelineEntry, Winch, float]]:
+    """Each winch item, and how long the cable is then."""
+    for entry in timeline(mission.steps, MissionState(cable_m=table["VEH_CABLE_LEN"])):
+        if isinstance(entry.step, Winch) and entry.after.cable_m is not None:
+            yield entry, entry.step, entry.after.cable_m
 
 
 def path_reports(
@@ -88,10 +92,8 @@ def remarks_on(reports: Sequence[PathReport], vehicle: str) -> Iterator[str]:
 def reeled(mission: Mission, vehicle: str) -> Iterator[str]:
     """A line about each cable that is reeled while the load is carried, which no path report tells of."""
     table = autopilot_parameters(load_belief(vehicle))
-    start = MissionState(cable_m=table["VEH_CABLE_LEN"])
-    for entry in timeline(mission.steps, start):
-        step, length_m = entry.step, entry.after.cable_m
-        if isinstance(step, Winch) and not entry.before.released:
+    for entry, step, length_m in _reelings(mission, table):
+        if not entry.before.released:
             speed_m_s = step.speed_m_s or table["WNC_SPEED"]
             duration_s = transfer_duration(abs(step.length_m), speed_m_s, table["WNC_ACCEL"])
             yield (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from autopilot.geometry.linear import norm, sub
+from autopilot.geometry.linear import Vec3, norm, sub
 from autopilot.guidance.legs import QUAD_POSITION, Creep, transfer_leg
 from autopilot.supervisor.phase_legs import CLEARANCE, HEIGHT_SIGMAS, SLACK_ACCEL, SLACK_SPEED
 from autopilot.supervisor.settings import Settings
@@ -37,16 +37,15 @@ def watch_tautening(flight: Flight, view: View, settings: Settings) -> Watched:
         length = norm(sub(view.x_quad, view.x_load))
         flight = replace(flight, cable=replace(flight.cable, taut_length_m=length))
         return Watched(flight, Event.TAUT, ((INFO, LIFTING_UNSEEN if view.unseen else LIFTING),))
-    if _astray(flight, view):
+    at = flight.legs[0].jet(leg_time_s(flight, view.now_us))[0]
+    over = (view.x_load[0], view.x_load[1], at[2])
+    if not norm(sub(over, at)) <= ASTRAY:  # as a load that was not seen well from the ground
         if _hangs(flight, view, settings):
             length = norm(sub(view.x_quad, view.x_load))
             text = f"Cable pulls at {length:.2f} m, landing; check VEH_CABLE_LEN"
             return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
-        flight = _over_load(flight, view)
-    creeps = len(flight.legs) == 1 and flight.still_since_us < 0
-    if creeps and flight.legs[0].jet(leg_time_s(flight, view.now_us))[0][2] > _taut_by(
-        flight, view, settings
-    ):
+        return Watched(_moved(flight, view, at, over))
+    if flight.still_since_us < 0 and at[2] > _taut_by(flight, view, settings):
         text = "Cable never taut, landing; check VEH_CABLE_LEN"
         return Watched(off_mission(flight), Event.LAND, ((CRITICAL, text),))
     return Watched(flight)
@@ -63,26 +62,18 @@ def _note_pull(flight: Flight, view: View, settings: Settings) -> Flight:
     return replace(flight, still_since_us=view.now_us if pulls else -1)
 
 
-def _astray(flight: Flight, view: View) -> bool:
-    """Whether the load is not where the vehicle rises, as one is that was not seen well from the ground."""
-    at = flight.legs[0].jet(leg_time_s(flight, view.now_us))[0]
-    return not norm(sub((view.x_load[0], view.x_load[1], at[2]), at)) <= ASTRAY
-
-
 def _hangs(flight: Flight, view: View, settings: Settings) -> bool:
-    """Whether it is astray because it swings, on a cable shorter than it is believed to be: the cable pulls,
+    """Whether the load is astray because it swings, on a cable shorter than it is believed to be: it pulls,
     long after it should have come taut, and is not as long as one that is."""
     latest_s = LONG_AFTER * TAUT_LATEST * settings.cable_length_m / settings.motion.taut_speed_m_s
     late = view.now_us - flight.phase_start_us > latest_s * 1e6
     return late and not view.taut and share_pulled(view, settings) > PULLED
 
 
-def _over_load(flight: Flight, view: View) -> Flight:
-    """The rising vehicle, moved over the load."""
+def _moved(flight: Flight, view: View, at: Vec3, over: Vec3) -> Flight:
+    """The rising vehicle, moved from where it is over the load."""
     creep = flight.legs[0]
     assert isinstance(creep, Creep)
-    at = creep.jet(leg_time_s(flight, view.now_us))[0]
-    over = (view.x_load[0], view.x_load[1], at[2])
     legs = (
         transfer_leg(at, over, SLACK_SPEED, SLACK_ACCEL, QUAD_POSITION),
         replace(creep, begin=over),
