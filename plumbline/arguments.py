@@ -23,7 +23,6 @@ _LONGEST_SHOWN = 80  # characters of a value
 _PHRASES = (  # of the command line, and what they are in Python
     (r"; choose another --out, or add --fresh to .*", "; choose another out"),
     (r"(?<=another folder) by --out\b", ""),
-    (r"; --sample takes a few", "; vary less"),
     (r"--force tries", "force=True tries"),
     (r"--law\b(?= says|[^s]*instead)", "laws"),
     (r"; see gcs [a-z ]*--help$", ""),

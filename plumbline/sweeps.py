@@ -40,8 +40,9 @@ _SAYS = "gcs: "  # begins the line of a known error
 def sweep(
     mission: str | Path | Mission,
     *,
-    vary: Mapping[str, Iterable[float]] | None = None,
+    vary: Mapping[str, Iterable[float] | str] | None = None,
     seeds: int = 1,
+    sample: int | None = None,
     laws: Sequence[str] = (DEFAULT_LAW,),
     estimator: str | None = None,
     planner: str | None = None,
@@ -57,8 +58,9 @@ def sweep(
     """Fly a mission under every value of what is varied, with every law and the seeds 1 ... `seeds`.
 
     `mission`, `sensors` and `vehicle`: a shipped name, the path of a file, or one made in Python. `vary`:
-    values by the name of a parameter of simulator or autopilot; `settings`: parameters that are the same for
-    all flights. `estimator` and `planner`: one of your own, as `FILE.py:CLASS`, of all flights. `jobs`
+    values by the name of a parameter of simulator or autopilot, in a list or in a text as of `gcs sweep
+    --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings (Latin hypercube)
+    instead of all of the grid. `settings`: parameters that are the same for all flights. `estimator` and `planner`: one of your own, as `FILE.py:CLASS`, of all flights. `jobs`
     flights are flown at a time, by default one on each core; `scheduler` is the address
     of a Dask scheduler, or a Dask client, that flies them instead. `out`: the directory that keeps table and
     page (docs/cli.md), from which a sweep that was interrupted goes on; by default nothing is kept.
@@ -85,7 +87,9 @@ def sweep(
             words += ["--law", law_reference(law)]
         words += own_words(estimator_reference(estimator), planner_reference(planner))
         for name, values in by_parameter("vary", vary, "{'SIM_WIND_E': [0, 3]}").items():
-            words += ["--vary", f"{name}={','.join(map(repr, numbers(f'vary[{name!r}]', values)))}"]
+            words += ["--vary", f"{name}={_values(name, values)}"]
+        if sample is not None:
+            words += ["--sample", str(whole("sample", sample, 1))]
         for setting in setting_words(settings):
             words += ["--set", setting]
         if jobs is not None:
@@ -99,6 +103,13 @@ def sweep(
         from pyarrow import parquet
 
         return as_frame(parquet.read_table(folder / "flights.parquet"), kind)
+
+
+def _values(name: str, values: Any) -> str:
+    """Those that a parameter takes, as the command line writes them."""
+    if isinstance(values, str):
+        return values
+    return ",".join(map(repr, numbers(f"vary[{name!r}]", values)))
 
 
 def _laws(laws: Sequence[str]) -> Sequence[str]:

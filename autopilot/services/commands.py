@@ -140,7 +140,7 @@ def _takeoff(call: Call, context: Context) -> Request | Verdict:
     altitude_m = _altitude_above_home(call, context)
     if altitude_m is not None and altitude_m <= 0.0:
         reference = "above home" if altitude_m == call.z else f"above sea level, {altitude_m:g} m above home"
-        return _refused(f"Take-off: param7 = {call.z:g} m {reference}; must be above home")
+        return _refused(f"Take-off: altitude {call.z:g} m {reference} (param7); must be above home")
     return Takeoff(altitude_m)
 
 

@@ -133,7 +133,8 @@ class VehicleLimits:
 class PathReport:
     """How a step is flown: signals as shaped, waypoints as passed, a way from rest to rest, an attitude run.
 
-    `distance_m` is between the flown and the asked path, at most; forces in N, `tilt_deg` of the vehicle.
+    `distance_m` is between the flown and the asked path, at most; forces in N, `tilt_deg` of the vehicle;
+    `speed_m_s` of the load, at most (0 in an attitude run, which gives none).
     """
 
     item: int
@@ -145,6 +146,7 @@ class PathReport:
     tension_low_n: float
     tilt_deg: float
     slowed: float = 1.0  # times as long as asked
+    speed_m_s: float = 0.0
 
     def __str__(self) -> str:
         near = ""
@@ -154,8 +156,9 @@ class PathReport:
             near = f", at most {1e3 * self.distance_m:.1f} mm from the path asked"
         if self.slowed != 1.0:
             near = f", {self.slowed:.2f} times as long as asked{near.removesuffix(' asked')}"
+        speed = f"load to {self.speed_m_s:.2f} m/s, " if self.speed_m_s else ""
         return (
-            f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; "
+            f"items[{self.item}] ({self.kind}): {self.duration_s:.1f} s{near}; {speed}"
             f"rotors {self.rotor_low_n:.2f} ... {self.rotor_high_n:.2f} N, "
             f"tension from {self.tension_low_n:.2f} N, tilt to {self.tilt_deg:.0f} deg"
         )
@@ -287,6 +290,7 @@ def _path_report(
         along.tension_low.value,
         degrees(along.tilt.value),
         slowed,
+        0.0 if isinstance(entry.step, AttitudeRun) else along.speed.value,
     )
 
 

@@ -353,7 +353,9 @@ def headline(meta: FlightMeta) -> str:
 def summary_line(record: Record) -> str:
     """The flight in one line."""
     parts = [str(record["outcome"])]
-    parts += [f"{name} {record[name]}" for name in ("law", "sensors", "seed") if record[name] is not None]
+    parts += [
+        f"{name} {record[name]}" for name in ("law", "vehicle", "sensors", "seed") if record[name] is not None
+    ]
     worst, rms = (METRICS[name].read(record) for name in ("load_error_max_m", "load_error_rms_m"))
     if record["load_error_max_m"] is not None:
         parts.append(f"load error max {worst}, RMS {rms}")

@@ -82,7 +82,7 @@ def draw_track(figure: Any, samples: Samples, room: Room, bar_room: Room) -> Non
         bar.set_label(f"load position error ({unit})", fontsize=9)
         bar.outline.set_visible(False)
         bar.ax.tick_params(labelsize=8, length=0)
-    _hang(ax, samples, np.flatnonzero(mission), low, high)
+    _hang(ax, samples, np.flatnonzero(mission if mission.any() else known), low, high)
     # the box is turned: its corners may lie beyond the axes' rectangle, at which Matplotlib would cut
     for artist in (*ax.lines, *ax.collections):
         artist.set_clip_on(False)

@@ -221,7 +221,8 @@ class FlightDisplay(LiveBars):
     def _pace(self, progress: Progress, now_s: float) -> str:
         if self._began is None or now_s - self._began[0] < 2.0 * _REFRESH_S:
             return ""
-        return f"x{(progress.sim_time_s - self._began[1]) / (now_s - self._began[0]):.1f}"
+        pace = f"x{(progress.sim_time_s - self._began[1]) / (now_s - self._began[0]):.1f}"
+        return "" if pace == "x0.0" else pace  # the vehicle has barely begun
 
     def _line(self, fields: dict[str, str]) -> str:
         words = [fields["clock"], fields["phase"], fields["item"]]

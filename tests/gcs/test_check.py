@@ -13,13 +13,14 @@ from autopilot.trajectory import feasibility
 from autopilot.trajectory.feasibility import PathReport
 from autopilot.trajectory.prepare import ShapedPath
 from autopilot.trajectory.shaping import unshaped
+from autopilot.trajectory.transfer import PEAK_SPEED
 from autopilot.vehicle.file import load_belief
 from autopilot.vehicle.parameters import autopilot_parameters
 from gcs.cli import gcs
 from gcs.errors import EXIT_USAGE, InputError
 from gcs.workflows.check_mission import Check, check_mission, flown_alone, reeled, reels_too_far, remarks_on
 from gcs.workflows.vehicle_limits import load_limits
-from missions.model import Land, Mission, Release, Takeoff, Waypoint, Winch
+from missions.model import Land, Mission, Release, Speed, Takeoff, Waypoint, Winch
 
 CASE_C = PathReport(2, "signals", 50.5, 0.0003, 1.86, 8.16, 3.87, 27.0)  # as planned for `heavy`, 12 N each
 
@@ -72,8 +73,22 @@ def test_paths_as_asked_are_told_with_what_the_check_does_not_judge() -> None:
     assert note.endswith("only a flight tells: gcs fly case-a --law thesis")
     assert shaped.warnings == ()
     assert [path.distance_m > 0.0 for path in (asked.paths[-1], shaped.paths[-1])] == [False, True]
-    assert ", as asked; rotors" in str(asked.paths[-1])
-    assert "mm from the path asked; rotors" in str(shaped.paths[-1])
+    assert ", as asked; load to " in str(asked.paths[-1])
+    assert "mm from the path asked; load to " in str(shaped.paths[-1])
+
+
+def test_how_fast_the_load_becomes_is_told() -> None:
+    steps = (Takeoff(2.0), Speed(9.0), Waypoint(1.0, 0.0, 2.0), Land())
+    *_, path = feasibility.paths(Mission("quick", "", "", (), steps), load_limits("bebop"))
+    # 1 m is too short for it at the acceleration that is set; sampled at the middle, where the peak is
+    assert path.speed_m_s == pytest.approx(PEAK_SPEED * 1.0 / path.duration_s, rel=1e-9)
+    assert path.speed_m_s < 2.0
+    assert f"; load to {path.speed_m_s:.2f} m/s, rotors" in str(path)
+
+
+def test_attitude_runs_tell_of_no_speed() -> None:
+    runs = [path for path in check_mission("quad-attitude", "bebop", False).paths if path.kind == "attitude"]
+    assert runs and all("m/s" not in str(path) for path in runs)
 
 
 def test_what_is_flown_without_the_load_is_told_to_have_no_path() -> None:

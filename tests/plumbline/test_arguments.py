@@ -40,10 +40,11 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "sweep vary": (lambda v: plumbline.sweep("hover", vary=v), NO_MAPPING),
     "sweep varied": (
         lambda v: plumbline.sweep("hover", vary={"SIM_WIND_E": v}),
-        (None, 3, "12", b"12", {1: 2}, np.array(3)),
+        (None, 3, "", b"12", {1: 2}, np.array(3)),
     ),
     "sweep settings": (lambda v: plumbline.sweep("hover", settings=v), NO_MAPPING),
     "sweep seeds": (lambda v: plumbline.sweep("hover", seeds=v), (0, 1.5, "x", None)),
+    "sweep sample": (lambda v: plumbline.sweep("hover", sample=v), (0, 1.5, "x")),
     "sweep laws": (lambda v: plumbline.sweep("hover", laws=v), (None, [], [3], *NO_LIST)),
     "sweep jobs": (lambda v: plumbline.sweep("hover", jobs=v), (0, 1.5, "x")),
     "sweep scheduler": (lambda v: plumbline.sweep("hover", scheduler=v), ("", *NO_TEXT)),

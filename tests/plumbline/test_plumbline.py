@@ -105,6 +105,13 @@ def test_a_sweep_is_a_table() -> None:
     assert found["outcome"].tolist()[:2] == ["completed"] * 2
 
 
+def test_settings_that_are_drawn() -> None:
+    vary = {"SIM_LOAD_MASS": "0.06:0.08", "SIM_ACT_DELAY_MS": [0, 12]}
+    found = plumbline.sweep("hover", vary=vary, sample=3, sensors="ideal", jobs=1)
+    assert found["SIM_LOAD_MASS"].between(0.06, 0.08).all() and found["SIM_LOAD_MASS"].nunique() == 3
+    assert set(found["SIM_ACT_DELAY_MS"]) == {0.0, 12.0}
+
+
 def test_a_library_that_is_missing_is_named_before_anything_is_flown(
     flight: plumbline.Flight, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -185,9 +192,17 @@ WRONG: dict[str, tuple[Any, str]] = {
         lambda: plumbline.sweep("hover", vary={"SIM_WIND_E": []}),
         "vary['SIM_WIND_E'] is empty; must be a list of one number at least",
     ),
-    "varied as on the command line": (
-        lambda: plumbline.sweep("hover", vary={"SIM_ACT_DELAY_MS": "0:3:3"}),  # type: ignore[dict-item]
-        "vary['SIM_ACT_DELAY_MS'] = '0:3:3'; must be a list of numbers",
+    "a range that is not sampled": (
+        lambda: plumbline.sweep("hover", vary={"SIM_ACT_DELAY_MS": "0:3"}),
+        "vary SIM_ACT_DELAY_MS=0:3: a range without a count is for sample; append a count, as :7",
+    ),
+    "no range": (
+        lambda: plumbline.sweep("hover", vary={"SIM_ACT_DELAY_MS": "fast"}),
+        "vary SIM_ACT_DELAY_MS=fast: ",
+    ),
+    "sampled from nothing": (
+        lambda: plumbline.sweep("hover", sample=3),
+        "sample draws the values of vary, and there is none",
     ),
     "no mission": (
         lambda: plumbline.fly(plumbline.Vehicle.load("bebop")),  # type: ignore[arg-type]

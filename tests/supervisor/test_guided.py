@@ -92,7 +92,7 @@ def test_offboard_brings_the_load_to_the_setpoint_and_holds_when_it_is_lost() ->
     assert sky.flight.phase == Phase.GUIDED
     sky.wait(0.2)
     assert sky.flight.phase == Phase.HOLD
-    assert sky.texts[-1] == "Nothing heard from setpoints any more: holding"
+    assert sky.texts[-1] == "Nothing usable from setpoints any more: holding"
     assert norm(sub(sky.view.x_load, (3.0, -1.0, 2.5))) < 0.01
 
 
@@ -170,7 +170,7 @@ def test_the_stick_leads_and_is_lost() -> None:
     assert norm(sky.view.v_load) < 0.01
     sky.wait(1.0)
     assert sky.flight.phase == Phase.HOLD
-    assert sky.texts[-1] == "Nothing heard from the stick any more: holding"
+    assert sky.texts[-1] == "Nothing usable from the stick any more: holding"
 
 
 def test_an_orbit_is_flown_about_its_centre_without_a_stream() -> None:

@@ -48,7 +48,7 @@ def watch_setpoints(flight: Flight, view: View, settings: Settings) -> Watched:
         return Watched(flight)
     guide, circle = flight.setpoints.guide, flight.setpoints.circle
     if lost(flight, view.now_us, settings):
-        text = f"Nothing heard from {guide.value} any more: holding"
+        text = f"Nothing usable from {guide.value} any more: holding"
         return Watched(flight, Event.HOLD, ((WARNING, text),))
     if guide == Guide.ORBIT and circle is not None and view.now_us >= circle.ends_us:
         return Watched(flight, Event.HOLD, ((INFO, "Circle flown: holding"),))
