@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from gcs.analysis.record import FlightMeta, Record
     from gcs.analysis.samples import Samples
     from gcs.analysis.tracks import Telemetry
-    from gcs.clients.flight import Outcome
     from plumbline.sensors import Sensors
     from plumbline.vehicles import Vehicle
 
@@ -103,7 +102,7 @@ def fly(
     with told_in_python():
         outcome = fly_here(flown, options, TlogWriter(log), _doubt)
     wall_s = time.perf_counter() - began_s
-    return Flight(flown, outcome, log.getvalue(), meta_of(flown, options, outcome, wall_s))
+    return Flight(log.getvalue(), meta_of(flown, options, outcome, wall_s), flown)
 
 
 def _doubt(line: str) -> None:
@@ -112,18 +111,41 @@ def _doubt(line: str) -> None:
 
 
 class Flight:
-    """A flight that is over.
+    """A flight that is over: flown by `fly`, or read by `load`.
 
-    `mission` is what was flown; `outcome` is `completed`, `diverged`, `timeout` or `refused`, and `reason`
-    says why it was not completed; `tlog` is its telemetry as the bytes of a `.tlog`, those of `gcs fly`.
+    `mission` is what was flown, None in a flight that was read; `tlog` is its telemetry as the bytes of a
+    `.tlog`, those of `gcs fly`.
     """
 
-    def __init__(self, mission: model.Mission, outcome: Outcome, tlog: bytes, meta: FlightMeta) -> None:
+    def __init__(self, tlog: bytes, meta: FlightMeta, mission: model.Mission | None = None) -> None:
         self.mission = mission
-        self.outcome = outcome.name
-        self.reason = outcome.reason
         self.tlog = tlog
         self._meta = meta
+
+    @classmethod
+    def load(cls, path: str | Path) -> Flight:
+        """A recorded flight: the directory that `gcs fly` or `report` left, or a `.tlog` of `gcs capture` or
+        of another ground station. What telemetry does not say is read from meta.json beside it, if there is
+        one.
+
+        `Error` if there is no telemetry.
+        """
+        from gcs.workflows.report import find_log, meta_beside
+
+        with told_in_python():
+            log = find_log(file_path("path", path))
+            return cls(log.read_bytes(), meta_beside(log))
+
+    @property
+    def outcome(self) -> str:
+        """`completed`, `diverged`, `timeout` or `refused`; of a flight that was read also what its telemetry
+        tells (docs/report.md)."""
+        return self._meta.outcome or str(self.summary["outcome"])
+
+    @property
+    def reason(self) -> str:
+        """Why it was not completed; an empty text if it was, or if nobody knows."""
+        return self._meta.reason or ""
 
     @cached_property
     def summary(self) -> Record:
@@ -195,7 +217,8 @@ class Flight:
     def __repr__(self) -> str:
         error_m = self.summary["load_error_max_m"]
         error = "" if error_m is None else f", load error at most {1e3 * error_m:.1f} mm"
-        return f"<Flight {self.mission.name}: {self.outcome}{error}>"
+        name = self._meta.mission if self.mission is None else self.mission.name
+        return f"<Flight {name or 'of an unknown mission'}: {self.outcome}{error}>"
 
     def _repr_png_(self) -> bytes:
         return self.plot().png

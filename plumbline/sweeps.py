@@ -60,11 +60,11 @@ def sweep(
     `mission`, `sensors` and `vehicle`: a shipped name, the path of a file, or one made in Python. `vary`:
     values by the name of a parameter of simulator or autopilot, in a list or in a text as of `gcs sweep
     --vary`: "LOW:HIGH:COUNT", or "LOW:HIGH" with `sample`, which draws that many settings (Latin hypercube)
-    instead of all of the grid. `settings`: parameters that are the same for all flights. `estimator` and `planner`: one of your own, as `FILE.py:CLASS`, of all flights. `jobs`
-    flights are flown at a time, by default one on each core; `scheduler` is the address
-    of a Dask scheduler, or a Dask client, that flies them instead. `out`: the directory that keeps table and
-    page (docs/cli.md), from which a sweep that was interrupted goes on; by default nothing is kept.
-    `quiet=False` shows progress on stderr.
+    instead of all of the grid. `settings`: parameters that are the same for all flights. `estimator` and
+    `planner`: one of your own, as `FILE.py:CLASS`, of all flights. `jobs` flights are flown at a time, by
+    default one on each core; `scheduler` is the address of a Dask scheduler, or a Dask client, that flies
+    them instead. `out`: the directory that keeps table and page (docs/cli.md), from which a sweep that was
+    interrupted goes on; by default nothing is kept. `quiet=False` shows progress on stderr.
 
     A table with a row for each flight, its columns those of flights.parquet (docs/cli.md): a DataFrame of
     pandas, or of polars, or a table of Arrow, as `kind` says. The flights are flown by a program of their

@@ -70,6 +70,16 @@ def find_log(source: Path) -> Path:
     return tlog
 
 
+def meta_beside(tlog: Path) -> FlightMeta:
+    """What meta.json beside the log says of the flight; nothing known if there is none."""
+    from gcs.report.build import META_FILE, ReportError, load_meta
+
+    try:
+        return load_meta(tlog.parent / META_FILE)
+    except ReportError as error:
+        raise InputError(str(error)) from None
+
+
 def report_again(
     source: Path, out: Path | None, quiet: bool, all_pictures: bool = False
 ) -> tuple[Record, Path]:

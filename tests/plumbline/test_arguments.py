@@ -36,6 +36,7 @@ CALLS: dict[str, tuple[Callable[[Any], Any], tuple[Any, ...]]] = {
     "fly settings": (lambda v: plumbline.fly("hover", settings=v), NO_MAPPING),
     "fly setting": (lambda v: plumbline.fly("hover", settings={"SIM_WIND_E": v}), (None, *NO_NUMBER)),
     "fly timeout": (lambda v: plumbline.fly("hover", timeout_s=v), NO_NUMBER),
+    "flight load": (plumbline.Flight.load, (None, *NO_PATH)),
     "sweep mission": (plumbline.sweep, (None, *NO_TEXT)),
     "sweep vary": (lambda v: plumbline.sweep("hover", vary=v), NO_MAPPING),
     "sweep varied": (

@@ -75,6 +75,48 @@ def test_pictures_and_report(flight: plumbline.Flight, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "flight.tlog").read_bytes() == flight.tlog
 
 
+def test_a_recorded_flight_is_read(flight: plumbline.Flight, tmp_path: Path) -> None:
+    flight.report(tmp_path)
+    found = plumbline.Flight.load(tmp_path)
+    assert (found.tlog, found.outcome, found.reason, found.mission) == (flight.tlog, "completed", "", None)
+    # files keep nine digits of the wall time, from which the factor is worked out
+    factor = pytest.approx(flight.summary["real_time_factor"], rel=1e-8)
+    assert found.summary == {**flight.summary, "real_time_factor": factor}
+    assert repr(found) == repr(flight)
+    assert found.telemetry().equals(flight.telemetry())
+    assert found.plot("error").png == flight.plot("error").png
+    assert found.report(tmp_path / "again").read_bytes() == (tmp_path / "report.html").read_bytes()
+
+
+def test_a_log_with_nothing_beside_it_is_read(flight: plumbline.Flight, tmp_path: Path) -> None:
+    log = tmp_path / "captured.tlog"
+    log.write_bytes(flight.tlog)
+    found = plumbline.Flight.load(str(log))
+    assert (found.outcome, found.reason, found.summary["mission"]) == ("completed", "", None)
+    assert repr(found).startswith("<Flight of an unknown mission: completed, load error at most ")
+
+
+def test_what_holds_no_flight_is_told(tmp_path: Path) -> None:
+    for write, told in (
+        (
+            lambda: None,
+            f"{tmp_path}/flight.tlog: no such file; must be a .tlog, or a directory that holds fli",
+        ),
+        ((tmp_path / "flight.tlog").touch, f"{tmp_path}/flight.tlog: holds no telemetry; must be a .tlog"),
+    ):
+        write()
+        with pytest.raises(plumbline.Error) as error:
+            plumbline.Flight.load(tmp_path)
+        assert str(error.value).startswith(told)
+
+
+def test_a_broken_meta_file_is_told(flight: plumbline.Flight, tmp_path: Path) -> None:
+    flight.report(tmp_path)
+    (tmp_path / "meta.json").write_text("[", encoding="utf-8")
+    with pytest.raises(plumbline.Error, match=r"meta\.json: .*; must be JSON: mend it, or delete it"):
+        plumbline.Flight.load(tmp_path)
+
+
 def test_a_report_replaces_another_flight_only_when_asked(flight: plumbline.Flight, tmp_path: Path) -> None:
     log, out = tmp_path / "flight.tlog", tmp_path
     log.touch()
